@@ -5,7 +5,7 @@
 
 #include <ebpo/base.h>
 
-/* Writes a * b to *out; returns false when it does not fit 64 bits. */
+/* Writes a * b to *out; returns false when the product does not fit 64 bits. */
 static inline bool ebpo_mul_ok(uint64_t a, uint64_t b, uint64_t *out)
 {
     return !__builtin_mul_overflow(a, b, out);
@@ -16,20 +16,23 @@ static inline bool ebpo_mul_ok(uint64_t a, uint64_t b, uint64_t *out)
 void *ebpo_alloc(uint64_t count, size_t size);
 /* Same as ebpo_alloc, but zeroed. */
 void *ebpo_alloc_zero(uint64_t count, size_t size);
-/* Same as ebpo_alloc, but aligned to a cache line, for data that vector instructions read and
- * write. */
+/* Same as ebpo_alloc_zero, but aligned to a cache line (64 bytes), for data that vector
+ * instructions read and write. */
 void *ebpo_alloc_lines(uint64_t count, size_t size);
-/* Resizes to count * size bytes. When it returns NULL, the old block stays valid. */
+/* Resizes a block to count * size bytes. When the function returns NULL, the old block stays valid.
+ */
 void *ebpo_realloc(void *block, uint64_t count, size_t size);
 
 /* Ensures capacity for `need` items in a growing array (*capacity items of `size` bytes at *array),
  * which grows by half. Returns false when memory is short; the array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
 
-/* The memory limit of an object that is being built; used by one thread. A refused request sets
- * `needed` to a limit that might suffice, always above `most`. */
+/* The memory limit of an object that is being built; used by one thread. All fields are in bytes.
+ */
 typedef struct ebpo_quota {
-    uint64_t most, taken, needed;
+    uint64_t most;   /* the limit */
+    uint64_t taken;  /* at most `most` */
+    uint64_t needed; /* after a refused request: a limit above `most` that might suffice */
 } ebpo_quota;
 
 /* Returns EBPO_E_LIMIT if `bytes` more bytes exceed the limit. If `space` is NULL, there is no
@@ -37,6 +40,7 @@ typedef struct ebpo_quota {
 EBPO_MUST_USE ebpo_status ebpo_quota_check(ebpo_quota *space, uint64_t bytes, ebpo_error *error);
 /* Same as ebpo_quota_check, and counts the bytes as taken. */
 EBPO_MUST_USE ebpo_status ebpo_quota_take(ebpo_quota *space, uint64_t bytes, ebpo_error *error);
+/* Returns bytes that ebpo_quota_take has counted. */
 void ebpo_quota_give(ebpo_quota *space, uint64_t bytes);
 
 #endif

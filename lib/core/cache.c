@@ -1,10 +1,10 @@
-/* Keeps items in caches under a memory budget. A pool has one lock, one table of slots by cache and
- * key, and one order of last use for all its caches; a cache with a separate budget has its own
- * pool. Memory for an item is reserved before it is loaded, and the lock is not held while a source
- * loads or releases. Meanwhile the slot is LOADING, and threads that want the same key wait.
- * Waiting reservations are served in order of arrival; otherwise a large one might wait for ever. A
- * background thread loads prefetched keys; it evicts no item that is in use or in the same
- * prefetch. */
+/* Keeps items in caches under a memory budget. A pool is a budget that several caches share. A pool
+ * has one lock, one table of slots by cache and key, and one order of last use for all its caches;
+ * a cache with a separate budget has its own pool. Memory for an item is reserved before it is
+ * loaded, and the lock is not held while a source loads or releases. Meanwhile the slot is LOADING,
+ * and threads that want the same key wait. Waiting reservations are served in order of arrival;
+ * otherwise a large reservation might wait for ever. A background thread loads prefetched keys; it
+ * evicts no item that is in use or in the same prefetch. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <signal.h>
@@ -61,7 +61,8 @@ struct ebpo_cache_pool {
     /* bytes reserved for running loads, and bytes of items being released: they become free or
      * pinned when the loads and releases end */
     uint64_t passing;
-    /* waiting gets are served in order of arrival; otherwise a large one might wait for ever */
+    /* waiting gets are served in order of arrival (by ticket); otherwise a large one might wait for
+     * ever */
     uint64_t tickets, serving;
 };
 
@@ -69,7 +70,7 @@ struct ebpo_cache {
     ebpo_cache_source source;
     char name[32];
     ebpo_cache_pool *pool;
-    bool alone; /* the pool belongs to this cache alone */
+    bool owns_pool; /* true: no other cache uses the pool, which is freed with this cache */
     /* signalled when the background thread has work; it is separate from `changed`, because each
      * unpin would wake the thread */
     pthread_cond_t work_added;
@@ -83,14 +84,14 @@ struct ebpo_cache {
     uint64_t prefetch_count; /* number of calls of ebpo_cache_prefetch */
 };
 
-/* A request for a reservation. Those of the background thread wait for all others, and drop no item
- * of the same prefetch. */
+/* A request for a reservation. Requests of the background thread wait for all other requests, and
+ * drop no item of the same prefetch. */
 typedef struct cache_demand {
-    ebpo_cache *cache; /* NULL: ebpo_cache_pool_take */
-    uint64_t key, peak;
-    bool ahead;
-    bool aside; /* a part of the bytes set aside (ebpo_cache_set_aside) */
-    bool known; /* the peak is known from an earlier attempt */
+    ebpo_cache *cache;  /* NULL: ebpo_cache_pool_take */
+    uint64_t key, peak; /* peak: bytes to reserve */
+    bool ahead;         /* the background thread loads the item */
+    bool aside;         /* a part of the bytes set aside (ebpo_cache_set_aside) */
+    bool known;         /* the peak is known from an earlier attempt */
 } cache_demand;
 
 /* The functions below are called with the lock held, and may release it meanwhile. */
@@ -196,6 +197,7 @@ static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
         c->stats.peak_bytes = c->stats.bytes;
 }
 
+/* Returns true if the key is in the latest prefetch. */
 static bool is_in_prefetch(const ebpo_cache *c, uint64_t key)
 {
     for (unsigned i = 0; i < c->ahead_count; i++)
@@ -271,12 +273,12 @@ static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
         if (saturated_sum(held, p->passing) > p->budget)
             return CAPACITY_LATER;
         cache_slot *leaving = NULL;
-        uint64_t left = saturated_sum(p->bytes, d->peak);
-        for (cache_slot *s = p->slots.oldest, *newer; s && left > p->budget; s = newer) {
+        uint64_t total = saturated_sum(p->bytes, d->peak);
+        for (cache_slot *s = p->slots.oldest, *newer; s && total > p->budget; s = newer) {
             newer = s->newer;
             if (d->ahead && s->owner == d->cache && is_in_prefetch(d->cache, s->key))
                 continue;
-            left -= s->bytes;
+            total -= s->bytes;
             s->owner->stats.evicted++;
             drop_item(p, s, &leaving);
         }
@@ -382,6 +384,7 @@ static void pin_slot(ebpo_cache *c, cache_slot *s)
 
 /* --- loading --- */
 
+/* Waits for a reservation of `peak` bytes; fails if the budget can never hold them. */
 static ebpo_status wait_for_capacity(ebpo_cache *c, uint64_t peak, ebpo_error *error)
 {
     ebpo_cache_pool *p = c->pool;
@@ -396,14 +399,16 @@ static ebpo_status wait_for_capacity(ebpo_cache *c, uint64_t peak, ebpo_error *e
                      c->name, p->budget, used, c->name, peak, saturated_sum(used, peak));
 }
 
-/* Ends a load: the item replaces `reserved` and is pinned once for each waiting thread and `own`
- * times more; after a failure only `reserved` is given back. */
-static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
+/* Ends a load: the item's bytes replace the `reserved` bytes, and the item is pinned once for each
+ * waiting thread and `caller_pins` times for this thread. After a failure, only `reserved` is given
+ * back. */
+static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved,
+                     unsigned caller_pins)
 {
     give_back_reserved(c, reserved);
     if (loaded) {
         s->state = READY;
-        s->pins = own + s->waiters;
+        s->pins = caller_pins + s->waiters;
         count_bytes(c->pool, c, s->bytes);
         if (s->pins)
             c->pool->pinned += s->bytes;
@@ -417,6 +422,7 @@ static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserve
     }
 }
 
+/* Writes the bytes that loading a key takes to *peak. The lock is not held. */
 static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_error *error)
 {
     uint64_t keep = 0;
@@ -474,8 +480,8 @@ static ebpo_status load_with_capacity(ebpo_cache *c, cache_slot *s, uint64_t pea
 /* Loads on this thread. The lock is held at beginning and end. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    cache_slot *s = add_slot(&c->pool->slots, c, key); /* from here on other threads wait for this
-                                                        * load */
+    /* after this line, other threads that need the key wait for this load */
+    cache_slot *s = add_slot(&c->pool->slots, c, key);
     uint64_t peak = 0, reserved = 0;
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
@@ -492,8 +498,8 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
     return status;
 }
 
-/* Waits for another thread's load; returns false when it failed. That thread pins the item for this
- * one. */
+/* Waits for another thread's load; returns false when the load failed. The loading thread has
+ * pinned the item for this thread. */
 static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
 {
     s->waiters++;
@@ -509,6 +515,7 @@ static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
     return false;
 }
 
+/* Pins the item of a key, which another thread has loaded or loads, or which this thread loads. */
 static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
     for (cache_slot *s; (s = find_slot(&c->pool->slots, c, key)) != NULL;) {
@@ -523,7 +530,7 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
     return load_here(c, key, item, error);
 }
 
-/* Pins an item that is in memory. */
+/* Pins the item of a key and returns true if the item is in memory. */
 static bool pin_ready(ebpo_cache *c, uint64_t key, void **item)
 {
     cache_slot *s = find_slot(&c->pool->slots, c, key);
@@ -617,8 +624,8 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
 
 /* --- prefetch --- */
 
-/* Loads d->key in the background, or skips it; returns false when it must wait for other loads. In
- * the latter case the slot is removed, and a thread that needs the key loads it. */
+/* Loads d->key in the background, or skips it. Returns false when the load must wait for other
+ * loads: then the slot is removed, so that a thread that needs the key can load it. */
 static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
     cache_slot *s =
@@ -671,7 +678,8 @@ static void *run_ahead(void *context)
     return NULL;
 }
 
-/* Starts the background thread with signals blocked: they are for the program's own threads. */
+/* Starts the background thread with signals blocked, because signals are for the program's own
+ * threads. */
 static bool start_ahead(ebpo_cache *c)
 {
     sigset_t all, before;
@@ -735,7 +743,7 @@ ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, c
     if (status == EBPO_OK)
         status = ebpo_cache_make_in(out, source, name, pool, error);
     if (status == EBPO_OK)
-        (*out)->alone = true;
+        (*out)->owns_pool = true;
     else
         ebpo_cache_pool_free(pool);
     return status;
@@ -793,7 +801,7 @@ void ebpo_cache_free(ebpo_cache *c)
     pthread_cond_broadcast(&p->changed);
     pthread_mutex_unlock(&p->lock);
     pthread_cond_destroy(&c->work_added);
-    if (c->alone)
+    if (c->owns_pool)
         ebpo_cache_pool_free(p);
     free(c);
 }

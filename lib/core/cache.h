@@ -17,9 +17,9 @@ typedef struct ebpo_cache_source {
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error);
     /* Loads an item within `most` bytes: the estimate, or UINT64_MAX without a budget. *bytes: size
-     * of the item. If `most` is too little, it returns EBPO_E_LIMIT with a sufficient size, above
-     * `most`, in *bytes; that size is then reserved and load is called again. A larger item is
-     * dropped, and the get fails with EBPO_E_LIMIT. */
+     * of the item. If `most` is too little, load returns EBPO_E_LIMIT with a sufficient size, above
+     * `most`, in *bytes; the cache then reserves that size and calls load again. An item larger
+     * than `most` is dropped, and ebpo_cache_get fails with EBPO_E_LIMIT. */
     ebpo_status (*load)(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
                         ebpo_error *error);
     void (*release)(void *user, void *item);
@@ -28,7 +28,7 @@ typedef struct ebpo_cache_source {
 typedef struct ebpo_cache_stats {
     uint64_t hits;                       /* lookups that did not wait */
     uint64_t loads, prefetched, evicted; /* loads by get, loads in the background, items dropped */
-    /* items, reservations of running loads, and bytes set aside */
+    /* bytes of items and of reservations for running loads, and bytes set aside; now and at most */
     uint64_t bytes, peak_bytes;
     double load_seconds; /* time that callers of get waited */
 } ebpo_cache_stats;
@@ -43,8 +43,8 @@ EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t b
                                                ebpo_error *error);
 /* Frees the pool; call it after freeing its caches. NULL is allowed. */
 void ebpo_cache_pool_free(ebpo_cache_pool *pool);
-/* Reserves bytes of the budget for another purpose, until they are returned. Drops items to free
- * the bytes. EBPO_E_LIMIT: items in use leave too little. */
+/* Reserves bytes of the budget for another purpose, until ebpo_cache_pool_give_back returns them.
+ * Drops items to free the bytes. EBPO_E_LIMIT: the items in use leave too few bytes. */
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *pool, uint64_t bytes,
                                                ebpo_error *error);
 void ebpo_cache_pool_give_back(ebpo_cache_pool *pool, uint64_t bytes);
@@ -75,10 +75,10 @@ void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 /* Pins an item if it is in memory; otherwise returns false without waiting. */
 bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
 
-/* Requests that a background thread (started by the first call) loads these keys in this order;
- * pending earlier requests are dropped. Background loads evict only items that are unpinned and not
- * among the keys; their failures are silent (get will load the key when needed). Keys beyond
- * EBPO_CACHE_AHEAD are ignored. Items that are in memory already count as just used. */
+/* Requests that a background thread (started by the first call) loads the items of these keys in
+ * this order; pending earlier requests are dropped. Background loads evict only items that are
+ * unpinned and not among the keys; their failures are silent (get will load the key when needed).
+ * Keys beyond EBPO_CACHE_AHEAD are ignored. Items that are in memory already count as just used. */
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 
 /* Sets the number of bytes of the budget that are set aside for other data than the items. Loads

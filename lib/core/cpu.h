@@ -2,8 +2,8 @@
  *
  * A kernel is a table of functions in NAME_kernels.c, defined as EBPO_KERNEL(table). Its header
  * declares it by EBPO_KERNELS(type, table), and callers use table_best(). lib/meson.build has one
- * row for each instruction set: its suffix and its flags. Tests compile only the base set, with
- * other flags (EBPO_BASE_KERNELS_ONLY). */
+ * row for each instruction set: its suffix and its flags. With EBPO_BASE_KERNELS_ONLY, tests
+ * compile only the kernels of the base set, with other flags. */
 #ifndef EBPO_CORE_CPU_H
 #define EBPO_CORE_CPU_H
 

@@ -44,8 +44,8 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
 /* Returns EBPO_E_ARGUMENT when the caller's result struct does not state its size. */
 #define EBPO_CHECK_SIZED(type, out, error) ebpo_sized_check((out)->struct_size, #type, error)
 
-/* Copies as much of `filled` as the caller's struct has, and zeros beyond; the caller's size stays.
- * Does nothing if no size was set. */
+/* Copies as much of `filled` as the caller's struct has, and zeros beyond; the caller's struct_size
+ * stays. Returns EBPO_E_ARGUMENT and writes nothing if struct_size is not set. */
 #define EBPO_GIVE(type, out, filled) \
     ebpo_sized_give((out), (out)->struct_size, (filled), sizeof(type))
 

@@ -22,9 +22,9 @@ static inline double ebpo_seconds(void) { return 1e-9 * (double)ebpo_clock(); }
 int ebpo_cores(void);
 
 /* Advises the system to back an array with pages of 2 MiB, as far as whole pages fit within it (no
- * more memory is taken): without it, address translation takes a fifth of the time of a search in a
- * large model. Call it before the array is filled. It is only advice; any pointer and size are
- * allowed. */
+ * more memory is taken): without such pages, address translation takes a fifth of the time of a
+ * search in a large model. Call it before the array is filled. The call is only advice; any pointer
+ * and size are allowed. */
 void ebpo_prefer_huge_pages(void *array, size_t bytes);
 
 /* Returns the bytes of memory: the machine's, or the lowest limit of a control group of this
@@ -34,8 +34,8 @@ uint64_t ebpo_machine_memory(void);
 /* Creates an unnamed temporary file. Returns its descriptor, or -1 with errno. */
 int ebpo_open_unnamed(const char *folder);
 
-/* Removes the temporary file that is being created, if it has a name for the moment. For signal
- * handlers, just before the process ends. */
+/* Removes the temporary file that is being created, if the file has a name at this moment. For
+ * signal handlers, just before the process ends. */
 void ebpo_workspace_abandon(void);
 
 #endif

@@ -1,8 +1,8 @@
-/* Runs independent pieces of work on several threads, which take the pieces in ascending
- * order. The calling thread is the first of them and alone reports progress. The thread of a piece
- * is not determined, so results must not depend on it; of several failures, the one of the lowest
- * piece is returned. All threads of the library are started here, with a fixed stack size and the
- * floating-point environment of the call. */
+/* Runs independent pieces of work on several threads, which take the pieces in ascending order. The
+ * calling thread is one of these threads, and only it reports progress. Which thread runs a piece
+ * is not determined, so results must not depend on the thread. Of several failures, the failure of
+ * the lowest piece is returned. All threads of the library are started here, with a fixed stack
+ * size and the floating-point environment of the call. */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
@@ -22,10 +22,11 @@ typedef struct run {
     void *context;
     const ebpo_progress *progress;
     const char *stage;
-    _Atomic uint64_t next, done;
+    _Atomic uint64_t next; /* first item of the next piece */
+    _Atomic uint64_t done; /* number of items done */
     atomic_bool stop;
     pthread_mutex_t lock; /* guards the three fields below */
-    uint64_t failed_at;
+    uint64_t failed_at;   /* first item of the lowest piece that failed */
     ebpo_status status;
     ebpo_error error;
 } run;

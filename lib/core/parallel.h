@@ -21,10 +21,10 @@ unsigned ebpo_thread_count(unsigned requested);
 
 /* Calls `task` over [0, count) in pieces of `grain` items (at least 1), in ascending order, on
  * `threads` threads (from ebpo_thread_count). The calling thread works too and reports progress
- * (`stage`, items done; 0 at the beginning). The thread of a piece is not determined: results must
- * not depend on it. After each piece, pages of `workspace` (may be NULL) are released if its budget
- * requires it, so tasks need not. Of several failures, the failure of the lowest piece is
- * returned. */
+ * (`stage`, items done; 0 at the beginning). Which thread runs a piece is not determined, so
+ * results must not depend on the thread. After each piece, pages of `workspace` (may be NULL) are
+ * released if its budget requires this, so tasks need not release pages. Of several failures, the
+ * failure of the lowest piece is returned. */
 ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,
                               uint64_t grain, ebpo_task_fn task, void *context,
                               const ebpo_progress *progress, const char *stage, ebpo_error *error);
@@ -38,14 +38,15 @@ bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_
 bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64_t done,
                         uint64_t total, ebpo_error *error);
 
-/* One of several passes of a stage: its progress is reported as the range from `begin` to `end` out
- * of `of`, so that the reported progress of the stage never goes back. */
+/* One of several passes of a stage: the progress of the pass is reported as the range from `begin`
+ * to `end` of a stage with `of` passes, so that the reported progress of the stage never goes back.
+ */
 typedef struct ebpo_pass {
     const ebpo_progress *to; /* NULL is allowed */
     uint64_t begin, end, of;
 } ebpo_pass;
 
-/* Returns the progress of a pass; `pass` must outlive it. */
+/* Returns the progress of a pass; `pass` must outlive the result. */
 ebpo_progress ebpo_pass_progress(ebpo_pass *pass);
 
 #endif

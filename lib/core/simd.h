@@ -1,6 +1,7 @@
 /* Named vector types for kernels (core/cpu.h): eight floats, four doubles, and three doubles, one
  * for each axis. Eight floats are one register with AVX2, otherwise two of 16 bytes (gcc 12
- * generates poor code for 32-byte vectors there). Masks are all ones or all zeros in a lane. */
+ * generates poor code for 32-byte vectors without AVX2). Masks are all ones or all zeros in a lane.
+ */
 #ifndef EBPO_CORE_SIMD_H
 #define EBPO_CORE_SIMD_H
 
@@ -76,7 +77,7 @@ typedef struct n8 {
 } n8;
 typedef struct f8_table {
     f8 first;
-    __m256i other; /* bits of floats 0 to 7, exclusive-or those of floats 8 to 15 */
+    __m256i difference; /* bits of floats 0 to 7, exclusive-or those of floats 8 to 15 */
 } f8_table;
 EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
 {
@@ -91,8 +92,10 @@ EBPO_EIGHT f8_table f8_table_load(const float *x)
 }
 EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
 {
-    __m256i other = _mm256_and_si256(_mm256_permutevar8x32_epi32(t.other, at.low), at.high);
-    return _mm256_xor_ps(_mm256_permutevar8x32_ps(t.first, at.low), _mm256_castsi256_ps(other));
+    __m256i difference =
+        _mm256_and_si256(_mm256_permutevar8x32_epi32(t.difference, at.low), at.high);
+    return _mm256_xor_ps(_mm256_permutevar8x32_ps(t.first, at.low),
+                         _mm256_castsi256_ps(difference));
 }
 EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
 {

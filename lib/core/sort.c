@@ -80,7 +80,7 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Distributes the records [begin, end) to the groups. First copies the records to `grouped`,
+/* Distributes the made records [begin, end) to the groups. First copies the records to `grouped`,
  * ordered by group; `grouped` fits in the core's cache. Then copies the records of each group to
  * `dealt` with one memcpy. A thread thus writes to `dealt` at one position at a time. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -130,6 +130,8 @@ typedef struct keyed {
     uint64_t at; /* index in the group */
 } keyed;
 
+/* Sorts by the bytes of the keys, from the lowest byte, and keeps the order of equal keys. Skips a
+ * byte that is equal in all keys. Returns the sorted array: `from` or `to`. */
 static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
 {
     uint64_t all = ~UINT64_C(0), any = 0;

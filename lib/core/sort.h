@@ -37,7 +37,7 @@ typedef struct ebpo_sort {
 /* Sorts; the result does not depend on threads or memory. */
 EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error);
 
-/* Sorts an array of numbers; fast for the few entries that most lists have. */
+/* Sorts an array of numbers in ascending order; fast for short arrays. */
 void ebpo_sort_numbers(uint64_t *numbers, uint64_t count);
 
 /* qsort with a context for the comparison; systems declare such a qsort differently or have none.

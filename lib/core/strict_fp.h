@@ -25,10 +25,10 @@ _Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024,
                "exact predicates need IEEE 754 binary64");
 
 #if defined(__clang__)
-/* clang's unsafe-math flags define no macro, but these pragmas override them. They do not override
- * -ffp-contract=fast, which is not detectable here either: tests/lint/flags/fp_flags.py detects it.
- */
-#if !defined(__wasm__) /* which clang 14 does not support there */
+/* clang's unsafe-math flags define no macro, but these pragmas override them. The pragmas do not
+ * override -ffp-contract=fast, and no macro shows that flag; tests/lint/flags/fp_flags.py detects
+ * it. */
+#if !defined(__wasm__) /* clang 14 does not support this pragma for WebAssembly */
 #pragma float_control(precise, on)
 #endif
 #pragma STDC FP_CONTRACT OFF

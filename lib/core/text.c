@@ -1,8 +1,7 @@
 /* Checks that text is valid UTF-8 (RFC 3629) without control characters. Checks dates and times of
- * ISO 8601. Provides streams into memory: if memory is lacking, those of fopencookie always report
- * it. Where the C library has no fopencookie, they use open_memstream, which does not always report
- * it.
- */
+ * ISO 8601. Provides streams into memory, by fopencookie, which reports every lack of memory. Where
+ * the C library has no fopencookie, open_memstream is used, which does not always report a lack of
+ * memory. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,12 +14,14 @@ bool ebpo_text_is_utf8(const char *text)
 {
     const uint8_t *p = (const uint8_t *)text;
     while (*p) {
+        enum { INVALID = 9 };
+        /* number of bytes that must follow this byte */
         unsigned more = *p < 0x80                 ? 0
                         : *p >= 0xc2 && *p < 0xe0 ? 1
                         : *p >= 0xe0 && *p < 0xf0 ? 2
                         : *p >= 0xf0 && *p < 0xf5 ? 3
-                                                  : 9;
-        if (more == 9)
+                                                  : INVALID;
+        if (more == INVALID)
             return false;
         if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
             (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90))
@@ -64,8 +65,8 @@ static bool read_digits(const char **text, int count, int least, int most, int *
 static int days_in_month(int year, int month)
 {
     static const int days[] = { 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31 };
-    bool leaps = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
-    return days[month - 1] + (month == 2 && leaps);
+    bool is_leap_year = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
+    return days[month - 1] + (month == 2 && is_leap_year);
 }
 
 /* Returns true for HH:MM, HH:MM:SS and HH:MM:SS.decimals, each followed by Z, +HH:MM, -HH:MM or

@@ -21,10 +21,10 @@ static inline ebpo_wide ebpo_wide_plus(ebpo_wide a, ebpo_wide b)
 static inline ebpo_wide ebpo_wide_product_by_halves(uint64_t a, uint64_t b)
 {
     uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
-    uint64_t one = al * bh, two = ah * bl;
-    ebpo_wide p =
-        ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl }, (ebpo_wide){ one >> 32, one << 32 });
-    return ebpo_wide_plus(p, (ebpo_wide){ two >> 32, two << 32 });
+    uint64_t middle_a = al * bh, middle_b = ah * bl;
+    ebpo_wide p = ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl },
+                                 (ebpo_wide){ middle_a >> 32, middle_a << 32 });
+    return ebpo_wide_plus(p, (ebpo_wide){ middle_b >> 32, middle_b << 32 });
 }
 
 /* Returns the exact product. */
@@ -83,15 +83,15 @@ static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
                            (ebpo_wide){ a.high ^ sign, a.low });
 }
 
-/* Returns a modulo m, unsigned; m in 1 .. 2^63. */
+/* Returns the remainder of a / m, both unsigned; m in 1 .. 2^63. */
 static inline uint64_t ebpo_wide_modulo(ebpo_wide a, uint64_t m)
 {
-    uint64_t rest = a.high % m;
+    uint64_t remainder = a.high % m;
     for (int bit = 63; bit >= 0; bit--) {
-        rest = rest * 2 + (a.low >> bit & 1);
-        rest -= rest >= m ? m : 0;
+        remainder = remainder * 2 + (a.low >> bit & 1);
+        remainder -= remainder >= m ? m : 0;
     }
-    return rest;
+    return remainder;
 }
 
 #endif

@@ -25,6 +25,7 @@
  * pool, which is one extent, because a build has thousands of such arrays. */
 enum { PAGE_BYTES = 4096, LEAST_EXTENT = 1 << 16, POOL_BYTES = 1 << 20, BUCKET_BITS = 10 };
 
+/* OWN: one array. POOL: several arrays. PART: one array in a pool. */
 typedef enum extent_kind { EXTENT_OWN, EXTENT_POOL, EXTENT_PART } extent_kind;
 
 typedef struct extent {
@@ -32,10 +33,10 @@ typedef struct extent {
     size_t bytes;
     extent_kind kind;
     bool filed;          /* true if in a file */
-    struct extent *pool; /* pool of a part */
-    size_t used; /* for a pool: bytes given out, and the number of parts that are not freed */
-    uint64_t parts;
-    struct extent *next;
+    struct extent *pool; /* of a part: its pool */
+    size_t used;         /* of a pool: bytes given out */
+    uint64_t parts;      /* of a pool: number of parts that are not freed */
+    struct extent *next; /* next in the bucket of the table */
 } extent;
 
 struct ebpo_workspace {
@@ -61,8 +62,7 @@ static inline extent **extent_bucket(ebpo_workspace *w, const void *at)
     return &w->table[page * UINT64_C(0x9e3779b97f4a7c15) >> (64 - BUCKET_BITS)];
 }
 
-/* Extents of a workspace: whole pages of memory or of files. */
-
+/* Chooses the folder of temporary files, and checks that a file can be created there. */
 static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_error *error)
 {
     const char *folder = wanted ? wanted : getenv("TMPDIR");
@@ -181,6 +181,7 @@ ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const cha
         strerror(fault));
 }
 
+/* Adds an extent to the table. */
 static void enter_extent(ebpo_workspace *w, extent *b)
 {
     pthread_mutex_lock(&w->table_lock);
@@ -209,7 +210,7 @@ static extent *remove_extent(ebpo_workspace *w, const void *at)
     return found;
 }
 
-/* Chooses memory or file, and counts the bytes. */
+/* Chooses memory or a file, and counts the bytes. Returns true for a file. */
 static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 {
     ebpo_workspace_stats *f = &w->usage;
@@ -257,8 +258,8 @@ static int allocate_blocks(int fd, size_t bytes)
 #endif
 }
 
-/* Maps a file whose blocks are allocated before it is written to; otherwise a full disk would raise
- * a signal. */
+/* Maps a new file and allocates its blocks first, because writing to a mapping on a full disk would
+ * raise a signal. */
 static void *map_file(ebpo_workspace *w, size_t bytes)
 {
     int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : allocate_blocks(fd, bytes);
@@ -341,6 +342,7 @@ static extent *make_part(ebpo_workspace *w, size_t bytes)
     return part;
 }
 
+/* Counts a freed part of a pool; frees the pool after its last part. */
 static void leave_pool(ebpo_workspace *w, extent *pool)
 {
     pthread_mutex_lock(&w->pool_lock);
@@ -359,8 +361,9 @@ static void leave_pool(ebpo_workspace *w, extent *pool)
     unmap_extent(w, pool);
 }
 
-/* Frees a part's memory or blocks, if possible. */
-static void give_back(const extent *b)
+/* Returns a part's memory, or its blocks in the file, to the system, where the system allows this.
+ */
+static void discard_pages(const extent *b)
 {
 #ifdef EBPO_HAVE_MADV_REMOVE
     madvise(b->at, b->bytes, b->filed ? MADV_REMOVE : MADV_DONTNEED);
@@ -376,14 +379,14 @@ static void free_extent(ebpo_workspace *w, extent *b)
         return;
     }
     if (w->page == PAGE_BYTES) /* only whole pages, so that no neighbour is affected */
-        give_back(b);
+        discard_pages(b);
     extent *pool = b->pool;
     free(b);
     leave_pool(w, pool);
 }
 
-/* Allocates an array. Small arrays and arrays without a workspace are not in the table: malloc
- * never returns whole pages. */
+/* Allocates an array. Arrays smaller than a page and arrays without a workspace come from malloc
+ * and are not in the table. */
 static void *alloc_array(ebpo_workspace *w, uint64_t count, size_t size, bool zero)
 {
     uint64_t bytes;
@@ -413,7 +416,7 @@ void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size)
 
 void ebpo_array_free(ebpo_workspace *workspace, void *array)
 {
-    /* malloc returns whole pages only by chance: the table decides */
+    /* an array of malloc begins at a page only by chance, so the table decides */
     extent *b = workspace && array && (uintptr_t)array % PAGE_BYTES == 0
                     ? remove_extent(workspace, array)
                     : NULL;
@@ -472,20 +475,21 @@ typedef struct residency {
     uint64_t all, files; /* bytes */
 } residency;
 
+/* Returns the resident memory of this process. */
 static residency read_residency(const ebpo_workspace *w)
 {
     char text[128], *at = text;
-    uint64_t numbers[3]; /* pages: size, resident, resident of files */
+    uint64_t pages[3]; /* size of the process, resident, resident and of files */
     ssize_t got = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
     text[got > 0 ? got : 0] = 0;
     for (int i = 0; i < 3; i++) {
         char *end;
-        numbers[i] = strtoull(at, &end, 10);
+        pages[i] = strtoull(at, &end, 10);
         if (end == at)
             return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: always release */
         at = end;
     }
-    return (residency){ numbers[1] * w->page, numbers[2] * w->page };
+    return (residency){ pages[1] * w->page, pages[2] * w->page };
 }
 
 static void release_extent(const extent *b)
@@ -504,7 +508,7 @@ void ebpo_release_pages(ebpo_workspace *workspace)
         return;
     pthread_mutex_lock(&w->table_lock);
     residency now = read_residency(w); /* another thread may have released pages meanwhile */
-    /* releasing would free hardly anything */
+    /* also return if releasing would free hardly anything */
     if (now.all <= w->usage.memory / 4 * 3 || now.files < w->floor + w->usage.memory / 16) {
         pthread_mutex_unlock(&w->table_lock);
         return;
@@ -516,7 +520,7 @@ void ebpo_release_pages(ebpo_workspace *workspace)
                 release_extent(b);
     /* The floor rises slowly, because pages that other threads bring in meanwhile do not belong to
      * it. */
-    uint64_t left = read_residency(w).files, most = w->floor + w->usage.memory / 64;
-    w->floor = left < most ? left : most;
+    uint64_t resident = read_residency(w).files, floor_max = w->floor + w->usage.memory / 64;
+    w->floor = resident < floor_max ? resident : floor_max;
     pthread_mutex_unlock(&w->table_lock);
 }

@@ -12,7 +12,7 @@ EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t
 /* Reports why the last allocation of this size failed: EBPO_E_MEMORY, or EBPO_E_IO with the folder.
  */
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error);
-/* Same as ebpo_workspace_fail, when the size is not known any more. `what` completes the message,
+/* Same as ebpo_workspace_fail, for callers that do not know the size. `what` completes the message,
  * as in "while joining levels". */
 ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what,
                                       ebpo_error *error);
@@ -25,9 +25,9 @@ const char *ebpo_workspace_folder(const ebpo_workspace *workspace);
 uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
 
 /* Releases pages of files when the budget is nearly used up; written data stays in the file. Call
- * it between pieces of work, on each thread and for every few megabytes visited; it is cheap, and
- * NULL is allowed. Loops (below) and runs of pieces (core/parallel.h) call it; other code, such as
- * a recursion, must call it itself. */
+ * this function between pieces of work, on each thread, after every few megabytes visited. A call
+ * is cheap, and NULL is allowed. Loops (below) and runs of pieces (core/parallel.h) make these
+ * calls; other code, such as a recursion, must make them itself. */
 void ebpo_release_pages(ebpo_workspace *workspace);
 
 /* Number of items between two releases, for arrays visited in order, and for loops whose items may
@@ -35,12 +35,12 @@ void ebpo_release_pages(ebpo_workspace *workspace);
 enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 
 /* Loops over the items of large arrays. A workspace with a budget keeps arrays in files, whose
- * visited pages stay in memory until released: these loops release them, so that bodies need not.
- * Bodies may `continue`, `break` and return; `end` is evaluated once. With a NULL `workspace` the
- * cost is one test. */
+ * visited pages stay in memory until released. These loops release the pages, so that the loops'
+ * bodies need not. Bodies may `continue`, `break` and return; `end` is evaluated once. With a NULL
+ * `workspace` the cost is one test. */
 
-/* Releases pages whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two. That many
- * bodies should visit at most a few megabytes. */
+/* Releases pages whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two. The
+ * bodies of `every` items should visit at most a few megabytes. */
 #define EBPO_FOR_ITEMS_EVERY(workspace, every, i, begin, end) \
     for (uint64_t i = (begin), i##_end = (end); i < i##_end; ebpo_items_step(workspace, every, ++i))
 
@@ -52,7 +52,7 @@ enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 #define EBPO_FOR_ITEMS_SCATTERED(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_SCATTERED, i, begin, end)
 
-/* Loops over pieces of a few megabytes each, or smaller ones if the work on them takes long. Each
+/* Loops over pieces of a few megabytes each, or of less if the work on a piece takes long. Each
  * piece begins at `at`. */
 #define EBPO_FOR_PIECES(workspace, at, end, piece)         \
     for (uint64_t at = 0, at##_end = (end); at < at##_end; \
@@ -67,17 +67,17 @@ static inline void ebpo_items_step(ebpo_workspace *workspace, uint64_t every, ui
 /* --- arrays in memory or in temporary files --- */
 
 /* Allocates count * size uninitialised bytes; returns NULL when the product overflows, memory is
- * short or the disk full (ebpo_workspace_fail reports which). A NULL workspace means malloc. The
- * array belongs to the workspace: an object that owns the array also keeps the workspace, to free
- * the array with it. */
+ * short or the disk full (ebpo_workspace_fail reports which). A NULL workspace means malloc.
+ * ebpo_array_free needs the same workspace, so an object that owns the array also keeps a pointer
+ * to the workspace. */
 void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size);
-/* Same, zeroed. */
+/* Same as ebpo_array_alloc, zeroed. */
 void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size);
 /* Same as ebpo_grow, for workspace arrays. */
 bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                      size_t size);
-/* Grows by ebpo_grow while the array is small, as nearly all are, and by ebpo_array_grow once it is
- * large. */
+/* Grows by ebpo_grow while the array is small (most arrays stay small), and by ebpo_array_grow once
+ * the array is large. */
 bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                           size_t size);
 /* Frees an array of `workspace`, or of malloc if `workspace` is NULL. A NULL array is allowed. */

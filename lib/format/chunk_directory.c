@@ -34,6 +34,8 @@ uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
                                        : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
 }
 
+/* Returns the array of a number in a list, or EBPO_ARRAYS for an unknown number. *level: level, or
+ * number of the attribute array. */
 static ebpo_array_id find_array(uint32_t number, int *level)
 {
     *level = 0;
@@ -159,6 +161,8 @@ ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, 
 
 /* --- stored sizes --- */
 
+/* Returns the stored bytes of a level. If `located` is false, counts only arrays with a single
+ * chunk, as the sizes of the others are not known yet. */
 static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
 {
     uint64_t bytes = 0;
@@ -210,7 +214,7 @@ static double decoded_bytes(const ebpo_array_in *a)
 
 ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, ebpo_error *error)
 {
-    double bytes = 0, space = (double)file->info.file_bytes;
+    double bytes = 0, file_bytes = (double)file->info.file_bytes;
     for (int level = 0; level < file->info.level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             bytes += decoded_bytes(&file->level_array[level][id]);
@@ -219,18 +223,18 @@ ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, eb
     for (int i = 0; i < file->attributes.arrays; i++)
         bytes += decoded_bytes(&file->attributes.array[i]);
     most = most ? most : EBPO_EXPANSION_MAX;
-    if (most == UINT64_MAX || bytes <= (double)EBPO_EXPANSION_FREE || bytes <= (double)most * space)
+    if (most == UINT64_MAX || bytes <= (double)EBPO_EXPANSION_FREE ||
+        bytes <= (double)most * file_bytes)
         return EBPO_OK;
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, file->in.shown,
-        "decoded, its arrays take %.0f MB, %.0f times the file and more than %llu times: the "
-        "file may be designed to exhaust memory; if you trust it, read it with --max-expansion "
-        "%.0f",
-        bytes / 1e6, bytes / space, (unsigned long long)most, bytes / space + 1);
+        "the decoded arrays take %.0f MB, %.0f times the size of the file (limit: %llu times); the "
+        "file may be designed to exhaust memory; if you trust it, use --max-expansion %.0f",
+        bytes / 1e6, bytes / file_bytes, (unsigned long long)most, bytes / file_bytes + 1);
 }
 
 /* Finds the rows of one array from *row on, and moves *row past them. Skips rows of unknown arrays
- * that precede them. */
+ * that precede the array's rows. */
 static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint64_t *list,
                              uint64_t rows, uint64_t *row, ebpo_error *error)
 {
@@ -247,6 +251,7 @@ static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint
                                  "the list has more or fewer chunks than", a->path, error);
 }
 
+/* Finds the rows of all arrays in the list of chunk checksums, which is sorted by array number. */
 static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -282,17 +287,17 @@ static ebpo_status read_checksums(ebpo_file *file, ebpo_error *error)
 
 ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error)
 {
-    ebpo_file *own = ebpo_reader_own(file);
+    ebpo_file *mutable_file = ebpo_reader_own(file);
     ebpo_status status = EBPO_OK;
     if (!file->has_checksums || atomic_load(&file->checksums_read))
         return EBPO_OK;
-    pthread_mutex_lock(&own->lock);
-    if (!atomic_load(&own->checksums_read)) {
-        status = read_checksums(own, error);
+    pthread_mutex_lock(&mutable_file->lock);
+    if (!atomic_load(&mutable_file->checksums_read)) {
+        status = read_checksums(mutable_file, error);
         if (status == EBPO_OK)
-            atomic_store(&own->checksums_read, true);
+            atomic_store(&mutable_file->checksums_read, true);
     }
-    pthread_mutex_unlock(&own->lock);
+    pthread_mutex_unlock(&mutable_file->lock);
     return status;
 }
 
@@ -359,6 +364,7 @@ static ebpo_status list_fails(const ebpo_file *file, const char *what, const cha
     return long_chunk_fail(file, EBPO_A_CHUNK_DIRECTORY, what, path, error);
 }
 
+/* Stores the location of the next chunk of the array with this number. */
 static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location chunk,
                               ebpo_error *error)
 {
@@ -371,7 +377,7 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
                                                 : &l->file->root_array[id];
     uint64_t *listed = listed_count(l, id, level);
     if (!a->present)
-        return EBPO_OK; /* the header requires no such array: its rows are ignored */
+        return EBPO_OK; /* the file has no such array, so these rows are ignored */
     if (*listed == ebpo_shape_chunks(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
     if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
@@ -387,7 +393,8 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
     return EBPO_OK;
 }
 
-/* Allocates an array's table of chunks. First checks that the list has enough rows for it. */
+/* Allocates an array's table of chunks. First checks that the list has enough rows for the table.
+ */
 static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
                                ebpo_error *error)
 {
@@ -401,6 +408,7 @@ static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chun
     return a->chunks ? EBPO_OK : ebpo_fail_memory(error, *chunks * sizeof *a->chunks);
 }
 
+/* Checks that the list had a row for each chunk of the array. */
 static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *error)
 {
     uint64_t listed = *listed_count(l, a->id, a->level);
@@ -413,20 +421,21 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *rows, uint64_t c
                                ebpo_error *error)
 {
     listing *l = ebpo_alloc_zero(1, sizeof *l);
-    uint64_t at = file->info.head_bytes, chunks = 0;
+    uint64_t offset = file->info.head_bytes, chunks = 0;
     ebpo_status status = l ? EBPO_OK : ebpo_fail_memory(error, sizeof *l);
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         status = begin_array(file, ebpo_array_number(file, i), &chunks, error);
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        if (ebpo_list_row_value(rows[i]) > file->end - at)
+        if (ebpo_list_row_value(rows[i]) > file->end - offset)
             status =
                 list_fails(file, "a chunk is beyond the end of the file in", "the list", error);
         else
-            status = list_chunk(l, ebpo_list_row_number(rows[i]),
-                                (ebpo_chunk_location){ at, ebpo_list_row_value(rows[i]) }, error);
-        at += ebpo_list_row_value(rows[i]);
+            status =
+                list_chunk(l, ebpo_list_row_number(rows[i]),
+                           (ebpo_chunk_location){ offset, ebpo_list_row_value(rows[i]) }, error);
+        offset += ebpo_list_row_value(rows[i]);
     }
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         status = end_array(l, ebpo_array_number(file, i), error);
@@ -434,7 +443,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *rows, uint64_t c
     return status;
 }
 
-/* Discards the chunk offsets of a list that was only partly valid. */
+/* Discards the chunk offsets that were read before an error in the list. */
 static void discard_offsets(ebpo_file *file)
 {
     for (int i = 0; i < ebpo_all_arrays(file); i++) {
@@ -496,6 +505,7 @@ ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array
 
 /* --- information about each array --- */
 
+/* Returns present array number n, in the order of the format, or NULL. */
 static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
 {
     for (int level = 0; level < file->info.level_count; level++)

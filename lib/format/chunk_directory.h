@@ -1,5 +1,5 @@
-/* Offset, stored size and checksum of every chunk of an open file. format-spec/subtrees.md
- * and checksums.md. */
+/* Declares the chunk directory: offset, stored size and checksum of every chunk of an open file
+ * (format-spec/subtrees.md, checksums.md). A chunk is the unit of compression in HDF5. */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H
 
@@ -67,7 +67,8 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t s
                                                  uint64_t **values, const char **why,
                                                  ebpo_error *error);
 
-/* Reads an array that is such a list: array->shape.rows values, which the caller frees. */
+/* Reads an array that is a list in a single chunk: array->shape.rows values, which the caller
+ * frees. */
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *array,
                                                uint64_t **values, ebpo_error *error);
 
@@ -85,7 +86,7 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* The list /chunk_checksums contains the last four bytes of every chunk of a file. The checksum
  * inside a chunk does not identify the chunk. Without the list, a chunk of another position or file
- * version would be accepted. format-spec/checksums.md --- */
+ * version would be accepted. Source: format-spec/checksums.md. */
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */

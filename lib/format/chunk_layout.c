@@ -1,10 +1,11 @@
 /* Computes the layout of a file's chunks, for the writer: the number of rows in the chunks of each
- * array, the order of chunks, and the chunks that each subtree needs. Levels near the root are
- * stored whole. Deep levels are stored subtree by subtree. One subtree is one range of bytes,
- * except for the chunks of faces and vertices that it shares with earlier subtrees. These
- * shared chunks are listed in /subtrees/shared_chunks. /subtrees/counts contains the numbers of
- * items of each subtree. All computations use integers, because the bytes of a file depend on them.
- * Source: format-spec/subtrees.md. */
+ * array, the order of chunks, and the chunks that each subtree needs. A subtree begins at a gray
+ * node (a node with children) of a fixed level. Levels near the root are stored whole. Deep levels
+ * are stored subtree by subtree. One subtree is one range of bytes, except for the chunks of faces
+ * and vertices that it shares with earlier subtrees. These shared chunks are listed in
+ * /subtrees/shared_chunks. /subtrees/counts contains the numbers of items of each subtree. All
+ * computations use integers, because the bytes of a file depend on them. Source:
+ * format-spec/subtrees.md. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,8 +27,8 @@ typedef struct owned_range {
     uint64_t face, face_end, vertex;
 } owned_range;
 
-/* Lists of the shared chunks of one subtree after the other. A block is a chunk of /mesh/faces or
- * /mesh/vertices. */
+/* Lists the shared chunks of each subtree in turn. A block is a chunk of /mesh/faces or
+ * /mesh/vertices. A round is the work on one subtree. */
 typedef struct shared_blocks {
     uint32_t *face_round, *vertex_round; /* [blocks] last round in which a block was listed */
     uint32_t round;                      /* number of the current subtree, from 1 */
@@ -53,8 +54,8 @@ static int last_whole_level(const ebpo_info *info)
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
 }
 
-/* Returns the first deep level. The levels between these two have chunks sorted by subtree, level
- * by level; the chunks of all deep levels are sorted together. */
+/* Returns the first deep level. The levels between the last whole level and this level have chunks
+ * sorted by subtree, level by level; the chunks of all deep levels are sorted together. */
 static int first_deep_level(const ebpo_info *info)
 {
     int level = last_whole_level(info) + 1;
@@ -65,20 +66,21 @@ static int first_deep_level(const ebpo_info *info)
 }
 
 /* Returns the power of two with the smallest ratio to the number of rows for CHUNK_FACES faces: the
- * first power that is not less than that number divided by the root of 2. Compares squares of
- * integers, because the bytes of a file depend on the result. There are at most 2^40 rows, and both
- * sides are below 2^64 before squaring. */
+ * first power that is not less than that number of rows divided by the square root of 2. Compares
+ * squares of integers, because the bytes of a file depend on the result. There are at most 2^40
+ * rows, and both sides are below 2^64 before squaring. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
     uint64_t wanted = rows * CHUNK_FACES, found = 1;
     for (;; found *= 2) {
-        uint64_t has = found * info->face_count;
-        if (!ebpo_wide_less(ebpo_wide_left(ebpo_wide_product(has, has), 1),
+        uint64_t product = found * info->face_count;
+        if (!ebpo_wide_less(ebpo_wide_left(ebpo_wide_product(product, product), 1),
                             ebpo_wide_product(wanted, wanted)))
             return found;
     }
 }
 
+/* Returns the number of rows in a chunk in a file with subtrees; UINT64_MAX: all rows. */
 static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t row_bytes)
 {
@@ -163,6 +165,7 @@ static void shared_blocks_free(shared_blocks *blocks)
     free(blocks->vertex_block);
 }
 
+/* Lists a block in `blocks`, once in each round. */
 static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
                        uint64_t *count)
 {
@@ -172,6 +175,7 @@ static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_
     blocks[(*count)++] = (uint32_t)block;
 }
 
+/* Lists the blocks of the shared vertices of a face. */
 static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own, uint64_t face)
 {
     for (int k = 0; k < 3; k++) {
@@ -182,8 +186,8 @@ static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const owned_range 
     }
 }
 
-/* Lists the blocks of the shared faces among these references of the subtree's leaves, and the
- * blocks of their shared vertices. */
+/* Lists the blocks of the shared faces among these references (faces that an earlier leaf lists),
+ * and the blocks of the shared vertices of these faces. */
 static void shared_blocks_refer(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own,
                                 const uint32_t *refs, uint64_t count)
 {
@@ -208,15 +212,17 @@ static int compare_descending(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
+/* Sorts the blocks in descending order and writes the distance of each block from `from` to `out`,
+ * except for blocks behind `from`, which the subtree owns. Returns the number of distances. */
 static uint64_t sort_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
 {
-    uint64_t taken = 0;
+    uint64_t written = 0;
     if (count)
         qsort(blocks, count, sizeof *blocks, compare_descending);
     for (uint64_t i = 0; i < count; i++)
         if (blocks[i] <= from)
-            out[taken++] = (uint32_t)(from - blocks[i]);
-    return taken;
+            out[written++] = (uint32_t)(from - blocks[i]);
+    return written;
 }
 
 /* Writes the listed blocks to `out`, blocks of faces first: each as the distance from the block of
@@ -265,12 +271,14 @@ void ebpo_subtree_sums_free(ebpo_subtree_sums *sums)
     memset(sums, 0, sizeof *sums);
 }
 
+/* Context of the functions that count the items of subtrees. */
 typedef struct counting {
     ebpo_subtree_sums *sums;
     const ebpo_tree *tree;
     const ebpo_info *info;
 } counting;
 
+/* Returns the sums of all columns before a subtree. */
 static uint64_t *row_of(const counting *c, uint64_t subtree)
 {
     return c->sums->before + subtree * c->sums->cols;
@@ -281,6 +289,7 @@ static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsign
     return row_of(c, subtree)[ebpo_subtree_column(c->info, level, what)];
 }
 
+/* Returns the first group (eight siblings) of a level that belongs to a subtree. */
 static uint64_t first_group(const counting *c, uint64_t subtree, int level)
 {
     return level == c->info->subtree_level + 1 ? subtree
@@ -301,7 +310,7 @@ static void count_leaves(const counting *c, const ebpo_level *level, uint64_t le
     sum[EBPO_S_ENDS] = level->leaf_first[end - 1] + level->leaf_new[end - 1];
 }
 
-/* Computes the columns of one level from those of the previous level. */
+/* Computes the columns of one level from the columns of the previous level. */
 static void count_level(const counting *c, int number)
 {
     const ebpo_level *level = &c->tree->level[number];
@@ -321,8 +330,8 @@ static void count_level(const counting *c, int number)
     }
 }
 
-/* Finds the subtree's owned faces, [*first, *end). The new faces of its leaves form one range
- * without gaps. */
+/* Finds the subtree's owned faces, [*first, *end). The new faces of its leaves (faces that no
+ * earlier leaf lists) form one range without gaps. */
 static void owned_faces(const counting *c, uint64_t subtree, uint64_t *first, uint64_t *end)
 {
     *first = UINT64_MAX;
@@ -339,6 +348,7 @@ static void owned_faces(const counting *c, uint64_t subtree, uint64_t *first, ui
     }
 }
 
+/* Counts the owned faces of each subtree, and the faces before them that no subtree owns. */
 static void count_faces(const counting *c)
 {
     uint64_t at = 0, first, end;
@@ -376,6 +386,7 @@ static void count_vertices(const counting *c)
     }
 }
 
+/* Lists the shared chunks of all subtrees. */
 static ebpo_status list_shared(const counting *c, ebpo_error *error)
 {
     shared_blocks blocks;
@@ -410,8 +421,8 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
     return status;
 }
 
-/* Computes /subtrees/counts, which are differences of the sums, and the sums before each chunk of
- * counts. Returns false if a count exceeds its type. */
+/* Computes /subtrees/counts (the differences of the sums) and the sums before each chunk of counts.
+ * Returns false if a count exceeds 32 bits. */
 static bool split_sums(const counting *c)
 {
     ebpo_subtree_sums *s = c->sums;
@@ -478,8 +489,8 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
     }
 }
 
-/* Returns the subtree of a row of an array of the mesh, of the maps, or of a level below the
- * subtrees' roots. Rows before the first subtree count as its rows. */
+/* Returns the subtree of a row of an array of the mesh, of source indices, or of a level below the
+ * subtrees' roots. Rows before the first subtree count as rows of the first subtree. */
 static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)
 {
@@ -508,6 +519,7 @@ static void add_array(ordering *o, unsigned array)
         o->out->chunk[o->out->count++] = (ebpo_ordered_chunk){ array, (uint32_t)k, 0 };
 }
 
+/* Compares chunks by subtree, then by array, then by number. */
 static int by_subtree(const void *a, const void *b)
 {
     const ebpo_ordered_chunk *x = a, *y = b;
@@ -517,13 +529,25 @@ static int by_subtree(const void *a, const void *b)
                                 : (x->chunk > y->chunk) - (x->chunk < y->chunk);
 }
 
-/* Selection of the arrays that come next in the file. */
+/* Selects the arrays whose chunks come next in the file. */
 typedef struct choice {
     int first_level, last_level; /* for arrays of levels */
-    enum { WHOLE, TOP_INDEXES, SURFACE, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
+    enum {
+        WHOLE,           /* all arrays of the levels */
+        TOP_INDEXES,     /* index arrays of the levels, and other arrays that locate subtrees */
+        SURFACE,         /* arrays of /surface */
+        NODES,           /* arrays of the levels that describe nodes */
+        LISTS,           /* arrays of the levels that describe face lists */
+        MESH,            /* vertices, faces, and source indices of faces */
+        MAPS,            /* source indices of vertices */
+        TABLE,           /* /subtrees/counts and /subtrees/shared_chunks */
+        OF_MESH,         /* attributes of vertices and faces */
+        OTHER_ATTRIBUTES /* attributes of other elements */
+    } kind;
 } choice;
 
-/* Returns true for arrays of a level that describe face lists; the others describe nodes. */
+/* Returns true for arrays of a level that describe face lists; the other arrays of a level describe
+ * nodes. */
 static bool is_of_faces(ebpo_array_id id)
 {
     return id == EBPO_A_LEAF_SKIP || id == EBPO_A_LEAF_NEW || id == EBPO_A_LEAF_REF_COUNT ||
@@ -549,7 +573,7 @@ static bool is_chosen(const choice *c, const ebpo_array_out *a)
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
     case MAPS: return a->id == EBPO_A_VERTEX_SOURCE;
     case OF_MESH: return a->id == EBPO_A_ATTRIBUTE && a->rows_of != EBPO_A_ATTRIBUTE;
-    case REST: return a->id == EBPO_A_ATTRIBUTE && a->rows_of == EBPO_A_ATTRIBUTE;
+    case OTHER_ATTRIBUTES: return a->id == EBPO_A_ATTRIBUTE && a->rows_of == EBPO_A_ATTRIBUTE;
     case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_SHARED;
     }
     return false;
@@ -562,6 +586,7 @@ static void add_chosen_chunks(ordering *o, const choice *c)
             add_array(o, i);
 }
 
+/* Adds the chosen chunks, sorted by subtree. */
 static void add_by_subtree(ordering *o, const choice *c)
 {
     uint64_t begin = o->out->count;
@@ -582,21 +607,22 @@ static void add_by_subtree(ordering *o, const choice *c)
 static void order_subtrees(ordering *o)
 {
     const ebpo_info *info = &o->plan->info;
-    int whole = last_whole_level(info), deep = first_deep_level(info), last = info->level_count - 1;
-    add_chosen_chunks(o, &(choice){ 0, whole, WHOLE });
-    add_chosen_chunks(o, &(choice){ whole + 1, last, TOP_INDEXES });
+    int whole_level = last_whole_level(info), deep_level = first_deep_level(info),
+        last = info->level_count - 1;
+    add_chosen_chunks(o, &(choice){ 0, whole_level, WHOLE });
+    add_chosen_chunks(o, &(choice){ whole_level + 1, last, TOP_INDEXES });
     o->out->top = o->out->count;
     add_chosen_chunks(o, &(choice){ 0, 0, SURFACE });
     add_chosen_chunks(o, &(choice){ 0, 0, TABLE });
-    for (int level = whole + 1; level < deep; level++)
+    for (int level = whole_level + 1; level < deep_level; level++)
         add_by_subtree(o, &(choice){ level, level, NODES });
-    add_by_subtree(o, &(choice){ whole + 1, deep - 1, LISTS });
-    add_by_subtree(o, &(choice){ deep, last, NODES });
-    add_by_subtree(o, &(choice){ deep, last, LISTS });
+    add_by_subtree(o, &(choice){ whole_level + 1, deep_level - 1, LISTS });
+    add_by_subtree(o, &(choice){ deep_level, last, NODES });
+    add_by_subtree(o, &(choice){ deep_level, last, LISTS });
     add_by_subtree(o, &(choice){ 0, 0, MESH });
     add_by_subtree(o, &(choice){ 0, 0, MAPS });
     add_by_subtree(o, &(choice){ 0, 0, OF_MESH });
-    add_chosen_chunks(o, &(choice){ 0, 0, REST });
+    add_chosen_chunks(o, &(choice){ 0, 0, OTHER_ATTRIBUTES });
 }
 
 ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan, ebpo_error *error)

@@ -10,7 +10,8 @@
 #include "hdf5_write/h5.h"
 #include "mesh/attributes.h"
 
-/* The tables of subtrees: counts and their prefix sums (no checksums). */
+/* Counts of the items of each subtree, and prefix sums of these counts. A column is an array of a
+ * level or of the mesh (ebpo_subtree_column). */
 typedef struct ebpo_subtree_sums {
     uint64_t subtrees;
     uint32_t cols;
@@ -38,20 +39,22 @@ typedef struct ebpo_array_out {
     int level;
     char path[EBPO_PATH_BYTES];
     ebpo_shape shape; /* before ebpo_stored_shape */
-    bool gates;       /* faces, stored as gates across edges */
+    bool gates; /* true: faces that are stored as gates across edges (hdf5_read/face_gates.h) */
     /* native integers, row by row; NULL for arrays with a special coding */
     const void *values;
     uint8_t value_size;
-    ebpo_h5_id handle;
-    bool columns; /* for attributes: true if written as columns */
+    ebpo_h5_id handle; /* of the array in the file, while it is written */
+    bool columns;      /* for attributes: true if written as columns */
     /* for attributes: the array that has the same rows (vertices or faces), or EBPO_A_ATTRIBUTE */
     ebpo_array_id rows_of;
 } ebpo_array_out;
 
 /* Properties of an attribute array that its HDF5 attributes state. */
 typedef struct ebpo_attribute_plan {
-    bool columns, items_columns, has_range;
-    double range[2];
+    bool columns;       /* the values are written as columns */
+    bool items_columns; /* the items of the lists are written as columns */
+    bool has_range;
+    double range[2]; /* least and greatest value */
 } ebpo_attribute_plan;
 
 typedef struct ebpo_plan {
@@ -75,9 +78,9 @@ uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, 
                             uint32_t cols, uint32_t element_size);
 
 /* Returns the original number of rows in each chunk for a file that another program has rewritten.
- * See ebpo_h5_chunk_rows_fn. The values cannot be decoded with another number, as codes restart at
- * each chunk. If `kept` is true, arrays whose chunk size the format does not fix keep their current
- * chunk size, if the format allows it. */
+ * See ebpo_h5_chunk_rows_fn. Codes restart at each chunk, so the values can only be decoded with
+ * this number of rows. If `kept` is true, arrays whose chunk size the format does not fix keep
+ * their current chunk size, if the format allows it. */
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
                                     bool kept);
 

@@ -21,6 +21,7 @@ enum { CHUNK_BITS = 48, AROUND = 4 };
 /* Limits of prefetched bytes of a counted cache: a maximum, and shares of the remaining limit. */
 enum { AHEAD_MAX = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
 
+/* Returns the key of a chunk in the cache: the array's number and the chunk's number. */
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t number = array->id < EBPO_LEVEL_ARRAYS
@@ -46,8 +47,8 @@ static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BIT
 /* Returns the rows of a chunk without the padding of the last chunk. */
 static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
 {
-    uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows;
-    return left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
+    uint64_t remaining = array->shape.rows - chunk * array->shape.chunk_rows;
+    return remaining < array->shape.chunk_rows ? remaining : array->shape.chunk_rows;
 }
 
 static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
@@ -59,6 +60,8 @@ static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint
     return EBPO_OK;
 }
 
+/* Decodes the corners of faces and checks that the vertices exist and agree with the index array.
+ */
 static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t rows,
                                 const uint8_t *raw, uint32_t *corners, ebpo_error *error)
 {
@@ -97,17 +100,18 @@ static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const ui
                                      error);
 }
 
+/* Decodes source indices (positions in the source mesh) of vertices or faces. */
 static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t rows,
-                              const uint8_t *raw, uint32_t *numbers, ebpo_error *error)
+                              const uint8_t *raw, uint32_t *indices, ebpo_error *error)
 {
     const ebpo_info *info = &c->file->info;
     uint64_t limit = id == EBPO_A_FACE_SOURCE
                          ? info->source_face_count + info->repair_record.added_faces
                          : info->source_vertex_count;
     uint32_t largest = 0;
-    ebpo_numbers_decode(raw, rows, numbers);
+    ebpo_numbers_decode(raw, rows, indices);
     for (uint64_t i = 0; i < rows; i++)
-        largest = numbers[i] > largest ? numbers[i] : largest;
+        largest = indices[i] > largest ? indices[i] : largest;
     return largest < limit
                ? EBPO_OK
                : ebpo_chunks_fail(c, -1, id, "a source index is out of range or used twice", error);
@@ -128,6 +132,7 @@ static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array,
     }
 }
 
+/* Adds the chunks [begin, end) of an array that are not in memory to the hints. */
 static void hint_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
                          uint64_t end)
 {
@@ -175,13 +180,14 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     uint64_t prefetched = c->file->in.source.prefetched,
              index_end = info->chunk_index_offset + info->chunk_index_bytes;
     /* locating the chunks reads the headers again */
-    uint64_t again = prefetched < info->head_bytes ? info->chunk_index_offset : 0;
+    uint64_t header = prefetched < info->head_bytes ? info->chunk_index_offset : 0;
     uint64_t index = index_end <= prefetched                 ? 0
                      : info->chunk_index_offset < prefetched ? index_end - prefetched
                                                              : info->chunk_index_bytes;
-    return again + index + ebpo_reader_chunk_bound(array);
+    return header + index + ebpo_reader_chunk_bound(array);
 }
 
+/* Returns true if `more` bytes can be read within the limit. */
 static bool fits_budget(const ebpo_chunks *c, uint64_t more)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes) + c->ahead_bytes;
@@ -211,6 +217,7 @@ static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64
     return fits_budget(c, cost) ? EBPO_OK : refuse_load(c, array, error);
 }
 
+/* Returns true if the chunk of a key is prefetched and not yet read. */
 static bool is_ahead(const ebpo_chunks *c, uint64_t key)
 {
     for (uint64_t i = 0; i < c->ahead_count; i++)
@@ -234,9 +241,9 @@ uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
-/* Sends prefetch hints for chunks of a counted cache, within its limit. Their bytes count as read
- * from then on. The first `now` chunks are needed at once. The others are prefetched only while the
- * prefetched and unread bytes are few (ebpo_chunks_capacity). */
+/* Sends prefetch hints for chunks of a counted cache, within its limit. The bytes of a chunk count
+ * as read from its hint on. The first `now` chunks are needed at once. The other chunks are
+ * prefetched only while few bytes are prefetched and unread (ebpo_chunks_capacity). */
 static void chunks_hint(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -244,7 +251,7 @@ static void chunks_hint(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsi
     for (unsigned i = 0; i < count; i++) {
         const ebpo_array_in *array = array_of(c, keys[i]);
         if (ebpo_shape_chunks(&array->shape) > 1 && !atomic_load(&c->file->located))
-            continue; /* its offset is not known yet */
+            continue; /* the chunk's offset is not known yet */
         uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
         if (is_ahead(c, keys[i]) || !fits_budget(c, cost) || (i >= now && cost > space) ||
             !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
@@ -278,6 +285,7 @@ void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys)
     clear_slots(keys, 16);
 }
 
+/* Returns the slot in which the key is or belongs. */
 static uint64_t slot_of(const ebpo_chunk_keys *keys, uint64_t key)
 {
     uint64_t at;
@@ -348,8 +356,8 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
     return status;
 }
 
-/* Reads the number of vertices that the faces before each chunk of faces use. In a counted cache,
- * this is done when the first chunk of faces is read. */
+/* Reads the number of vertices that the faces before each chunk of faces use. A counted cache reads
+ * this when the first chunk of faces is read. */
 static ebpo_status read_vertices_before(ebpo_chunks *c, ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
@@ -485,8 +493,8 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 {
     uint64_t chunk = row / view->array->shape.chunk_rows;
     void *item;
-    ebpo_held_chunk_release(chunks,
-                            view); /* before loading, as a small budget may need its space */
+    /* released before loading, because a small budget may need the memory of the pinned chunk */
+    ebpo_held_chunk_release(chunks, view);
     uint64_t key = key_of(view->array, chunk);
     if (chunks->collecting && !ebpo_cache_has(chunks->cache, key)) {
         add_key(chunks->collecting, key, cost_of(chunks, view->array, chunk));
@@ -504,13 +512,13 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 
 /* --- rows of plain arrays --- */
 
-static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers,
+static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t count,
                            uint8_t *values, size_t size)
 {
     if (shape->element_size == size && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
-        memcpy(values, rows, numbers * size);
+        memcpy(values, rows, count * size);
     else
-        ebpo_integers_decode(rows, shape->element_size, shape->is_signed, numbers, values, size);
+        ebpo_integers_decode(rows, shape->element_size, shape->is_signed, count, values, size);
 }
 
 static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
@@ -565,7 +573,7 @@ ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                              uint64_t rows, size_t size, void *values_out, ebpo_error *error)
 {
     void *values = NULL;
-    /* checked before memory is allocated */
+    /* check the request before memory is allocated by its size */
     ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
     if (status == EBPO_OK && rows) {
         const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);

@@ -8,16 +8,17 @@
 #include "core/cache.h"
 #include "format/reader.h"
 
-/* Cache of decoded chunks under a budget (0: no limit; the smallest usable one is a few MiB). */
+/* Cache of decoded chunks under a budget (0: no limit; the smallest usable budget is a few MiB). */
 typedef struct ebpo_chunks ebpo_chunks;
 EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
                                            uint64_t budget, ebpo_error *error);
 /* Creates a cache under a shared budget. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file,
                                               ebpo_cache_pool *pool, ebpo_error *error);
-/* Creates a counted cache for one thread at a time. It reads and prefetches only requested data.
- * ebpo_chunks_limit sets the maximum number of bytes read from the file; initially there is none. A
- * read beyond the limit returns EBPO_E_LIMIT, and ebpo_chunks_refused then returns true. */
+/* Creates a counted cache for one thread at a time. The cache reads and prefetches only requested
+ * data. ebpo_chunks_limit sets the maximum number of bytes read from the file; a new cache has no
+ * limit. A read beyond the limit returns EBPO_E_LIMIT, and ebpo_chunks_refused then returns true.
+ */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
                                                    uint64_t budget, ebpo_error *error);
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
@@ -39,15 +40,16 @@ struct ebpo_chunks {
     /* [chunks of /mesh/faces] number of vertices that the faces before each chunk use;
      * NULL: a single chunk, or no mesh */
     uint64_t *vertices_before;
-    pthread_mutex_t lock;        /* for `rows` */
+    pthread_mutex_t lock;        /* guards `rows` */
     struct ebpo_kept_rows *rows; /* recently used rows of the table of subtrees, or NULL */
     /* State of counted chunks (ebpo_chunks_make_counted), which one thread uses at a time. */
     bool counted;
     bool refused;    /* a load was refused because of the limit */
     uint64_t limit;  /* maximum number of bytes read from the file, including prefetched bytes */
     uint64_t *ahead; /* [ahead_count] keys that are prefetched and not yet read */
-    uint64_t ahead_count, ahead_capacity, ahead_bytes;
-    struct ebpo_chunk_keys *collecting; /* set by ebpo_chunks_collect */
+    uint64_t ahead_count, ahead_capacity;
+    uint64_t ahead_bytes;               /* stored bytes of these chunks */
+    struct ebpo_chunk_keys *collecting; /* set by ebpo_chunks_collect; NULL: chunks are read */
 };
 
 /* A position in an array, with at most one chunk pinned while its rows are needed. Initialise with
@@ -57,15 +59,17 @@ typedef struct ebpo_held_chunk {
     uint64_t key;
     uint64_t begin, end; /* row range of the pinned chunk */
     /* NULL: no chunk is pinned. Integers as in the file; faces as u32 corners, vertices as floats
-     * or doubles, maps as u32 */
+     * or doubles, source indices as u32 */
     const uint8_t *rows;
 } ebpo_held_chunk;
 
+/* Pins the chunk of a row, as ebpo_held_chunk_move does when the row is in another chunk. */
 EBPO_MUST_USE ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view,
                                                uint64_t row, ebpo_error *error);
 void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view);
 
-/* Pins the chunk that contains the existing row `row`. Cheap while rows stay in one chunk. */
+/* Pins the chunk that contains row `row`, which must exist. A call is cheap while the rows stay in
+ * one chunk. */
 EBPO_MUST_USE static inline ebpo_status ebpo_held_chunk_move(ebpo_chunks *chunks,
                                                              ebpo_held_chunk *view, uint64_t row,
                                                              ebpo_error *error)
@@ -74,15 +78,15 @@ EBPO_MUST_USE static inline ebpo_status ebpo_held_chunk_move(ebpo_chunks *chunks
                                                  : ebpo_held_chunk_load(chunks, view, row, error);
 }
 
-/* Does the same as ebpo_chunks_integers, into new memory that the caller frees. `values_out` is the
- * address of the pointer; the pointer is NULL for 0 rows. */
+/* Same as ebpo_chunks_integers, but allocates the memory, which the caller frees. `values_out` is
+ * the address of the pointer; the pointer is NULL for 0 rows. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                            uint64_t row, uint64_t rows, size_t size,
                                            void *values_out, ebpo_error *error);
 
 /* Adds the chunks of existing rows in [row, row + rows) that are not in memory to `hints`. In a
- * counted cache, it only adds them to the keys of ebpo_chunks_collect, if any; use the functions
- * below. */
+ * counted cache, adds the chunks only to the keys of ebpo_chunks_collect, if any, and not to
+ * `hints`; callers of a counted cache use the functions below. */
 void ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *hints, ebpo_array_id id, int level,
                       uint64_t row, uint64_t rows);
 
@@ -98,7 +102,7 @@ typedef struct ebpo_chunk_keys {
 void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys);
 
 /* Adds the chunks of existing rows in [row, row + rows) that are not in memory to `keys`. Returns
- * true if there are any. */
+ * true if there are such chunks. */
 bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
                          uint64_t rows, ebpo_chunk_keys *keys);
 

@@ -1,8 +1,8 @@
 /* Computes the content checksum from the path and the SHA-256 of each array, sorted by path. The
  * SHA-256 is computed from the array's bytes before shuffle and compression, so the checksum does
- * not depend on the codec, the chunks or HDF5. Codes that restart at each chunk (vertices, maps)
- * are recoded as in a file without subtrees. The part `attributes` has a separate checksum of its
- * values, so the content checksum is the same with and without attributes. Source:
+ * not depend on the codec, the chunks or HDF5. Codes that restart at each chunk (vertices, source
+ * indices) are recoded as in a file without subtrees. The part `attributes` has a separate checksum
+ * of its values, so the content checksum is the same with and without attributes. Source:
  * format-spec/checksums.md. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,8 +16,8 @@
 #include "format/schema.h"
 #include "hdf5_read/coding.h"
 
-/* Number of faces in a chunk of a file without subtrees, and number of chunks that contain as many
- * faces in a file with subtrees. */
+/* Number of faces in a chunk of a file without subtrees (PLAIN_FACE_ROWS), and number of chunks
+ * with together as many faces in a file with subtrees (SKIPPED). */
 enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
 
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
@@ -50,7 +50,8 @@ static uint64_t encode_zigzag(uint64_t value, unsigned size)
 }
 
 /* Writes the chunk's first row to `joined`, recoded as a difference from the last row of the
- * previous chunk if `goes_on` is true. Stores the values of the chunk's last row. */
+ * previous chunk if `goes_on` is true (the previous chunk is part of the same larger chunk). Stores
+ * the values of the chunk's last row. */
 static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool goes_on,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {
@@ -69,6 +70,7 @@ static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool
     }
 }
 
+/* Adds only the rows of the index that a file without subtrees has. */
 static void add_faces_index(ebpo_array_digest *digest, uint64_t row, uint64_t rows,
                             size_t row_bytes, const uint8_t *bytes)
 {
@@ -143,14 +145,14 @@ enum { PIECE = 1 << 16 };
 static void digest_values(ebpo_content *content, int number, ebpo_workspace *workspace,
                           const uint8_t *values, uint64_t count, size_t size)
 {
-    uint8_t file[PIECE], digest[32];
+    uint8_t encoded[PIECE], digest[32];
     char path[EBPO_PATH_BYTES];
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
     EBPO_FOR_PIECES(workspace, at, count, PIECE / size) {
         uint64_t step = count - at < PIECE / size ? count - at : PIECE / size;
-        ebpo_integers_encode(values + at * size, size, step, size, file);
-        ebpo_sha256_add(&state, file, step * size);
+        ebpo_integers_encode(values + at * size, size, step, size, encoded);
+        ebpo_sha256_add(&state, encoded, step * size);
     }
     ebpo_sha256_end(&state, digest);
     ebpo_attribute_path(number, path);

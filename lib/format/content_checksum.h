@@ -1,7 +1,7 @@
 /* Computes the content checksum of a file: the SHA-256 of one entry per array, sorted by path. An
  * entry is the path, a zero byte, and the SHA-256 of the array as stored before shuffle and
- * compression. The checksum does not depend on the codec, the chunks or HDF5. A few lines of Python
- * compute it. */
+ * compression. The checksum does not depend on the codec, the chunks or HDF5, so that other
+ * programs can compute it. */
 #ifndef EBPO_FORMAT_CONTENT_CHECKSUM_H
 #define EBPO_FORMAT_CONTENT_CHECKSUM_H
 
@@ -22,7 +22,8 @@ typedef struct ebpo_content_entry {
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
 /* The four checksums. Colours, the border of a surface with its winding numbers, and the simplified
- * surface have separate ones, so the content checksum is the same with and without these parts. */
+ * surface have separate checksums, so the content checksum is the same with and without these
+ * parts. */
 enum {
     EBPO_DIGEST_CONTENT,
     EBPO_DIGEST_COLOURS,
@@ -30,6 +31,7 @@ enum {
     EBPO_DIGEST_SURFACE,
     EBPO_DIGESTS
 };
+/* Returns the checksum to which an array belongs. */
 static inline int ebpo_content_of(ebpo_array_id id, bool solid)
 {
     bool border = id == EBPO_A_BORDER_LOOPS || id == EBPO_A_BORDER_POINTS ||
@@ -42,8 +44,8 @@ static inline int ebpo_content_of(ebpo_array_id id, bool solid)
 }
 
 /* Digest of one array, computed chunk by chunk. In a file with subtrees, chunks have fewer rows
- * than in a file without. They are joined to the larger chunks, and codes that restart with each
- * chunk are recoded. */
+ * than in a file without. The digest joins these chunks to the larger chunks, and recodes codes
+ * that restart with each chunk. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
     uint64_t last[3]; /* running sums of the components at the end of the previous chunk */
@@ -63,7 +65,9 @@ typedef struct ebpo_content {
     uint64_t count, capacity;
 } ebpo_content;
 
+/* Adds the entry of an array; a lack of memory is reported by ebpo_content_end. */
 void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32]);
+/* Computes the checksum of all entries. */
 EBPO_MUST_USE ebpo_status ebpo_content_end(ebpo_content *content, uint8_t digest[32],
                                            ebpo_error *error);
 void ebpo_content_free(ebpo_content *content);

@@ -1,4 +1,4 @@
-/* Defines an open file and the locations of its arrays. */
+/* Defines an open file and the locations of the file's arrays. */
 #ifndef EBPO_FORMAT_FILE_IN_H
 #define EBPO_FORMAT_FILE_IN_H
 
@@ -20,7 +20,7 @@ typedef struct ebpo_chunk_reader {
     size_t capacity;
 } ebpo_chunk_reader;
 
-/* Chunk reader and buffer of one thread. */
+/* Chunk reader, and buffer for the decoded chunk, of one thread. */
 typedef struct ebpo_idle_reader ebpo_idle_reader;
 struct ebpo_idle_reader {
     ebpo_idle_reader *next;
@@ -36,13 +36,14 @@ typedef struct ebpo_idle_readers {
     unsigned count;
 } ebpo_idle_readers;
 
+/* An array of an open file. */
 typedef struct ebpo_array_in {
-    bool present;
+    bool present; /* false: the file lacks the array, and no other field is valid */
     ebpo_array_id id;
-    int level;
+    int level; /* of attributes: number of the array; 0 for other arrays without a level */
     char path[EBPO_PATH_BYTES];
     ebpo_shape shape; /* of the result of ebpo_reader_chunk */
-    bool gates;       /* stored as gates, so the stored shape differs: ebpo_stored_shape */
+    bool gates;       /* true: faces, stored as gates in the shape of ebpo_stored_shape */
     uint64_t stored_bytes;
     /* [ebpo_shape_chunks(&shape)] location of each chunk; NULL when the array is absent. Valid
      * after ebpo_reader_locate, or always for a single chunk */
@@ -60,8 +61,8 @@ static inline size_t ebpo_reader_chunk_bound(const ebpo_array_in *array)
 
 /* Properties of an attribute array that its HDF5 attributes state. */
 typedef struct ebpo_attribute_in {
-    ebpo_attribute head; /* no values */
-    bool different;      /* lists have different lengths */
+    ebpo_attribute head; /* names and types, without values */
+    bool different;      /* true: the lists have different lengths */
     bool has_range;
     double range[2];
 } ebpo_attribute_in;
@@ -76,7 +77,7 @@ typedef struct ebpo_attributes_in {
 
 struct ebpo_file {
     ebpo_input in;
-    uint64_t end; /* of the HDF5 file; the stored file may have more bytes */
+    uint64_t end; /* end of the HDF5 data in bytes; the stored file may be longer */
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* from EBPO_A_VERTICES on */
@@ -86,7 +87,7 @@ struct ebpo_file {
     bool has_directory;         /* the file has a list of chunk offsets */
     bool has_checksums;         /* the file has a list of chunk checksums: chunk_directory.h */
     atomic_bool checksums_read; /* the list of chunk checksums has been read */
-    uint32_t *checksums;        /* NULL until then */
+    uint32_t *checksums;        /* the list, or NULL before it has been read */
     ebpo_idle_readers idle;
 };
 
@@ -130,8 +131,8 @@ static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, eb
 /* Returns the stored size of an array; 0 while another thread may be locating its chunks. */
 uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array);
 
-/* Returns the stored bytes of a level. While another thread may be locating the chunks, it counts
- * only sizes that are known since opening. */
+/* Returns the stored bytes of a level. While another thread may be locating the chunks, counts only
+ * sizes that have been known since the file was opened. */
 uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);
 
 #endif

@@ -25,12 +25,12 @@ ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *n
                               "there is no level %d; the file has levels 0 to %d", node->cell.level,
                               info->level_count - 1);
     const ebpo_level_summary *s = &info->level[node->cell.level];
-    const uint64_t all[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
-    if (node->rank >= all[node->type])
+    const uint64_t counts[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
+    if (node->rank >= counts[node->type])
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
                               "level %d has %" PRIu64 " nodes of type %d; number %" PRIu64
                               " was requested",
-                              node->cell.level, all[node->type], (int)node->type, node->rank);
+                              node->cell.level, counts[node->type], (int)node->type, node->rank);
     return EBPO_OK;
 }
 
@@ -51,7 +51,8 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
     if (status == EBPO_OK &&
         gray->cell.level + 1 ==
-            chunks->file->info.level_count) { /* a pruned node: ebpo_facts_check excludes others */
+            chunks->file->info.level_count) { /* a pruned node (without children in the file):
+                                                 ebpo_facts_check excludes other nodes */
         *types = 0;
         memset(ranks, 0, 4 * sizeof *ranks);
         return EBPO_OK;
@@ -83,6 +84,7 @@ static plane_list planes_of(const ebpo_chunks *chunks, const ebpo_node *node)
                                                    EBPO_PART_PLANES, s->plane_count };
 }
 
+/* Reads and checks the plane codes of one node. */
 static ebpo_status read_codes(ebpo_chunks *chunks, const plane_list *list, int level,
                               uint64_t first, unsigned count, uint32_t *codes, ebpo_error *error)
 {
@@ -103,7 +105,7 @@ ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *node,
                                uint32_t codes[EBPO_NODE_PLANES], unsigned *count, ebpo_error *error)
 {
     uint64_t first = 0;
-    uint8_t own = 0;
+    uint8_t plane_count = 0;
     *count = 0;
     ebpo_status status = node->type == EBPO_LEAF
                              ? ebpo_chunks_check_node(chunks, node, error)
@@ -118,11 +120,11 @@ ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *node,
                  ? ebpo_ranks_leaf_planes(chunks, level, node->rank, &first, error)
                  : ebpo_ranks_planes(chunks, level, node->rank, &first, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, list.counts, level, node->rank, 1, &own, sizeof own,
-                                      error);
-    if (status == EBPO_OK && own)
-        status = read_codes(chunks, &list, level, first, own, codes, error);
-    *count = status == EBPO_OK ? own : 0;
+        status = ebpo_chunks_integers(chunks, list.counts, level, node->rank, 1, &plane_count,
+                                      sizeof plane_count, error);
+    if (status == EBPO_OK && plane_count)
+        status = read_codes(chunks, &list, level, first, plane_count, codes, error);
+    *count = status == EBPO_OK ? plane_count : 0;
     return status;
 }
 
@@ -196,8 +198,10 @@ static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_
 
 const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };
 
+/* Returns the item of the index row before an item. */
 static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
 
+/* Reads the types and ranks of a group, and counts its nodes by type. */
 static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, ebpo_group *out,
                               uint64_t counts[4], ebpo_error *error)
 {
@@ -219,6 +223,8 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
 
 /* --- planes --- */
 
+/* Appends the plane codes of the group's nodes of one type to the group. `all`: number of planes in
+ * the level. */
 static ebpo_status read_group_codes(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                     uint64_t first, uint64_t all, const uint8_t *counts,
                                     uint64_t nodes, ebpo_group *out, ebpo_node_type type,
@@ -356,7 +362,7 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
 /* --- chunks of a group that are not in memory --- */
 
 /* Adds the missing chunks of an item's index row, and of the counts from this row to the last of
- * `items` items. Returns true if there are any. */
+ * `items` items. Returns true if chunks are missing. */
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
@@ -372,15 +378,18 @@ static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array
            missing;
 }
 
+/* Adds the missing chunks of the plane codes of `count` nodes. Returns true if chunks are missing.
+ */
 static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_id codes, int level,
                           uint64_t rank, uint64_t count, uint64_t first, ebpo_chunk_keys *keys)
 {
-    uint8_t own[8];
+    uint8_t plane_counts[8];
     uint64_t sum = 0;
-    if (ebpo_chunks_integers(chunks, counts, level, rank, count, own, sizeof *own, NULL) != EBPO_OK)
+    if (ebpo_chunks_integers(chunks, counts, level, rank, count, plane_counts, sizeof *plane_counts,
+                             NULL) != EBPO_OK)
         return false;
     for (uint64_t i = 0; i < count; i++)
-        sum += own[i];
+        sum += plane_counts[i];
     return ebpo_chunks_missing(chunks, codes, level, first, sum, keys);
 }
 
@@ -397,7 +406,7 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
         ebpo_array_id id;
         unsigned wanted;
     } arrays[] = {
-        { EBPO_A_TYPES, ~0u },
+        { EBPO_A_TYPES, ~0u }, /* always */
         { EBPO_A_PLANE_COUNTS, EBPO_GROUP_PLANES },
         { EBPO_A_PLANES, EBPO_GROUP_PLANES },
         { EBPO_A_LEAF_WINDING, EBPO_GROUP_WINDINGS },
@@ -467,7 +476,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
                              unsigned wanted, ebpo_error *error)
 {
     enum {
-        STAGES = 4 /* rows of the table of subtrees, types, counts, planes */,
+        STAGES = 4,            /* rows of the table of subtrees, types, counts, planes */
         FIRST_BYTES = 32 << 10 /* bytes of the next levels that are fetched with level 0 */
     };
     ebpo_status status = EBPO_OK;
@@ -476,7 +485,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
         ebpo_chunk_keys_begin(&keys);
         if (!group_is_missing(chunks, &groups[0], wanted, &keys))
             break;
-        unsigned own = keys.count;
+        unsigned of_first = keys.count; /* keys of the first group, which are needed now */
         uint64_t small = 0;
         for (int level = 1;
              groups[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES;
@@ -484,7 +493,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
             small += add_small(chunks, level, wanted, &keys);
         for (unsigned i = 1; i < count; i++)
             (void)group_is_missing(chunks, &groups[i], wanted, &keys);
-        status = ebpo_chunks_fetch(chunks, &keys, own, error);
+        status = ebpo_chunks_fetch(chunks, &keys, of_first, error);
     }
     return status;
 }

@@ -27,8 +27,8 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_nod
 EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
                                               int32_t *winding, ebpo_error *error);
 
-/* Reads the root. With ebpo_chunks_source, it serves cursors (geometry/cursor.h) whose holder is an
- * ebpo_chunks. */
+/* Reads the root. With ebpo_chunks_source, this function serves cursors (geometry/cursor.h) whose
+ * holder is an ebpo_chunks. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error);
 
 extern const ebpo_node_source ebpo_chunks_source;
@@ -37,13 +37,14 @@ extern const ebpo_node_source ebpo_chunks_source;
 
 enum { EBPO_GROUP_CODES = 8 * 255, EBPO_GROUP_BLOCK = EBPO_INDEX_ROWS };
 
-/* Data that a caller requests in addition to the types. Data that the file lacks are omitted. */
+/* Data that a caller requests (`wanted`) in addition to the types. Data that the file lacks are
+ * omitted. */
 enum { EBPO_GROUP_PLANES = 1, EBPO_GROUP_WINDINGS = 2 };
 
 typedef struct ebpo_group {
     uint16_t types;
     uint64_t rank[4]; /* rank in the level of the group's first node of each type */
-    /* by octant: planes added by gray nodes, stored planes of leaves */
+    /* by octant: number of planes that a gray node adds, or that are stored for a leaf */
     uint8_t plane_count[8];
     uint32_t codes[EBPO_GROUP_CODES]; /* in node order; valid codes */
     unsigned code_count;
@@ -69,8 +70,9 @@ typedef struct ebpo_group_number {
 bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *group, unsigned wanted);
 
 /* Fetches the missing chunks of the first group from a remote file. Prefetches the missing chunks
- * of the other groups at the same time, as far as they are known. For EBPO_GROUP_BLOCK adjacent
- * groups, one group in `groups` is sufficient. Returns EBPO_E_LIMIT like ebpo_group_read. */
+ * of the other groups at the same time, if memory already has the data that locate these chunks.
+ * For EBPO_GROUP_BLOCK adjacent groups, one group in `groups` is sufficient. Returns EBPO_E_LIMIT
+ * like ebpo_group_read. */
 EBPO_MUST_USE ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups,
                                            unsigned count, unsigned wanted, ebpo_error *error);
 

@@ -36,18 +36,19 @@ typedef enum fact_kind {
     FACT_WORD     /* enumeration as a word, see `words` */
 } fact_kind;
 
+/* Conversion of one member of a struct to one attribute. */
 typedef struct fact {
     const char *name;
     fact_kind kind;
-    size_t offset, size;
-    const char *const *words;
+    size_t offset, size;      /* of the member, in bytes */
+    const char *const *words; /* for FACT_WORD: words by value, then NULL */
 } fact;
 
 #define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
 
 enum { WELD_FACTS = 3 };
-/* A word in the lists of parts. A reader may ignore an unknown optional part. A reader that ignores
- * a required part would return wrong results. */
+/* A word in the attributes required_parts and optional_parts. A reader may ignore an unknown
+ * optional part, but without a required part it would return wrong results. */
 typedef struct part_word {
     const char *word;
     unsigned part; /* an ebpo_part, a WORD_ constant, or 0: in every file */
@@ -154,8 +155,8 @@ static const part_word part_words[] = {
 };
 static const int part_word_count = sizeof part_words / sizeof part_words[0];
 
-/* Attributes of files with a selection of planes that is not the default. Readers do not need them.
- */
+/* Attributes of files with a selection of planes that is not the default. Readers do not need these
+ * attributes. */
 static const char *const normals_words[] = { "spherical", "angle", NULL };
 static const fact selection_facts[] = {
     { "selection_percent", FACT_REAL, FACT_AT(percent) },
@@ -175,7 +176,7 @@ static const fact weld_facts[WELD_FACTS] = {
     { "mend_collapsed_faces", FACT_COUNT, FACT_AT(repair_record.collapsed_faces) },
 };
 
-/* Attributes of files with subtrees (the first and the last), or with colours. */
+/* Attributes of files with subtrees (subtree_level, top_bytes) or with colours (colours_sha256). */
 static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(subtree_level) },
                   colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
                   top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
@@ -302,6 +303,8 @@ static const char *check_box(const ebpo_info *info)
     return NULL;
 }
 
+/* Checks the counts of a level against the level above, the next level and the parts. Returns the
+ * error's text or NULL; the other check_ functions return the same. */
 static const char *check_level_counts(const ebpo_info *info, int level)
 {
     const ebpo_level_summary *s = &info->level[level];
@@ -416,6 +419,7 @@ static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, cons
     return EBPO_E_ARGUMENT;
 }
 
+/* Writes the list of the required parts, or of the optional parts, of the file. */
 static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                              bool required, ebpo_error *error)
 {
@@ -620,6 +624,7 @@ ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id, const char
                : status;
 }
 
+/* Reads a number that must fit the member's type. */
 static ebpo_status get_limited(ebpo_head *in, ebpo_head_object id, const char *object,
                                const fact *f, void *field, ebpo_error *error)
 {
@@ -699,7 +704,7 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
             error, EBPO_E_VERSION, in->shown,
             "format version %d.%d, but this library reads version %d; use a newer library",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
-    char words[32] = ""; /* only this text distinguishes draft files */
+    char words[32] = ""; /* only this text distinguishes files of the draft and of version 1.0 */
     if (status == EBPO_OK)
         status = ebpo_head_get_text(in, root, "/", "format_version", words, sizeof words, error);
     if (status == EBPO_E_ABSENT)
@@ -711,7 +716,8 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* Marks a known part as present in *found. A part may be in either of the two lists. */
+/* Sets the bit of a known part in *found (bit i: part_words[i]). A part may be in either of the two
+ * lists, but only once. */
 static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, unsigned *found,
                              ebpo_error *error)
 {
@@ -738,16 +744,16 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
     unsigned found = 0;
     for (int required = 1; required >= 0; required--) {
         const char *name = required ? "required_parts" : "optional_parts";
-        char words[1024], *rest = words;
+        char words[1024], *remaining = words;
         ebpo_status status = ebpo_head_get_text(in, root, "/", name, words, sizeof words, error);
         if (status == EBPO_E_ABSENT)
             return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
                                 "attribute %s is missing; get a fresh copy of the file", name);
         if (status == EBPO_OK && !*words)
-            rest = NULL; /* the list is empty */
-        while (status == EBPO_OK && rest) {
-            char *word = rest, *space = strchr(rest, ' ');
-            rest = space ? space + 1 : NULL;
+            remaining = NULL; /* the list is empty */
+        while (status == EBPO_OK && remaining) {
+            char *word = remaining, *space = strchr(remaining, ' ');
+            remaining = space ? space + 1 : NULL;
             if (space)
                 *space = 0;
             status = *word ? mark_part(in, word, required, &found, error)
@@ -778,6 +784,8 @@ static ebpo_status get_subtrees(ebpo_head *in, ebpo_head_object root, ebpo_info 
     return status;
 }
 
+/* Reads the attributes that only subsets have. subset_levels, subset_box and subset_error may be
+ * absent. */
 static ebpo_status get_subset(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                               ebpo_error *error)
 {
@@ -805,8 +813,9 @@ static ebpo_status get_subset(ebpo_head *in, ebpo_head_object root, ebpo_info *i
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
-/* Reads an attribute that is a word. Sets *out to the value for which word_of returns this word, or
- * to -1 for a word of a newer library. Leaves *out unchanged if the attribute is absent. */
+/* Reads an optional attribute that is a word. Sets *out to the value for which word_of returns this
+ * word, or to -1 for a word of a newer library. Leaves *out unchanged if the attribute is absent.
+ */
 static ebpo_status get_known(ebpo_head *in, ebpo_head_object root, const char *name,
                              const char *(*word_of)(int value), int *out, ebpo_error *error)
 {
@@ -840,7 +849,7 @@ static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info
     return status;
 }
 
-/* Reads the number of dropped faces. If it is not 0, dropping was requested. */
+/* Reads the number of dropped faces. If this number is not 0, dropping was requested. */
 static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                ebpo_error *error)
 {

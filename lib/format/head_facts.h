@@ -10,8 +10,8 @@
 #include "hdf5_read/head.h"
 #include "hdf5_write/h5.h"
 
-/* Writes the root's attributes with the checksums and chunk_index_* of `info`. The functions below
- * overwrite these once their values are known. */
+/* Writes the root's attributes. The functions below overwrite the checksums, chunk_index_offset,
+ * chunk_index_bytes and top_bytes of `info` when these values are known. */
 EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
@@ -31,8 +31,8 @@ EBPO_MUST_USE ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, 
 EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
                                                const ebpo_level_summary *level, ebpo_error *error);
 
-/* Reads the root's attributes: version and required parts first, so that the error for a newer file
- * names its version. */
+/* Reads the root's attributes. Reads the version and the required parts first, so that the error
+ * for a file of a newer version names this version. */
 EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group,
@@ -44,8 +44,8 @@ EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object 
                                                 const char *object, const char *name,
                                                 uint8_t digest[32], ebpo_error *error);
 
-/* Checks ranges, and sums over the levels. `as`: status of an error, EBPO_E_FORMAT for files and
- * EBPO_E_ARGUMENT for callers' trees. */
+/* Checks that the values are in range and that the levels' counts add up. `as`: status of an error,
+ * EBPO_E_FORMAT for files and EBPO_E_ARGUMENT for callers' trees. */
 EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,
                                            ebpo_error *error);
 

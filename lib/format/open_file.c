@@ -27,8 +27,9 @@
 #include "io/file_source.h"
 #include "mesh/import.h"
 
-/* Returns true if the array may have this coding. Values of another coding would be decoded
- * wrongly. Files of version 1.0 and the first files of 1.1 also have `delta` at leaf_skip. */
+/* Returns true if the format allows this coding for the array. Values of another coding would be
+ * decoded wrongly. Files of version 1.0 and the first files of 1.1 also have `delta` at leaf_skip.
+ */
 static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gates)
 {
     if (gates)
@@ -38,7 +39,7 @@ static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gat
 }
 
 /* Returns true if the array's type and columns are those of the schema. Sets a->shape to the shape
- * of the values, and a->gates. */
+ * of the decoded values, and a->gates (true: faces stored as gates, face_gates.h). */
 static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -66,6 +67,8 @@ static uint32_t block_rows(const ebpo_info *info, ebpo_array_id id)
                                          : 0;
 }
 
+/* Opens an array: checks its coding, rows, type and columns. Leaves it absent if the counts in the
+ * header require no rows. */
 static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id, int level,
                               ebpo_error *error)
 {
@@ -162,8 +165,8 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* Returns true if a list about all chunks states the size of this file. Programs that rewrite a
- * file keep the attribute, or drop it. */
+/* Returns true if a list of all chunks has an attribute with the size of this file. A program that
+ * rewrites the file keeps the attribute, so that the size is wrong, or drops the attribute. */
 static bool states_size(const ebpo_file *file, ebpo_head *head, const char *path)
 {
     ebpo_head_object id;
@@ -173,8 +176,8 @@ static bool states_size(const ebpo_file *file, ebpo_head *head, const char *path
            bytes == file->info.file_bytes;
 }
 
-/* Opens a list of all chunks. *valid is false if another program has rewritten the file, as the
- * list is then not valid. */
+/* Opens a list of all chunks. *valid is false if another program has rewritten the file: then the
+ * list describes other chunks. */
 static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *valid,
                              ebpo_error *error)
 {
@@ -195,8 +198,9 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
     return EBPO_OK;
 }
 
-/* Opens the chunk checksums. They are ignored, whatever they are, if they do not state the size of
- * the file, and if they are bare, because the last bytes of bare chunks are no checksum. */
+/* Opens the chunk checksums. Ignores them, even if they are damaged, if they do not state the size
+ * of the file (another program has rewritten the file). Ignores them also in files without filters,
+ * because the last bytes of such chunks are no checksum. */
 static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
@@ -280,7 +284,7 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
 }
 
 /* Compares the content checksum of a file without chunk checksums, such as `h5repack -f NONE`
- * writes. This is done before any data are returned, as nothing else detects a changed chunk. */
+ * writes. Called before any data are returned, because nothing else detects a changed chunk. */
 static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
 {
     return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE
@@ -288,8 +292,8 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns true if the error that occurred already names the type of the file, which begins like
- * HDF5 or another known type. */
+/* Returns true if the file begins like HDF5 or another known type: the error that occurred already
+ * names this type. */
 static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
     return (size && begin[0] == 0x89) || ebpo_wrong_kind_of_file(begin, size);
@@ -307,7 +311,7 @@ static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size
     return head_names_kind(begin, size) ? NULL : format;
 }
 
-/* Returns a description of a file type that users often confuse with this format, with advice. The
+/* Returns a description, with advice, of a file type that users often confuse with this format. The
  * first bytes identify the type. Returns NULL if the type is unknown or the error already names it.
  */
 static const char *other_kind(const uint8_t *begin, uint64_t size)
@@ -378,8 +382,8 @@ static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint6
 {
     ebpo_source own = EBPO_SOURCE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
-    if (status == EBPO_E_UNSUPPORTED && source->close) /* the struct of a newer caller: only known
-                                                        * members are used */
+    /* a newer caller's struct has unknown members: use only known members */
+    if (status == EBPO_E_UNSUPPORTED && source->close)
         source->close(source->user);
     if (status != EBPO_OK)
         return status;
@@ -495,7 +499,7 @@ ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(e
 
 enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
 
-/* A named temporary file, which libhdf5 opens by its name. The name is removed once it is open. */
+/* A temporary file that libhdf5 opens by its name. The name is removed when the file is open. */
 typedef struct temporary {
     int fd;
     char name[PATH_MAX];
@@ -520,6 +524,7 @@ static void remove_temporary(temporary *t)
     close(t->fd);
 }
 
+/* Writes bytes to the temporary copy at the offset `at`. */
 static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uint8_t *data,
                                uint64_t bytes, ebpo_error *error)
 {
@@ -562,8 +567,8 @@ static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, con
     return status;
 }
 
-/* Finds the name under which libhdf5 opens the file, and the file's size. Downloads a remote file
- * first. */
+/* Sets *from to the name under which libhdf5 opens the file, and *bytes to the file's size.
+ * Downloads a remote file first, to `fetched`. */
 static ebpo_status find_from(const char *path, const ebpo_http_options *http, const char *shown,
                              temporary *fetched, const char **from, uint64_t *bytes,
                              ebpo_error *error)
@@ -606,7 +611,7 @@ static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_option
     return status;
 }
 
-/* Returns true if the copy lacks the object of an error. */
+/* Returns true if the copy does not have `object`, the HDF5 object that an error names. */
 static bool copy_lacks(int copy, const char *shown, const char *object)
 {
     char name[32];
@@ -624,10 +629,12 @@ static bool copy_lacks(int copy, const char *shown, const char *object)
     return absent;
 }
 
+/* Opens a file that another program has rewritten: copies the file in a separate process, and opens
+ * the copy. */
 static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, ebpo_file **out,
                                 ebpo_error *error)
 {
-    enum { HEAD_MORE = 64 << 20 };
+    enum { HEAD_MORE = 64 << 20 }; /* bytes that the copy may have beyond twice the file's size */
     char redacted[EBPO_SHOWN_BYTES];
     const char *shown = ebpo_is_url(path) ? ebpo_url_redact(path, redacted, sizeof redacted) : path;
     ebpo_process_limits limits = { o->memory_bytes, HEAD_MORE, o->seconds };
@@ -640,14 +647,15 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     limits.file_bytes += 2 * bytes;
     if (!limits.seconds) /* decoding and encoding take about 1/20 second for a MiB */
         limits.seconds = 60 + (unsigned)(bytes / BYTES_A_SECOND);
-    ebpo_error omitted = EBPO_ERROR_INIT, why = EBPO_ERROR_INIT;
+    ebpo_error copy_error = EBPO_ERROR_INIT, open_error = EBPO_ERROR_INIT;
     if (status == EBPO_OK)
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
-                                    ebpo_rows_of_foreign_chunk, &limits, &omitted, error);
-    if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
-        status = ebpo_fail_with(error, *omitted.message && copy_lacks(copy.fd, shown, why.object)
-                                           ? &omitted /* states why the copy lacks the object */
-                                           : &why);
+                                    ebpo_rows_of_foreign_chunk, &limits, &copy_error, error);
+    if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &open_error) != EBPO_OK)
+        status = ebpo_fail_with(error,
+                                *copy_error.message && copy_lacks(copy.fd, shown, open_error.object)
+                                    ? &copy_error /* states why the copy lacks the object */
+                                    : &open_error);
     remove_temporary(&copy);
     remove_temporary(&fetched);
     return status;

@@ -22,6 +22,7 @@ typedef struct span {
     uint64_t end; /* for references: end of the new faces of the leaf before the run */
 } span;
 
+/* State of ebpo_runs_read. */
 typedef struct reading {
     ebpo_chunks *chunks;
     int level;
@@ -39,6 +40,7 @@ static ebpo_status runs_wrong(const reading *r, ebpo_array_id id, const char *wh
     return ebpo_chunks_fail(r->chunks, r->level, id, what, r->error);
 }
 
+/* Returns true if the caller requested the array and the file has it. */
 static bool is_wanted_array(const reading *r, int id)
 {
     return ebpo_schema_is_held(id) && ebpo_schema[id].needs & r->needs &&
@@ -121,6 +123,7 @@ static ebpo_status read_column(const reading *r, int id, int type)
 
 /* --- lists of planes and references --- */
 
+/* Returns the number of list items of the nodes [begin, begin + nodes). */
 static uint64_t sum_counts(const reading *r, int id, uint64_t begin, uint64_t nodes)
 {
     const uint8_t *small = ebpo_level_array(r->out, id);
@@ -146,6 +149,7 @@ static ebpo_status find_span(const reading *r, ebpo_per per, uint64_t rank, span
     }
 }
 
+/* Finds the ranges of the runs in a list, and sets the total number of items in `out`. */
 static ebpo_status find_spans(const reading *r, int id, const ebpo_list_spec *list)
 {
     ebpo_per per = ebpo_schema[id].per;
@@ -234,7 +238,7 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
 }
 
 /* Converts the skips in leaf_first to first faces, for leaves [begin, begin + leaves). `end`: end
- * of the new faces of the leaf before them. */
+ * of the new faces of the leaf before leaf `begin`. */
 static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leaves, uint64_t end)
 {
     ebpo_level *out = r->out;
@@ -290,7 +294,7 @@ static ebpo_status read_array(const reading *r, int id)
     ebpo_status status = EBPO_OK;
     if (type >= 0 && is_wanted_array(r, id))
         status = read_column(r, id, type);
-    else if (list && ebpo_level_array(r->out, list->counts)) /* also an empty list */
+    else if (list && ebpo_level_array(r->out, list->counts)) /* a list of no items, too */
         status = read_list(r, id, list);
     return status == EBPO_OK ? finish_array(r, id) : status;
 }
@@ -313,6 +317,7 @@ ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
     return status;
 }
 
+/* State of ebpo_pick_level. */
 typedef struct picking {
     ebpo_chunks *chunks;
     int level;
@@ -322,6 +327,8 @@ typedef struct picking {
     ebpo_error *error;
 } picking;
 
+/* Sends prefetch hints for the types of the runs, and for the types and index rows from which the
+ * ranks are counted. */
 static void hint_types(const picking *p)
 {
     ebpo_hints e = EBPO_HINTS_INIT(p->chunks->file);
@@ -439,6 +446,7 @@ void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t 
 
 /* --- reading rows in any order --- */
 
+/* Rows of one array that are read in the order of their chunks. */
 typedef struct gathering {
     ebpo_chunks *chunks;
     const ebpo_array_in *array;
@@ -498,10 +506,10 @@ static ebpo_status pick_rows(ebpo_chunks *chunks, const ebpo_array_in *array, co
 {
     gathering g = { .chunks = chunks, .array = array, .rows = rows, .out = out };
     g.row_bytes =
-        ebpo_shape_row_bytes(&array->shape); /* decoding does not change an array's width */
+        ebpo_shape_row_bytes(&array->shape); /* decoding does not change the bytes of a row */
     if (!array->present)
         return ebpo_fail_at(error, EBPO_E_ABSENT, chunks->file->in.shown, array->path, -1,
-                            "the file does not hold this array");
+                            "the file does not have this array");
     uint64_t number = ebpo_shape_chunks(&array->shape);
     uint64_t *begin = ebpo_alloc(number + 2, sizeof *begin);
     uint32_t *order = ebpo_alloc(count, sizeof *order);
@@ -550,6 +558,7 @@ typedef struct attribute_picking {
     ebpo_error *error;
 } attribute_picking;
 
+/* Reads rows of array `number` of /attributes, with the threads and the error of `p`. */
 static ebpo_status copy_picked_rows(const attribute_picking *p, int number, const uint32_t *rows,
                                     uint64_t count, void *out)
 {
@@ -564,7 +573,7 @@ static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_att
                      : ebpo_fail_memory(p->error, p->count * bytes);
 }
 
-/* Computes the file indices of the items of all selected lists. A list begins at `before`, the end
+/* Computes the file indices of the items of all selected lists. List i begins at before[i], the end
  * of the preceding list in the file. Replaces a->ends by the ends in the selection. */
 static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
                                 const uint64_t *before, uint32_t **items)

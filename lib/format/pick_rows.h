@@ -8,8 +8,8 @@
 #include "format/chunks.h"
 #include "mesh/attributes.h"
 
-/* Groups [group, group + groups) of a level; level 0 has group 0. The run's nodes of type k have
- * the ranks [rank[k], rank[k] + count[k]). */
+/* A run: groups [group, group + groups) of a level, each with eight siblings; level 0 has only
+ * group 0. The run's nodes of type k have the ranks [rank[k], rank[k] + count[k]). */
 typedef struct ebpo_run {
     uint64_t group, groups;
     uint64_t rank[4], count[4];
@@ -20,24 +20,25 @@ void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *hints, int level, const ebp
                     uint64_t run_count, uint32_t needs);
 
 /* Reads the arrays of the nodes of ascending runs into `out`, concatenated, and sets the counts.
- * `out` already has the types. Reads the arrays that any of `needs` requires. Face indices are
- * those of the file. Memory is first reserved from `space` (NULL: no limit). */
+ * `out` already has the types. Reads the arrays that any of `needs` (EBPO_NEEDS_..., schema.h)
+ * requires. Face indices are those of the file. Memory is first reserved from `space` (NULL: no
+ * limit). */
 EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
                                          uint64_t run_count, uint32_t needs, ebpo_quota *space,
                                          ebpo_level *out, ebpo_error *error);
 
 /* Reads all nodes of ascending runs that do not overlap, as one level. Fills in the ranks and
  * counts of the runs. The level's group_count is the sum over the runs, and its volumes are 0. The
- * level has the types, and the arrays that any of `needs` requires (EBPO_NEEDS_..., schema.h). Its
- * face lists, and leaf_first, contain the file's indices. The caller frees it with ebpo_level_free.
- */
+ * level has the types, and the arrays that any of `needs` requires (EBPO_NEEDS_..., schema.h). The
+ * face lists and leaf_first contain indices in the file. The caller frees the level with
+ * ebpo_level_free. */
 EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs,
                                           uint64_t run_count, uint32_t needs, ebpo_level *out,
                                           ebpo_error *error);
 
-/* Reads rows, in any order, of an array of the mesh or the maps. A row is three corners for faces,
- * three floats or doubles for vertices, an index for maps. Returns EBPO_E_FORMAT for a row that
- * does not exist. */
+/* Reads rows, in any order, of an array of the mesh, or of source indices (positions in the source
+ * mesh). A row is three corners for faces, three floats or doubles for vertices, and one source
+ * index. Returns EBPO_E_FORMAT for a row that does not exist. */
 EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
                                          const uint32_t *rows, uint64_t count, unsigned threads,
                                          void *out, ebpo_error *error);
@@ -48,10 +49,12 @@ EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attribu
                                                const char *element, const uint32_t *rows,
                                                uint64_t count, unsigned threads, ebpo_error *error);
 
-/* Sends prefetch hints for reading these faces, in the mesh and the maps as `parts` requires.
- * Includes the vertices first used in the faces' chunks, which are most vertices of the faces. */
+/* Sends prefetch hints for reading these faces in the mesh and, if `parts` has EBPO_PART_MAPS,
+ * their source indices. Includes the vertices that the chunks of these faces use first: these are
+ * most vertices of the faces. */
 void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts);
-/* Does the same for vertices. */
+/* Sends prefetch hints for reading these vertices in the mesh and, if `parts` has EBPO_PART_MAPS,
+ * their source indices. */
 void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
                         uint32_t parts);
 

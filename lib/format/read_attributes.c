@@ -25,7 +25,8 @@ static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path,
                         "%s; get a fresh copy of the file", what);
 }
 
-/* Reports an error if the status of reading a required HDF5 attribute is EBPO_E_ABSENT. */
+/* Turns EBPO_E_ABSENT, the status of reading a required HDF5 attribute, into an error that names
+ * the attribute. Returns any other status unchanged. */
 static ebpo_status required_value(const ebpo_file *file, const char *path, ebpo_status status,
                                   const char *name, ebpo_error *error)
 {
@@ -47,6 +48,8 @@ static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     return *type >= 0 ? EBPO_OK : attribute_head_wrong(file, path, "unknown number type", error);
 }
 
+/* Reads whether each row is a list: the type of the stored lengths, and whether the lengths differ.
+ */
 static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
                             ebpo_attribute *a, bool *different, ebpo_error *error)
 {
@@ -131,11 +134,11 @@ static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array
                                const ebpo_attribute_in *of)
 {
     const ebpo_attribute *a = &of->head;
-    uint32_t names = 1;
+    uint32_t names = 1; /* number of names, which one space separates */
     for (const char *s = a->names; *s; s++) {
         names += *s == ' ';
         if (*s == ' ' && (s == a->names || s[1] == ' ' || !s[1]))
-            return "names do not have one space between them";
+            return "the names are not separated by single spaces";
     }
     if (!a->element[0] || strchr(a->element, ' ') || !a->names[0])
         return "the array has no names, or no element";
@@ -153,6 +156,8 @@ static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array
     return NULL;
 }
 
+/* Checks that all arrays of an element ("vertex", "material") have the same number of rows. Returns
+ * the error's text or NULL. */
 static const char *check_element(const ebpo_file *file, uint64_t n)
 {
     const ebpo_attribute_in *all = file->attributes.head;
@@ -163,8 +168,8 @@ static const char *check_element(const ebpo_file *file, uint64_t n)
     return NULL;
 }
 
-/* Checks the sizes of the arrays of textures. Their texts must be small, as they are read when a
- * user inspects the file. */
+/* Checks the sizes of the arrays of textures. Texts must be small, because `ebpo info` reads them.
+ * Returns the error's text or NULL. */
 static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_in *items)
 {
     bool texts = strcmp(of->head.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) != 0;
@@ -177,6 +182,7 @@ static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_
                : NULL;
 }
 
+/* Opens the array of the items of lists. */
 static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_error *error)
 {
     const ebpo_array_in *items = &file->attributes.array[ebpo_items_number(n)];
@@ -302,7 +308,7 @@ const char *ebpo_attribute_type_text(uint64_t type)
 }
 
 /* --- reading whole arrays, and checking the part's checksum --- */
-
+/* Returns true if the array contains floating-point numbers. */
 static bool floats_in(const ebpo_file *file, const ebpo_array_in *array)
 {
     if (array->level == 0)
@@ -355,6 +361,7 @@ static ebpo_status read_array(const ebpo_file *file, int number, const ebpo_read
     return ebpo_reader_rows(file, array, read, decode_attribute_rows, &t, error);
 }
 
+/* Checks that the ends of the lists ascend and that the last end is the number of items. */
 static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attribute *a,
                               ebpo_workspace *workspace, ebpo_error *error)
 {
@@ -373,6 +380,8 @@ static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attr
                                  "the ends of the lists do not match their items", error);
 }
 
+/* Reads the values of an attribute array; for lists of different lengths, reads the ends and,
+ * unless `ends_only` is true, the items. */
 static ebpo_status read_parts(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
                               bool ends_only, ebpo_attribute *a, ebpo_error *error)
 {
@@ -523,7 +532,7 @@ ebpo_status ebpo_file_attribute_ends(const ebpo_file *file, unsigned n,
     return read_public(file, n, options, true, out, error);
 }
 
-/* Reads the whole part into memory, as it is small compared to the mesh. */
+/* Reads all attributes into memory, because they are small compared to the mesh. */
 ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options *read,
                                   ebpo_error *error)
 {

@@ -1,4 +1,4 @@
-/* Reads a file's part `attributes`: values of vertices, faces and other elements. */
+/* Reads a file's part `attributes`: values of vertices, faces and other elements of the source. */
 #ifndef EBPO_FORMAT_READ_ATTRIBUTES_H
 #define EBPO_FORMAT_READ_ATTRIBUTES_H
 

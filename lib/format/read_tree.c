@@ -20,8 +20,9 @@
 #include "format/write_plan.h"
 #include "hdf5_read/coding.h"
 
-/* Converts the skips in leaf_first to first faces. A skip is the number of faces between the new
- * faces of the previous leaf and those of this leaf. */
+/* Converts the skips in leaf_first to first faces. A new face of a leaf is a face that no earlier
+ * leaf lists. A skip is the number of faces between the last new face of the previous leaf of the
+ * level and the first new face of this leaf. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -42,7 +43,7 @@ typedef struct refs_job {
     const ebpo_file *file;
     int number;
     ebpo_level *level;
-    const uint64_t *index;
+    const uint64_t *index; /* sums of leaf_index, three for each EBPO_INDEX_ROWS leaves */
 } refs_job;
 
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
@@ -55,9 +56,9 @@ bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
         refs[k] = (uint32_t)above;
     }
     for (uint64_t k = 0; k < count / 2; k++) {
-        uint32_t other = refs[count - 1 - k];
+        uint32_t swap = refs[count - 1 - k];
         refs[count - 1 - k] = refs[k];
-        refs[k] = other;
+        refs[k] = swap;
     }
     return true;
 }
@@ -68,9 +69,9 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     refs_job *j = context;
     (void)worker;
     uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
-    uint64_t stop =
+    uint64_t leaf_end =
         end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
-    for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
+    for (; leaf < leaf_end; at += j->level->leaf_ref_count[leaf++])
         if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf],
                               j->level->leaf_first[leaf])) {
             ebpo_check check = ebpo_reader_check(j->file, j->level->workspace);
@@ -81,10 +82,10 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Compares an index array of the file with the sums `right`. Does nothing if the array is absent or
- * needs one of the parts `without`. */
+/* Compares an index array of the file with the sums `computed`. Does nothing if the array is absent
+ * or needs one of the parts `without`. */
 static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
-                               int number, uint64_t without, const uint64_t *right,
+                               int number, uint64_t without, const uint64_t *computed,
                                ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, number);
@@ -95,7 +96,7 @@ static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const eb
     read.workspace = level->workspace;
     ebpo_status status = ebpo_reader_make(file, id, number, &read, sizeof *stored, &stored, error);
     if (status == EBPO_OK &&
-        memcmp(stored, right, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
+        memcmp(stored, computed, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
         ebpo_check check = ebpo_reader_check(file, level->workspace);
         status = ebpo_check_fail(&check, number, ebpo_schema[id].name,
                                  "the index contradicts the arrays that it indexes", error);
@@ -214,7 +215,7 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
     return status;
 }
 
-/* --- the mesh, its maps, and whole trees --- */
+/* --- the mesh, its source indices, and whole trees --- */
 
 void ebpo_tree_free(ebpo_tree *tree)
 {
@@ -279,6 +280,7 @@ static ebpo_status decode_faces(void *context, const ebpo_array_in *array, uint6
     return EBPO_OK;
 }
 
+/* Allocates a mesh, and copies the source's name, format and digest. */
 static ebpo_status make_mesh(const ebpo_file *file, ebpo_mesh *out, ebpo_workspace *workspace,
                              ebpo_error *error)
 {
@@ -306,8 +308,8 @@ static ebpo_status read_mesh(const ebpo_file *file, ebpo_mesh *out, const ebpo_r
 {
     mesh_job j = { .file = file, .mesh = out };
     ebpo_check check = ebpo_reader_check(file, read->workspace);
-    ebpo_read_options alone = *read;
-    alone.threads = 1;
+    ebpo_read_options one_thread = *read;
+    one_thread.threads = 1;
     ebpo_status status = make_mesh(file, out, read->workspace, error);
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), read,
@@ -315,7 +317,8 @@ static ebpo_status read_mesh(const ebpo_file *file, ebpo_mesh *out, const ebpo_r
     if (status == EBPO_OK)
         status = ebpo_check_finite(&check, out, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, &alone, 8, &j.faces_index, error);
+        status =
+            ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, &one_thread, 8, &j.faces_index, error);
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), read,
                                   decode_faces, &j, error);
@@ -375,6 +378,7 @@ static ebpo_status decode_numbers(void *context, const ebpo_array_in *array, uin
     return EBPO_OK;
 }
 
+/* Reads the source indices of vertices or faces, which must be distinct and below `limit`. */
 static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t limit,
                             const ebpo_read_options *read, uint32_t **out, ebpo_error *error)
 {
@@ -389,6 +393,8 @@ static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t li
                : status;
 }
 
+/* Returns a limit that all source indices of faces are below: faces that a repair added have
+ * indices after those of the source. */
 static uint64_t face_limit(const ebpo_info *info)
 {
     return info->source_face_count + info->repair_record.added_faces;
@@ -459,7 +465,7 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
         return status;
     if (read.omitted_parts)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
-                              "a tree is always read as a whole; set `without` of the read "
+                              "a tree is always read as a whole; set `omitted_parts` of the read "
                               "options to 0, or read levels");
     ebpo_hint_tree(file);
     out->info = file->info;
@@ -471,9 +477,10 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Computes the position of each item in the order of source indices. The indices are distinct
- * and below `limit`. The caller frees *position. A header may state a limit far above the number of
- * items, so the function uses one bit per possible index; memory pages without items stay empty. */
+/* Computes the position of each item in the order of source indices (positions in the source mesh).
+ * The indices are distinct and below `limit`. The caller frees *position. Uses one bit for each
+ * possible index, because a header may state a limit far above the number of items; the system
+ * allocates no memory for pages of zeros. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **position, ebpo_error *error)
 {
@@ -528,14 +535,14 @@ static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *position, e
     return EBPO_OK;
 }
 
-static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
-                                 const uint32_t *face_place, ebpo_error *error)
+static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_position,
+                                 const uint32_t *face_position, ebpo_error *error)
 {
     uint32_t *sorted = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *sorted);
     if (!sorted)
         return ebpo_workspace_fail(mesh->workspace, mesh->face_count * 12, error);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->face_count * 3)
-        sorted[3 * (uint64_t)face_place[i / 3] + i % 3] = vertex_place[mesh->faces[i]];
+        sorted[3 * (uint64_t)face_position[i / 3] + i % 3] = vertex_position[mesh->faces[i]];
     ebpo_array_free(mesh->workspace, mesh->faces);
     mesh->faces = sorted;
     return EBPO_OK;
@@ -557,30 +564,31 @@ static ebpo_status reorder_attributes(ebpo_mesh *mesh, const char *element,
     return status;
 }
 
+/* Sorts vertices, faces and attributes by source indices. */
 static ebpo_status to_source_order(const ebpo_file *file, ebpo_mesh *mesh,
                                    const ebpo_read_options *read, ebpo_error *error)
 {
-    uint32_t *vertex_place = NULL, *face_place = NULL;
+    uint32_t *vertex_position = NULL, *face_position = NULL;
     ebpo_workspace *workspace = read->workspace;
     ebpo_maps maps;
     ebpo_status status = ebpo_file_read_maps(file, read, &maps, error);
     if (status == EBPO_OK)
         status = sort_by_source(workspace, maps.vertex_source, mesh->vertex_count,
-                                file->info.source_vertex_count, &vertex_place, error);
+                                file->info.source_vertex_count, &vertex_position, error);
     if (status == EBPO_OK)
         status = sort_by_source(workspace, maps.face_source, mesh->face_count,
-                                face_limit(&file->info), &face_place, error);
+                                face_limit(&file->info), &face_position, error);
     ebpo_maps_free(&maps);
     if (status == EBPO_OK)
-        status = reorder_vertices(mesh, vertex_place, error);
+        status = reorder_vertices(mesh, vertex_position, error);
     if (status == EBPO_OK)
-        status = reorder_faces(mesh, vertex_place, face_place, error);
+        status = reorder_faces(mesh, vertex_position, face_position, error);
     if (status == EBPO_OK)
-        status = reorder_attributes(mesh, "vertex", vertex_place, mesh->vertex_count, error);
+        status = reorder_attributes(mesh, "vertex", vertex_position, mesh->vertex_count, error);
     if (status == EBPO_OK)
-        status = reorder_attributes(mesh, "face", face_place, mesh->face_count, error);
-    ebpo_array_free(workspace, vertex_place);
-    ebpo_array_free(workspace, face_place);
+        status = reorder_attributes(mesh, "face", face_position, mesh->face_count, error);
+    ebpo_array_free(workspace, vertex_position);
+    ebpo_array_free(workspace, face_position);
     return status;
 }
 
@@ -601,7 +609,8 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, &read, error);
     if (status == EBPO_OK && (!maps || file->info.repair_record.welded_vertices))
-        ebpo_attributes_drop_others(out->attributes); /* they refer to vertices by source indices */
+        /* attributes of other elements (edges, ...) refer to vertices by source indices */
+        ebpo_attributes_drop_others(out->attributes);
     if (source_order)
         *source_order = status == EBPO_OK && maps;
     if (status != EBPO_OK)
@@ -611,24 +620,24 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
 
 /* --- recomputing checksums: a thread takes a whole array, as its chunks must come in order --- */
 
-/* Digest of one array. */
-typedef struct taking {
+/* Digest of one array whose chunks are read. */
+typedef struct array_job {
     const ebpo_info *info;
     ebpo_array_digest digest;
-} taking;
+} array_job;
 
 typedef struct content_job {
     const ebpo_file *file;
     const ebpo_array_in *array[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS];
     uint8_t digest[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS][32];
     unsigned count;
-    ebpo_read_options alone; /* chunks in order */
+    ebpo_read_options one_thread; /* one thread, so that the chunks of an array come in order */
 } content_job;
 
 static ebpo_status digest_rows(void *context, const ebpo_array_in *array, uint64_t chunk,
                                uint64_t row, uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
-    taking *t = context;
+    array_job *t = context;
     (void)chunk;
     (void)error;
     ebpo_array_digest_add(&t->digest, t->info, array->id, &array->shape, row, rows, bytes);
@@ -642,14 +651,16 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     (void)worker;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        taking t = { .info = &j->file->info };
+        array_job t = { .info = &j->file->info };
         ebpo_array_digest_begin(&t.digest);
-        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, digest_rows, &t, error);
+        status = ebpo_reader_rows(j->file, j->array[i], &j->one_thread, digest_rows, &t, error);
         ebpo_array_digest_end(&t.digest, j->digest[i]);
     }
     return status;
 }
 
+/* Computes checksum `which` (EBPO_DIGEST_...) from the digests of the arrays, and compares it with
+ * the stated checksum, the attribute `name`. */
 static ebpo_status compare_digest(content_job *j, int which, const uint8_t stated[32],
                                   const char *name, ebpo_error *error)
 {
@@ -675,8 +686,8 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
     if (status != EBPO_OK)
         return status;
-    content_job j = { .file = file, .alone = read };
-    j.alone.threads = 1;
+    content_job j = { .file = file, .one_thread = read };
+    j.one_thread.threads = 1;
     /* arrays of a remote file in file order; otherwise the largest arrays first */
     bool remote = ebpo_input_prefetches(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
@@ -687,9 +698,9 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
             if (file->level_array[level][id].present)
                 j.array[j.count++] = &file->level_array[level][id];
     for (unsigned i = 0; remote && i < j.count / 2; i++) {
-        const ebpo_array_in *other = j.array[i];
+        const ebpo_array_in *swap = j.array[i];
         j.array[i] = j.array[j.count - 1 - i];
-        j.array[j.count - 1 - i] = other;
+        j.array[j.count - 1 - i] = swap;
     }
     ebpo_hint_tree(file);
     status =

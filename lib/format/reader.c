@@ -96,7 +96,7 @@ static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
     if (last && last->offset + last->size == offset)
         last->size += size;
     else if (ebpo_grow(&e->range, &e->capacity, e->count + 1,
-                       sizeof *e->range)) /* without memory, the range has no prefetch hint */
+                       sizeof *e->range)) /* if memory is short, the range has no prefetch hint */
         e->range[e->count++] = (ebpo_range){ offset, size };
 }
 
@@ -110,7 +110,8 @@ void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
 {
     if (!ebpo_hints_wanted(e) || !array->present || e->failed)
         return;
-    /* not repeated after a failure, as each attempt makes all retries; the later read reports it */
+    /* not repeated after a failure, because each attempt makes all retries; the later read reports
+     * the error */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
@@ -151,8 +152,8 @@ static int compare_ranges(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sorts ranges by offset, and joins them across gaps of at most `between` bytes. */
-static void join_ranges(ebpo_hints *e, uint64_t between)
+/* Sorts ranges by offset, and joins them across gaps of at most `gap` bytes. */
+static void join_ranges(ebpo_hints *e, uint64_t gap)
 {
     uint64_t kept = 0;
     if (e->count)
@@ -160,7 +161,7 @@ static void join_ranges(ebpo_hints *e, uint64_t between)
     for (uint64_t i = 0; i < e->count; i++) {
         ebpo_range *last = kept ? &e->range[kept - 1] : NULL, next = e->range[i];
         uint64_t end = next.offset + next.size;
-        if (last && next.offset <= last->offset + last->size + between)
+        if (last && next.offset <= last->offset + last->size + gap)
             last->size = end > last->offset + last->size ? end - last->offset : last->size;
         else
             e->range[kept++] = next;
@@ -187,13 +188,14 @@ uint64_t ebpo_hints_bytes(ebpo_hints *e)
     return sum;
 }
 
-/* Returns true if the list of chunk checksums has not been read. It is read before all other data.
- */
+/* Returns true if the file has a list of chunk checksums that has not been read. The list is read
+ * before all other data. */
 static bool wants_checksums(const ebpo_file *file)
 {
     return file->has_checksums && !atomic_load(&file->checksums_read);
 }
 
+/* Returns the range of the list of chunk checksums in the file. */
 static ebpo_range where_checksums(const ebpo_file *file)
 {
     const ebpo_chunk_location *at = file->root_array[EBPO_A_CHUNK_CHECKSUMS].chunks;
@@ -212,8 +214,9 @@ void ebpo_hint_all(ebpo_hints *e)
     *e = (ebpo_hints)EBPO_HINTS_INIT(e->file);
 }
 
-/* Returns false if the stated size top_bytes is implausibly large. */
-static bool is_top(const ebpo_info *info)
+/* Returns true if the stated size top_bytes is plausible: at most 1 MiB more than a sixteenth of
+ * the file. */
+static bool is_plausible_top(const ebpo_info *info)
 {
     enum { SHARE = 16, ANYWAY = 1 << 20 };
     return info->top_bytes <= info->file_bytes / SHARE + ANYWAY;
@@ -226,7 +229,7 @@ void ebpo_hint_top(const ebpo_file *file)
     uint64_t index_end = info->chunk_index_offset + info->chunk_index_bytes, from,
              top = info->top_bytes < info->file_bytes ? info->top_bytes : info->file_bytes;
     if (!ebpo_input_prefetches(&file->in) || !file->has_directory || atomic_load(&file->located) ||
-        !is_top(info))
+        !is_plausible_top(info))
         return;
     const ebpo_chunk_location *directory = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
     ebpo_range range[4] = { { directory->address, directory->bytes } };
@@ -266,6 +269,7 @@ enum {
     RUN_CHUNKS = 64      /* maximum number of chunks that a thread takes at a time */
 };
 
+/* State of ebpo_reader_rows. */
 typedef struct job {
     const ebpo_file *file;
     const ebpo_array_in *array;
@@ -324,8 +328,8 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
                                 ebpo_error *error)
 {
-    uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows,
-             rows = left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
+    uint64_t remaining = array->shape.rows - chunk * array->shape.chunk_rows,
+             rows = remaining < array->shape.chunk_rows ? remaining : array->shape.chunk_rows;
     size_t row = ebpo_shape_row_bytes(&array->shape);
     ebpo_status status = unpack_stored(file, array, chunk, coder, stored, coder->scratch, error);
     if (status != EBPO_OK)
@@ -377,8 +381,8 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
 }
 
 /* Returns the end of a run of chunks that one read fetches. The chunks [begin, result) are
- * contiguous in the file, end at or before chunk `end`, and take at most RUN_BYTES unless there is
- * only one. */
+ * contiguous in the file, end at or before chunk `end`, and take at most RUN_BYTES, unless the run
+ * is a single chunk. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
     const ebpo_chunk_location *c = array->chunks;
@@ -390,21 +394,21 @@ static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t en
     return next;
 }
 
-static ebpo_status read_run(job *j, ebpo_idle_reader *s, uint64_t begin, uint64_t end, size_t bytes,
-                            ebpo_error *error)
+static ebpo_status read_run(job *j, ebpo_idle_reader *idle, uint64_t begin, uint64_t end,
+                            size_t bytes, ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
     ebpo_status status =
-        fetch_stored(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
+        fetch_stored(j->file, &idle->reader, a->chunks[begin].address, bytes, 0, error);
     size_t at = 0;
     for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++) {
-        uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
-        status = decode_stored(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw,
-                               error);
+        uint64_t row = chunk * a->shape.chunk_rows, remaining = a->shape.rows - row;
+        status = decode_stored(j->file, a, chunk, &idle->reader.coder, idle->reader.stored + at,
+                               idle->raw, error);
         if (status == EBPO_OK)
-            status =
-                j->take(j->context, a, chunk, row,
-                        left < a->shape.chunk_rows ? left : a->shape.chunk_rows, s->raw, error);
+            status = j->take(j->context, a, chunk, row,
+                             remaining < a->shape.chunk_rows ? remaining : a->shape.chunk_rows,
+                             idle->raw, error);
         at += a->chunks[chunk].bytes;
     }
     return status;
@@ -459,6 +463,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     return status;
 }
 
+/* Memory for decoded integers of `size` bytes. */
 typedef struct target {
     uint8_t *values;
     size_t size;

@@ -14,7 +14,7 @@ typedef struct ebpo_hints {
     const ebpo_file *file;
     ebpo_range *range;
     uint64_t count, capacity;
-    bool failed; /* chunk offsets could not be read */
+    bool failed; /* chunk offsets could not be read: nothing is collected any more */
     bool local;  /* also collect chunks of local files: the operating system receives the hints */
     bool counts_bytes; /* collect chunks of any file, for ebpo_hints_bytes */
 } ebpo_hints;
@@ -24,6 +24,7 @@ typedef struct ebpo_hints {
     }
 /* Collects chunks [begin, end) of an array; does nothing if the array is absent. */
 void ebpo_hint_chunks(ebpo_hints *hints, const ebpo_array_in *array, uint64_t begin, uint64_t end);
+/* Collects all chunks of an array. */
 void ebpo_hint_array(ebpo_hints *hints, const ebpo_array_in *array);
 /* Collects a level's arrays, except those of the parts `without`. */
 void ebpo_hint_level(ebpo_hints *hints, int level, uint32_t without);
@@ -31,7 +32,7 @@ void ebpo_hint_level(ebpo_hints *hints, int level, uint32_t without);
 void ebpo_hint_root(ebpo_hints *hints, uint32_t needs);
 /* Collects the arrays of attributes. */
 void ebpo_hint_attributes(ebpo_hints *hints);
-/* Sends prefetch hints for all of the file. */
+/* Sends prefetch hints for all arrays of the file. */
 void ebpo_hint_tree(const ebpo_file *file);
 /* Sends prefetch hints for the data with which a reader locates a subtree: levels down to the
  * subtrees' roots, the sums before the subtrees, and the chunk offsets. Does nothing unless the
@@ -53,15 +54,15 @@ static inline ebpo_read_options ebpo_read_threads(unsigned threads)
     return options;
 }
 
-/* Fetches and decodes chunk number `chunk` of an array that is present. Writes chunk_rows rows, in
- * the last chunk with padding, to `raw` of EBPO_CHUNK_BYTES_MAX bytes. Several threads may call
- * this function at once, each with a separate `reader`. */
+/* Fetches and decodes chunk number `chunk` of an array that is present. Writes chunk_rows rows (in
+ * the last chunk, the rows beyond the end are padding) to `raw` of EBPO_CHUNK_BYTES_MAX bytes.
+ * Several threads may call this function at once, each with a separate `reader`. */
 EBPO_MUST_USE ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array,
                                             uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
 
-/* Does the same for faces that are stored as gates, without converting the gates to corners. Writes
- * EBPO_GATES_COLS bytes for each row. */
+/* Fetches a chunk of faces that are stored as gates (face_gates.h), without converting the gates to
+ * corners. Writes EBPO_GATES_COLS bytes for each row. */
 EBPO_MUST_USE ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk,
                                             ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
@@ -88,6 +89,7 @@ EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id 
  * face `first`, become ascending face indices. Returns false when an index would be below 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 
+/* Makes an empty list of idle readers. */
 void ebpo_idle_readers_make(ebpo_idle_readers *readers);
 /* Frees the idle readers. */
 void ebpo_idle_readers_free(ebpo_idle_readers *readers);

@@ -197,6 +197,7 @@ uint64_t ebpo_schema_index_rows(uint64_t count)
     return count > EBPO_INDEX_ROWS ? (count - 1) / EBPO_INDEX_ROWS + 1 : 0;
 }
 
+/* Returns the number of rows of /mesh/faces_index. */
 static uint64_t face_chunks(const ebpo_info *info)
 {
     uint64_t faces = info->face_count,
@@ -205,7 +206,7 @@ static uint64_t face_chunks(const ebpo_info *info)
 }
 
 /* Returns the number of subtrees. */
-static uint64_t subtree_rows(const ebpo_info *info)
+static uint64_t subtree_count(const ebpo_info *info)
 {
     return info->level[info->subtree_level].gray_count;
 }
@@ -213,7 +214,7 @@ static uint64_t subtree_rows(const ebpo_info *info)
 static uint64_t subtree_chunks(const ebpo_info *info)
 {
     uint64_t rows = ebpo_subtree_rows(info);
-    return (subtree_rows(info) + rows - 1) / rows;
+    return (subtree_count(info) + rows - 1) / rows;
 }
 
 uint32_t ebpo_subtree_rows(const ebpo_info *info)
@@ -265,7 +266,7 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_PATCH_VERTEX: return info->surface_vertices;
     case EBPO_PER_PATCH_COLOUR: return info->surface_colours;
     case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
-    case EBPO_PER_SUBTREE: return subtree_rows(info);
+    case EBPO_PER_SUBTREE: return subtree_count(info);
     case EBPO_PER_SHARED_BLOCK:
     case EBPO_PER_CHUNK: return EBPO_ROWS_STATED;
     default: return load_field(l, level_counts[per].in_summary);
@@ -394,19 +395,19 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
                                error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
-    uint64_t empty = 0, closed = 0;
+    uint64_t empty_groups = 0, without_faces = 0;
     EBPO_FOR_ITEMS(check->workspace, i, 0, groups) {
         for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
             counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
     for (uint64_t i = 0; i < groups; i++) {
-        empty += arrays->types[i] == 0;
-        closed += arrays->types[i] != 0 && !ebpo_group_lists_faces(arrays->types[i]);
+        empty_groups += arrays->types[i] == 0;
+        without_faces += arrays->types[i] != 0 && !ebpo_group_lists_faces(arrays->types[i]);
     }
-    if (level && closed)
+    if (level && without_faces)
         return ebpo_check_fail(check, level, "types",
                                "a gray node has no child that is gray or a leaf", error);
-    if (level && empty != info->level[level - 1].pruned_count)
+    if (level && empty_groups != info->level[level - 1].pruned_count)
         return ebpo_check_fail(
             check, level, "types",
             info->pruned ? "there is not exactly one empty group for each pruned node of the "
@@ -427,10 +428,10 @@ static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info
 {
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
         const ebpo_array_spec *spec = &ebpo_schema[id];
-        bool called_for = ebpo_schema_rows(info, (ebpo_array_id)id, level) != 0;
+        bool required = ebpo_schema_rows(info, (ebpo_array_id)id, level) != 0;
         if (!ebpo_schema_is_held(id))
             continue;
-        if (called_for && !spec->if_needed && !ebpo_level_array(arrays, id))
+        if (required && !spec->if_needed && !ebpo_level_array(arrays, id))
             return ebpo_check_fail(check, level, spec->name, "the array is missing", error);
         if (!info->solid && spec->needs == EBPO_NEEDS_SOLID && ebpo_level_array(arrays, id))
             return ebpo_check_fail(check, level, spec->name, "a surface has no winding numbers",
@@ -499,16 +500,17 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
                                 const ebpo_level *arrays, ebpo_error *error)
 {
     const ebpo_level_summary *s = &info->level[level];
-    uint64_t end = 0, news = 0, refs = 0;
+    uint64_t end = 0, new_faces = 0, refs = 0;
     EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->leaf_count) {
         uint64_t first = arrays->leaf_first[i];
         if (first < end || first > info->face_count ||
             arrays->leaf_new[i] > info->face_count - first)
             return ebpo_check_fail(
                 check, level, "leaf_skip",
-                "a leaf's new faces overlap another leaf's or are beyond the last face", error);
+                "a leaf's new faces overlap those of another leaf or are beyond the last face",
+                error);
         end = first + arrays->leaf_new[i];
-        news += arrays->leaf_new[i];
+        new_faces += arrays->leaf_new[i];
         if (arrays->leaf_ref_count[i] > s->ref_count - refs)
             return ebpo_check_fail(check, level, "leaf_ref_count",
                                    "the counts exceed the number of references", error);
@@ -519,7 +521,7 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
             return status;
         refs += arrays->leaf_ref_count[i];
     }
-    if (news != s->new_count || refs != s->ref_count)
+    if (new_faces != s->new_count || refs != s->ref_count)
         return ebpo_check_fail(check, level, "leaf_new",
                                "the leaves' counts do not add up to those in the header", error);
     return EBPO_OK;
@@ -551,12 +553,13 @@ ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int
 typedef struct walk {
     const ebpo_check *check;
     const ebpo_tree *tree;
-    /* next item of each level: in depth-first order, the items of a level have ascending octcodes
-     */
+    /* index of the next group and of the next leaf of each level; in depth-first order, the items
+     * of a level have ascending indices */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
-    uint64_t faces_before; /* number of new faces of the leaves before */
+    uint64_t faces_before; /* number of new faces of the leaves that were visited */
 } walk;
 
+/* Checks the next group of a level, and the subtrees of its gray nodes. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->tree->level[level];
@@ -591,7 +594,7 @@ ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebp
 ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uint32_t *map,
                            uint64_t count, uint64_t limit, ebpo_error *error)
 {
-    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* a map has indices of 32 bits */
+    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* source indices have 32 bits */
     uint64_t *used = ebpo_alloc_zero(limit / 64 + 1, sizeof *used);
     if (!used)
         return ebpo_fail_memory(error, limit / 8);

@@ -1,4 +1,4 @@
-/* Arrays of a file: the rows of array_table.inc as an enumeration and a table.
+/* Declares the arrays of a file: the rows of array_table.inc as an enumeration and a table. Source:
  * format-spec/README.md, sections 6 and 9. */
 #ifndef EBPO_FORMAT_SCHEMA_H
 #define EBPO_FORMAT_SCHEMA_H
@@ -25,14 +25,14 @@ typedef enum ebpo_array_id {
     EBPO_ARRAYS
 } ebpo_array_id;
 
-/* Kind of item that has one row in an array. The attributes of a level's group contain the numbers
- * of items before EBPO_COUNTS. */
+/* Kind of item that has one row in an array. For kinds before EBPO_COUNTS, the HDF5 attributes of a
+ * level's group contain the number of items. */
 typedef enum ebpo_per {
 #define LEVEL_COUNT(ID, ...) EBPO_PER_##ID,
 #include "format/array_table.inc"
     EBPO_COUNTS,
     EBPO_PER_GROUP = EBPO_COUNTS,
-    EBPO_PER_GROUP_BLOCK, /* EBPO_INDEX_ROWS groups; the next two: gray nodes, leaves */
+    EBPO_PER_GROUP_BLOCK, /* EBPO_INDEX_ROWS groups; in the next two rows: gray nodes, leaves */
     EBPO_PER_GRAY_BLOCK,
     EBPO_PER_LEAF_BLOCK,
     EBPO_PER_VERTEX,
@@ -40,7 +40,7 @@ typedef enum ebpo_per {
     EBPO_PER_FACE_CHUNK,
     EBPO_PER_BORDER_LOOP,
     EBPO_PER_BORDER_POINT,
-    EBPO_PER_PATCH, /* of the simplified surface; the next three: of all patches */
+    EBPO_PER_PATCH, /* of the simplified surface; the next three rows: of all patches */
     EBPO_PER_PATCH_BYTE,
     EBPO_PER_PATCH_VERTEX,
     EBPO_PER_PATCH_COLOUR,
@@ -129,7 +129,8 @@ typedef struct ebpo_array_spec {
     uint8_t cols;   /* 0: one dimension */
     uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
-    bool if_needed; /* may be absent although its rows exist: all values are then the default */
+    bool if_needed; /* true: may be absent although its items exist; all values are then the default
+                     */
     int8_t default_value;
     uint8_t since;      /* first minor version of the format with this array */
     uint8_t held_size;  /* size of an element in ebpo_level; 0: ebpo_level lacks the array */
@@ -141,16 +142,17 @@ typedef struct ebpo_array_spec {
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
 
+/* Coding of faces as gates across edges (hdf5_read/face_gates.h). */
 #define EBPO_GATES_CODING "gates"
-/* Returns the shape in the file of an array with values of shape `given`. It differs from `given`
- * only for gates. */
+/* Returns the shape in the file of an array with values of shape `given`. The result differs from
+ * `given` only for gates. */
 ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
 
-/* Writes the absolute path of an array; `level` matters for level arrays only. */
+/* Writes the absolute path of an array; `level` is ignored for arrays of the root. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
 
-/* Returns the path of an array in files that were written before format 1.1 had its final names, or
- * NULL. */
+/* Returns the path of the array in files of format 1.1 that were written before the array had its
+ * final name; NULL for arrays without a former name. */
 const char *ebpo_schema_former(ebpo_array_id id);
 
 /* Writes the attribute `columns`: a name for each column; "" for arrays of one dimension. */
@@ -164,7 +166,7 @@ uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
 uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level);
 
 /* Returns the number of rows of an index array over `count` items: one for each EBPO_INDEX_ROWS
- * items. Returns 0 instead of 1, as a single row contains only zeros. */
+ * items. Returns 0 instead of 1, because a single row would contain only zeros. */
 uint64_t ebpo_schema_index_rows(uint64_t count);
 
 /* Returns the number of groups of eight in a level, from the header's counts. */
@@ -186,7 +188,7 @@ typedef struct ebpo_list_spec {
     ebpo_array_id counts; /* the array of these numbers */
     ebpo_per of;          /* the type of node */
 } ebpo_list_spec;
-/* Returns NULL for arrays that are not lists. */
+/* Returns the list that consists of such items; NULL for items that are in no list. */
 const ebpo_list_spec *ebpo_schema_list(ebpo_per per);
 
 /* Returns the type of node (ebpo_node_type) that `per` stands for, or -1. */
@@ -194,6 +196,7 @@ int ebpo_schema_node_type(ebpo_per per);
 
 /* --- a level in memory --- */
 
+/* Returns true for index arrays: sums before each EBPO_INDEX_ROWS-th item. */
 static inline bool ebpo_schema_is_index(int id)
 {
     return ebpo_schema[id].per >= EBPO_PER_GROUP_BLOCK &&
@@ -207,6 +210,7 @@ static inline bool ebpo_schema_is_list(ebpo_array_id id)
     return id == EBPO_A_CHUNK_DIRECTORY || id == EBPO_A_CHUNK_CHECKSUMS;
 }
 
+/* Returns true if ebpo_level has the array. */
 static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }
 
 static inline void *ebpo_level_array(const ebpo_level *level, int id)
@@ -230,7 +234,7 @@ static inline uint64_t ebpo_level_rows(const ebpo_level *level, int id)
     return ebpo_level_count(level, ebpo_schema[id].per);
 }
 
-/* Returns true if all values are the default, which an absent array means as well. */
+/* Returns true if all values are the default, so that the array can be omitted. */
 bool ebpo_level_is_default(const ebpo_level *level, int id);
 
 /* Frees the arrays that only these `needs` require. The level's counts do not change. */
@@ -242,13 +246,13 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
 /* Returns a level with the header's counts and no arrays. */
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
-/* Constraints on a tree from a file or from a caller who writes one: format-spec/README.md,
- * sections 6 and 9. */
+/* Constraints on a tree, which is read from a file or comes from a caller who writes it:
+ * format-spec/README.md, sections 6 and 9. */
 
 /* Subject of the check: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
 typedef struct ebpo_check {
-    const char *shown; /* the file's name */
-    ebpo_status as;
+    const char *shown;         /* the file's name */
+    ebpo_status as;            /* status of an error */
     ebpo_workspace *workspace; /* contains the arrays, or NULL */
 } ebpo_check;
 
@@ -266,7 +270,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_i
 EBPO_MUST_USE ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree,
                                            ebpo_error *error);
 
-/* Checks that a map's values are distinct and below `limit`. */
+/* Checks that source indices (positions in the source mesh) are distinct and below `limit`. */
 EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *array,
                                          const uint32_t *map, uint64_t count, uint64_t limit,
                                          ebpo_error *error);
@@ -287,7 +291,7 @@ const char *ebpo_attribute_about(int number, bool ends);
 
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];
 
-/* The former name of ebpo_coding_columns, which readers take. */
+/* The former name of ebpo_coding_columns, which readers also accept. */
 #define EBPO_CODING_COLUMNS_FORMER "columns"
 
 #endif

@@ -39,10 +39,9 @@ ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *
 {
     *out = (ebpo_compact){ .mask = 0 };
     if (capacity > UINT64_C(1) << 31)
-        return ebpo_fail(
-            error, EBPO_E_LIMIT,
-            "%llu references in one subtree are more than can be numbered; choose a deeper level",
-            (unsigned long long)capacity);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "one subtree has %llu references, more than 2^31; choose a deeper level",
+                         (unsigned long long)capacity);
     uint64_t slots = ebpo_hash_slots(2 * capacity);
     out->mask = slots - 1;
     out->slot = ebpo_alloc(slots, sizeof *out->slot);
@@ -74,11 +73,11 @@ static void compact_add(ebpo_compact *compact, uint32_t number)
 }
 
 /* Sorts with a radix sort, from the lowest byte to the highest. Skips bytes that are equal in all
- * numbers. `other`: temporary memory of the same size. */
-static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
+ * numbers. `temporary`: memory of the same size. */
+static void sort_numbers(uint32_t *numbers, uint32_t *temporary, uint64_t count)
 {
     uint64_t begin[4][256] = { { 0 } };
-    uint32_t *from = numbers, *to = other;
+    uint32_t *from = numbers, *to = temporary;
     for (uint64_t i = 0; i < count; i++)
         for (int byte = 0; byte < 4; byte++)
             begin[byte][numbers[i] >> 8 * byte & 255]++;
@@ -106,11 +105,11 @@ static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
 {
     if (compact->count == 0)
         return EBPO_OK;
-    uint32_t *other = ebpo_alloc(compact->count, sizeof *other);
-    if (!other)
-        return ebpo_fail_memory(error, compact->count * sizeof *other);
-    sort_numbers(compact->sorted, other, compact->count);
-    free(other);
+    uint32_t *temporary = ebpo_alloc(compact->count, sizeof *temporary);
+    if (!temporary)
+        return ebpo_fail_memory(error, compact->count * sizeof *temporary);
+    sort_numbers(compact->sorted, temporary, compact->count);
+    free(temporary);
     for (uint64_t i = 0; i < compact->count; i++)
         compact->slot[slot_of(compact, compact->sorted[i])].position = (uint32_t)i;
     return EBPO_OK;
@@ -124,6 +123,7 @@ static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 
 /* --- faces --- */
 
+/* Sends prefetch hints for the rows `single` and [first, first + rows). */
 static void hint_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
                       uint64_t singles, uint64_t first, uint64_t rows)
 {
@@ -171,6 +171,7 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
 
 /* --- local indices of faces --- */
 
+/* Collects the shared faces: references to faces before the first owned face. */
 static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *shared, ebpo_quota *space,
                                   ebpo_error *error)
 {
@@ -190,18 +191,19 @@ static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *shared, ebpo_
     return compact_sort(shared, error);
 }
 
+/* Replaces file indices of faces by local indices. */
 static void localise_faces(ebpo_slice *slice, const ebpo_compact *shared)
 {
     /* the index of an owned face decreases by the number of earlier faces that are not shared */
-    uint64_t less = slice->first_face - shared->count;
+    uint64_t decrease = slice->first_face - shared->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
         for (uint64_t k = 0; k < level->leaf_count; k++)
-            level->leaf_first[k] -= less;
+            level->leaf_first[k] -= decrease;
         for (uint64_t k = 0; k < level->ref_count; k++) {
             uint32_t ref = level->leaf_refs[k];
             level->leaf_refs[k] =
-                ref < slice->first_face ? compact_find(shared, ref) : (uint32_t)(ref - less);
+                ref < slice->first_face ? compact_find(shared, ref) : (uint32_t)(ref - decrease);
         }
     }
 }
@@ -238,23 +240,24 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     if (status != EBPO_OK)
         return status;
     const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
-                   *own = slice->mesh.faces + 3 * (uint64_t)slice->shared_count;
+                   *owned_corners = slice->mesh.faces + 3 * (uint64_t)slice->shared_count;
     uint64_t used = chunks->vertices_before
                         ? chunks->vertices_before[view.begin / view.array->shape.chunk_rows]
                         : 0;
     /* one past the largest vertex of the faces before the owned faces, and of the owned faces;
      * vertex indices are below 2^32 - 2 */
-    uint32_t before = 0, within = 0;
+    uint32_t end_before = 0, end_owned = 0;
     for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
-        before = corners[i] + 1 > before ? corners[i] + 1 : before;
+        end_before = corners[i] + 1 > end_before ? corners[i] + 1 : end_before;
     for (uint64_t i = 0; i < 3 * slice->face_count; i++)
-        within = own[i] + 1 > within ? own[i] + 1 : within;
+        end_owned = owned_corners[i] + 1 > end_owned ? owned_corners[i] + 1 : end_owned;
     ebpo_held_chunk_release(chunks, &view);
-    *begin = before > used ? before : used;
-    *end = within > *begin ? within : *begin;
+    *begin = end_before > used ? end_before : used;
+    *end = end_owned > *begin ? end_owned : *begin;
     return EBPO_OK;
 }
 
+/* Collects the vertices of the slice before `begin`, which earlier faces of the file use first. */
 static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quota *space,
                                  ebpo_compact *older, uint64_t *bytes, ebpo_error *error)
 {
@@ -275,10 +278,10 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quo
  * that owned faces use first. */
 static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
-    uint32_t less = (uint32_t)(begin - older->count);
+    uint32_t decrease = (uint32_t)(begin - older->count);
     for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
-        mesh->faces[i] =
-            mesh->faces[i] < begin ? compact_find(older, mesh->faces[i]) : mesh->faces[i] - less;
+        mesh->faces[i] = mesh->faces[i] < begin ? compact_find(older, mesh->faces[i])
+                                                : mesh->faces[i] - decrease;
 }
 
 static ebpo_status read_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_quota *space,
@@ -286,15 +289,15 @@ static ebpo_status read_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_qu
 {
     ebpo_mesh *mesh = &slice->mesh;
     ebpo_compact older = { .slot = NULL };
-    uint64_t begin, end, table = 0;
+    uint64_t begin, end, table_bytes = 0;
     bool wide = chunks->file->info.double_coordinates;
     size_t row_bytes = 3 * (wide ? sizeof(double) : sizeof(float));
     ebpo_status status = new_vertices(slice, chunks, &begin, &end, error);
     if (status == EBPO_OK)
-        status = collect_older(mesh, begin, space, &older, &table, error);
+        status = collect_older(mesh, begin, space, &older, &table_bytes, error);
     if (status == EBPO_OK) {
         mesh->vertex_count = older.count + (end - begin);
-        status = ebpo_quota_check(space, table + mesh->vertex_count * row_bytes, error);
+        status = ebpo_quota_check(space, table_bytes + mesh->vertex_count * row_bytes, error);
     }
     if (status == EBPO_OK)
         status = ebpo_quota_take(space, mesh->vertex_count * row_bytes, error);
@@ -324,8 +327,8 @@ static ebpo_status read_source_indices(ebpo_slice *slice, ebpo_chunks *chunks, e
 }
 
 /* Completes a slice that has levels with file indices, first_face and face_count. Reads faces and
- * vertices, and converts the levels to local indices. With `maps`, also reads source indices.
- * `space`: see ebpo_slice_read_within. */
+ * vertices, and converts the levels to local indices. If `maps` is true, also reads source indices
+ * (positions in the source mesh). `space`: see ebpo_slice_read_within. */
 static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
                                     ebpo_quota *space, ebpo_error *error)
 {
@@ -369,6 +372,7 @@ typedef struct range {
     ebpo_run run;
 } range;
 
+/* Sets *out to the range that consists of the root only. */
 static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, range *out,
                               ebpo_error *error)
 {
@@ -400,7 +404,7 @@ static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32
 }
 
 /* Returns true if the next level of the extent has nodes below this range. */
-static bool goes_on(const extent *e, const range *r)
+static bool has_next_level(const extent *e, const range *r)
 {
     return r->run.count[EBPO_GRAY] && r->level + 1 < e->end;
 }
@@ -430,9 +434,9 @@ static void hint_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
     uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
              counted = index * EBPO_INDEX_ROWS;
     ebpo_runs_hint(chunks, &e, r->level, &r->run, 1, x->needs);
-    if (goes_on(x, r) && ebpo_subtree_table_has(chunks->file, r->level + 1)) {
+    if (has_next_level(x, r) && ebpo_subtree_table_has(chunks->file, r->level + 1)) {
         ebpo_chunks_hint(chunks, &e, EBPO_A_TYPES, r->level + 1, gray, r->run.count[EBPO_GRAY]);
-    } else if (goes_on(x, r)) {
+    } else if (has_next_level(x, r)) {
         ebpo_chunks_hint(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, index, 1);
         ebpo_chunks_hint(chunks, &e, EBPO_A_TYPES, r->level + 1, counted,
                          gray + r->run.count[EBPO_GRAY] - counted);
@@ -441,13 +445,13 @@ static void hint_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
 }
 
 /* Sends prefetch hints for all levels below the subtrees' roots. Does nothing unless the range is
- * in the level of these roots, where the table states all lower chunks. */
+ * in the level of these roots, because the table only locates the chunks of whole subtrees. */
 static void hint_subtrees(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     e.local = true;
-    if (!ebpo_subtree_table_has(chunks->file, r->level + 1) || !goes_on(x, r) ||
+    if (!ebpo_subtree_table_has(chunks->file, r->level + 1) || !has_next_level(x, r) ||
         r->level != chunks->file->info.subtree_level || !ebpo_hints_wanted(&e))
         return;
     ebpo_subtree_table_hint_run(chunks, first, count);
@@ -464,6 +468,7 @@ static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range 
     return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, x->space, out, error);
 }
 
+/* Reads the levels of the extent, from the root down. */
 static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
                                ebpo_error *error)
 {
@@ -478,7 +483,7 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ext
         return ebpo_fail_memory(error, sizeof(uint16_t));
     slice->level[0].types[0] = (uint16_t)root->type;
     status = read_nodes(chunks, x, &r, &slice->level[0], error);
-    for (slice->level_count = 1; status == EBPO_OK && goes_on(x, &r); slice->level_count++) {
+    for (slice->level_count = 1; status == EBPO_OK && has_next_level(x, &r); slice->level_count++) {
         ebpo_level *out = &slice->level[slice->level_count];
         out->group_count = r.run.count[EBPO_GRAY];
         status = ebpo_quota_take(x->space, out->group_count * sizeof *out->types, error);
@@ -490,11 +495,12 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ext
     return status;
 }
 
+/* State of the visit of all leaves in depth-first order. */
 typedef struct walk {
     ebpo_chunks *chunks;
     ebpo_slice *slice;
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* next item of each level */
-    bool begun;
+    bool begun;                                             /* true after the first leaf */
 } walk;
 
 /* Checks that the new faces of the leaves, in depth-first order, are one range without gaps. This
@@ -525,10 +531,12 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Returns true if the root is the root of a subtree of the file's table, and all its levels are
+ * read. */
 static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
 {
     const ebpo_info *info = &chunks->file->info;
-    /* the table does not state the faces of a part of the levels */
+    /* the table states the faces of a whole subtree only */
     return info->subtree_level && root->cell.level == info->subtree_level &&
            root->type == EBPO_GRAY && x->end == info->level_count;
 }
@@ -543,8 +551,8 @@ static ebpo_status check_owned_faces(const ebpo_slice *slice, ebpo_chunks *chunk
     ebpo_status status = ebpo_subtree_table_row(chunks, slice->root.rank, &row, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t has = row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
-    return has == slice->face_count && (has == 0 || row.face == slice->first_face)
+    uint64_t stated = row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
+    return stated == slice->face_count && (stated == 0 || row.face == slice->first_face)
                ? EBPO_OK
                : ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
                                   "a row contradicts the faces of its subtree", error);
@@ -609,23 +617,27 @@ ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_nod
     return ebpo_slice_read_parts(out, chunks, root, ~(uint32_t)EBPO_NEEDS_LEAF_PLANES, error);
 }
 
+/* Adds the references and the new faces of the leaves of a range. */
 static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice_size *out,
                                  ebpo_error *error)
 {
-    uint64_t refs = 0, fresh = 0, first = r->run.rank[EBPO_LEAF], count = r->run.count[EBPO_LEAF];
+    uint64_t refs = 0, new_faces = 0, first = r->run.rank[EBPO_LEAF],
+             count = r->run.count[EBPO_LEAF];
     const ebpo_level_summary *s = &chunks->file->info.level[r->level];
     ebpo_status status =
         ebpo_chunks_sum(chunks, EBPO_A_LEAF_REF_COUNT, r->level, first, count, &refs, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, r->level, first, count, &fresh, error);
-    if (status == EBPO_OK && (refs > s->ref_count || fresh > s->new_count))
+        status =
+            ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, r->level, first, count, &new_faces, error);
+    if (status == EBPO_OK && (refs > s->ref_count || new_faces > s->new_count))
         status = ebpo_chunks_fail(chunks, r->level, EBPO_A_LEAF_NEW,
                                   "the leaves' counts do not add up to those in the header", error);
     out->refs += refs;
-    out->new_faces += fresh;
+    out->new_faces += new_faces;
     return status;
 }
 
+/* Adds the planes of the nodes of one type in a range. */
 static ebpo_status measure_planes(ebpo_chunks *chunks, const range *r, ebpo_node_type type,
                                   ebpo_slice_size *out, ebpo_error *error)
 {
@@ -638,6 +650,7 @@ static ebpo_status measure_planes(ebpo_chunks *chunks, const range *r, ebpo_node
     return status;
 }
 
+/* Adds the sizes of the nodes of a range. */
 static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const range *r,
                                  ebpo_slice_size *out, ebpo_error *error)
 {
@@ -662,16 +675,16 @@ static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_
     ebpo_subtree_table_hint_run(chunks, subtree, 1);
     ebpo_status status = ebpo_subtree_table_row(chunks, subtree, &row, error);
     for (int level = info->subtree_level + 1; level < x->end && status == EBPO_OK; level++) {
-        uint64_t has[EBPO_SUBTREE_LEVEL_COLS];
+        uint64_t counts[EBPO_SUBTREE_LEVEL_COLS];
         for (unsigned k = 0; k < EBPO_SUBTREE_LEVEL_COLS; k++)
-            has[k] = row.after[ebpo_subtree_column(info, level, k)] -
-                     row.before[ebpo_subtree_column(info, level, k)];
+            counts[k] = row.after[ebpo_subtree_column(info, level, k)] -
+                        row.before[ebpo_subtree_column(info, level, k)];
         out->groups += ebpo_subtree_groups(info, &row, level, true) -
                        ebpo_subtree_groups(info, &row, level, false);
-        out->leaves += has[EBPO_S_LEAF];
-        out->refs += x->needs & EBPO_NEEDS_MESH ? has[EBPO_S_REFS] : 0;
-        out->planes += (x->needs & EBPO_NEEDS_PLANES ? has[EBPO_S_PLANES] : 0) +
-                       (x->needs & EBPO_NEEDS_LEAF_PLANES ? has[EBPO_S_LEAF_PLANES] : 0);
+        out->leaves += counts[EBPO_S_LEAF];
+        out->refs += x->needs & EBPO_NEEDS_MESH ? counts[EBPO_S_REFS] : 0;
+        out->planes += (x->needs & EBPO_NEEDS_PLANES ? counts[EBPO_S_PLANES] : 0) +
+                       (x->needs & EBPO_NEEDS_LEAF_PLANES ? counts[EBPO_S_LEAF_PLANES] : 0);
     }
     if (status == EBPO_OK && x->needs & EBPO_NEEDS_MESH)
         out->new_faces += row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
@@ -692,7 +705,7 @@ ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
         out->shared = out->refs;
         return status;
     }
-    while (status == EBPO_OK && goes_on(&x, &r)) {
+    while (status == EBPO_OK && has_next_level(&x, &r)) {
         out->groups += r.run.count[EBPO_GRAY];
         status = next_range(chunks, &r, NULL, error);
         if (status == EBPO_OK)
@@ -710,7 +723,7 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_
 
 /* --- the whole tree --- */
 
-/* Removes data that slices do not contain. */
+/* Removes data that slices do not contain: planes of leaves, and volumes. */
 static void drop_arrays(ebpo_level *level)
 {
     ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);

@@ -17,8 +17,8 @@
  * - 1. leaf_first and leaf_refs of the levels contain local indices. */
 typedef struct ebpo_slice {
     ebpo_node root;
-    /* the file is a subset: nodes with empty groups, and gray nodes on the last level, are pruned
-     */
+    /* true: the file is a subset, in which nodes with empty groups, and gray nodes on the last
+     * level, are pruned (their children are not in the file) */
     bool pruned;
     int level_count;
     ebpo_level level[EBPO_LEVELS_MAX];
@@ -27,27 +27,27 @@ typedef struct ebpo_slice {
     uint64_t first_face;
     uint64_t face_count; /* owned faces */
     ebpo_mesh mesh;      /* shared_count + face_count faces, vertices in any order */
-    /* [shared_count + face_count] source indices, or NULL without maps */
+    /* [shared_count + face_count] source indices, or NULL if the file lacks the part `maps` */
     uint32_t *face_source;
 } ebpo_slice;
 
 void ebpo_slice_free(ebpo_slice *slice);
 
 /* Reads the subtree of a gray node, or a single leaf, with its faces and the arrays that `needs`
- * requires (EBPO_NEEDS_..., schema.h: windings, planes, stored planes of leaves, maps). Returns
- * EBPO_E_ABSENT if the file has no mesh. */
+ * requires (EBPO_NEEDS_..., schema.h: windings, planes, stored planes of leaves, source indices).
+ * Returns EBPO_E_ABSENT if the file has no mesh. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks,
                                                 const ebpo_node *root, uint32_t needs,
                                                 ebpo_error *error);
 
-/* Does the same with a limit of memory. Reserves the bytes of each array in `space` before
- * allocating it, and keeps them reserved. Releases the bytes of temporary arrays. Returns
- * EBPO_E_LIMIT beyond the limit. */
+/* Same as ebpo_slice_read_parts, with a limit of memory. Reserves the bytes of each array in
+ * `space` before allocating it, and keeps them reserved. Releases the bytes of temporary arrays.
+ * Returns EBPO_E_LIMIT beyond the limit. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks,
                                                  const ebpo_node *root, uint32_t needs,
                                                  ebpo_quota *space, ebpo_error *error);
 
-/* Does the same with all data except stored planes of leaves. */
+/* Same as ebpo_slice_read_parts, with all data except stored planes of leaves. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks,
                                           const ebpo_node *root, ebpo_error *error);
 
@@ -73,7 +73,7 @@ typedef struct ebpo_slice_size {
 } ebpo_slice_size;
 EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root,
                                              ebpo_slice_size *out, ebpo_error *error);
-/* Does the same for ebpo_slice_read_nodes. */
+/* Same as ebpo_slice_measure, for ebpo_slice_read_nodes. */
 EBPO_MUST_USE ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
                                                    uint32_t needs, int levels, ebpo_slice_size *out,
                                                    ebpo_error *error);
@@ -89,7 +89,7 @@ static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t lo
 
 /* Set of distinct indices below 2^32 - 1, sorted, with the position of each in the sorted order. */
 typedef struct ebpo_compact {
-    /* hash table with open addressing, at most half full; number UINT32_MAX: free */
+    /* hash table with open addressing, at most half full; a free slot has number UINT32_MAX */
     struct {
         uint32_t number, position; /* the index, and its position in `sorted` */
     } * slot;

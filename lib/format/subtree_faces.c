@@ -1,9 +1,9 @@
 /* Checks the faces of a subtree against the file's table of subtrees. Only a visit of all leaves in
- * depth-first order determines where the new faces of each level begin: a wrong column of ends
- * shifts the faces of one level, and no sum detects that. The leaves of a whole subtree are
- * checked where they are read; this check is for readers of a part of a subtree. One chunk of each
- * array and level is pinned at a time; nothing is allocated. Source: format-spec/subtrees.md,
- * rule RC.4. */
+ * depth-first order determines where the new faces of each level begin: a wrong value in the column
+ * EBPO_S_ENDS shifts the faces of one level, and no sum detects this error. Readers of a whole
+ * subtree check its leaves themselves (slice.c); this check is for readers of a part of a subtree.
+ * At a time, one chunk of each array and level is pinned. No memory is allocated. Source:
+ * format-spec/subtrees.md, rule RC.4. */
 #include <string.h>
 
 #include "core/endian.h"
@@ -17,7 +17,7 @@ typedef struct visit {
     ebpo_chunks *chunks;
     const ebpo_subtree_row *row;
     ebpo_held_chunk view[EBPO_LEVELS_MAX][LISTS];
-    /* of each level: next group and leaf, and the end of the new faces of the leaf before */
+    /* for each level: next group, next leaf, and the end of the new faces of the previous leaf */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], end[EBPO_LEVELS_MAX];
     uint64_t face; /* next new face */
 } visit;
@@ -28,6 +28,7 @@ static ebpo_status faces_differ(const visit *v, ebpo_error *error)
                             "a row contradicts the faces of its subtree", error);
 }
 
+/* Reads element `at` of one of the three arrays of a level. */
 static ebpo_status load_item(visit *v, int level, int list, uint64_t at, uint64_t *value,
                              ebpo_error *error)
 {
@@ -45,13 +46,13 @@ static ebpo_status load_item(visit *v, int level, int list, uint64_t at, uint64_
 
 static ebpo_status visit_leaf(visit *v, int level, ebpo_error *error)
 {
-    uint64_t at = v->leaf[level]++, skip = 0, fresh = 0;
+    uint64_t at = v->leaf[level]++, skip = 0, new_faces = 0;
     ebpo_status status = load_item(v, level, SKIP, at, &skip, error);
     if (status == EBPO_OK)
-        status = load_item(v, level, NEW, at, &fresh, error);
+        status = load_item(v, level, NEW, at, &new_faces, error);
     if (status == EBPO_OK && v->end[level] + skip != v->face)
         status = faces_differ(v, error);
-    v->face += fresh;
+    v->face += new_faces;
     v->end[level] = v->face;
     return status;
 }
@@ -73,6 +74,7 @@ static ebpo_status visit_group(visit *v, int level, ebpo_error *error)
     return status;
 }
 
+/* Visits all leaves of a subtree. */
 static ebpo_status visit_subtree(ebpo_chunks *chunks, const ebpo_subtree_row *row,
                                  ebpo_error *error)
 {
@@ -90,8 +92,8 @@ static ebpo_status visit_subtree(ebpo_chunks *chunks, const ebpo_subtree_row *ro
     for (int level = info->subtree_level + 1; level < info->level_count; level++)
         for (int list = 0; list < LISTS; list++)
             ebpo_held_chunk_release(chunks, &v.view[level][list]);
-    uint64_t has = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
-    return status == EBPO_OK && v.face != row->face + has ? faces_differ(&v, error) : status;
+    uint64_t owned = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
+    return status == EBPO_OK && v.face != row->face + owned ? faces_differ(&v, error) : status;
 }
 
 ebpo_status ebpo_subtree_faces_check(ebpo_chunks *chunks, const ebpo_node *node, ebpo_error *error)

@@ -91,6 +91,7 @@ static uint32_t count_at(const subtree_counts *c, uint64_t subtree, uint32_t col
     return ebpo_load32(c->view.rows + ((subtree - c->view.begin) * c->cols + column) * 4);
 }
 
+/* Adds the counts of a subtree to the sums. */
 static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
 {
     for (uint32_t k = 0; k < c->cols; k++)
@@ -208,6 +209,7 @@ static uint64_t remembered_subtrees(const ebpo_info *info)
     return subtrees < FACES_KNOWN_MAX ? subtrees : FACES_KNOWN_MAX;
 }
 
+/* Returns true if the row is the one that find_kept searches for. */
 static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
 {
     return column == BY_NUMBER ? row->subtree == item
@@ -239,7 +241,7 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
     if (!chunks->rows)
         chunks->rows =
             ebpo_alloc_zero(1, sizeof *chunks->rows + remembered_subtrees(&chunks->file->info) / 8 +
-                                   1); /* without memory, rows are not cached */
+                                   1); /* if memory is short, rows are not cached */
     if (chunks->rows) {
         chunks->rows->row[chunks->rows->next] = *row;
         chunks->rows->next = (chunks->rows->next + 1) % KEPT;
@@ -330,6 +332,7 @@ static bool is_direct(const ebpo_info *info, int level, ebpo_per per)
     return per == EBPO_PER_GROUP && level == info->subtree_level + 1;
 }
 
+/* Returns the column that counts the items of a level. */
 static unsigned column_of(const ebpo_info *info, int level, ebpo_per per)
 {
     return per == EBPO_PER_GROUP  ? ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)
@@ -836,20 +839,20 @@ void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, 
                         uint32_t needs, int last_level, bool faces)
 {
     const ebpo_info *info = &chunks->file->info;
-    bool mesh = faces && info->parts & EBPO_PART_MESH, alone = count == 1;
+    bool mesh = faces && info->parts & EBPO_PART_MESH, single = count == 1;
     ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
     hinting t = { chunks,  hints,
-                  &row[0], alone ? &row[0] : &row[1],
+                  &row[0], single ? &row[0] : &row[1],
                   needs,   faces ? EBPO_LEVELS_MAX : last_level };
     if (row && count && ebpo_hints_wanted(hints) &&
         ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
-        (alone || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
+        (single || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
         hint_nodes(&t);
         if (mesh)
             hint_owned_faces(&t);
-        if (mesh && alone)
+        if (mesh && single)
             hint_shared(&t, &row[0]);
-        for (uint64_t i = 0; i < count && mesh && !alone; i++)
+        for (uint64_t i = 0; i < count && mesh && !single; i++)
             if (ebpo_subtree_table_row(chunks, first + i, &row[2], NULL) == EBPO_OK)
                 hint_shared(&t, &row[2]);
     }

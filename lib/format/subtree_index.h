@@ -11,11 +11,12 @@ enum { EBPO_SUBTREE_COLS = EBPO_SUBTREE_LEVELS + EBPO_SUBTREE_LEVEL_COLS * EBPO_
 typedef struct ebpo_subtree_row {
     uint64_t subtree;
     uint64_t before[EBPO_SUBTREE_COLS]; /* sums of the columns over the preceding subtrees */
-    uint64_t after[EBPO_SUBTREE_COLS];  /* the same, including this subtree */
+    uint64_t after[EBPO_SUBTREE_COLS];  /* sums of the columns including this subtree */
     uint64_t face, vertex;              /* first owned face and vertex of the subtree */
 } ebpo_subtree_row;
 
-/* Returns true if the table covers a level: it covers the levels below the subtrees' roots. */
+/* Returns true if the table has columns for a level: it has columns for the levels below the
+ * subtrees' roots. */
 static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 {
     return file->info.subtree_level && level > file->info.subtree_level;
@@ -31,7 +32,8 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
                                                   ebpo_error *error);
 
 /* ebpo_subtree_faces_note remembers that the faces of a subtree were checked (subtree_faces.h).
- * ebpo_subtree_faces_known returns true if this is remembered, which it is not for all subtrees. */
+ * ebpo_subtree_faces_known returns true if this is remembered; not every checked subtree is
+ * remembered. */
 bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
 void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 
@@ -42,8 +44,8 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 
 /* Adds to `keys` the chunks of the table that are not in memory and are needed to find an item of a
  * level. `per` is the kind of item: EBPO_PER_GROUP, EBPO_PER_GRAY or EBPO_PER_LEAF. Returns true if
- * there are such chunks; otherwise *first is the first such item of the item's subtree. Also
- * returns true on errors, which the later read reports. */
+ * there are such chunks. If it returns false, *first is the first item of this kind in the subtree
+ * of `item`. Also returns true on errors, which the later read reports. */
 bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
                                 ebpo_chunk_keys *keys, uint64_t *first);
 

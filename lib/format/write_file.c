@@ -54,7 +54,7 @@ typedef struct file_headers {
 
 /* The file's first chunk, which contains the root's type. It is written with the headers. */
 typedef struct first_chunk {
-    const void *data;
+    const void *data; /* stored bytes */
     size_t bytes;
 } first_chunk;
 
@@ -72,7 +72,7 @@ static bool has_index(const ebpo_plan *plan)
     return false;
 }
 
-/* Describes the array of a list with this number of rows. */
+/* Describes the array of a list with this number of rows; 0: the list is not written. */
 static void plan_list(file_headers *h, chunk_list list, ebpo_array_id id, uint64_t rows)
 {
     ebpo_array_out *a = &h->list[list];
@@ -85,8 +85,8 @@ static void plan_list(file_headers *h, chunk_list list, ebpo_array_id id, uint64
                                  .pipeline = h->plan->array[0].shape.pipeline };
 }
 
-/* Initialises the headers. They refer to the plan, which the caller frees after headers_close. At
- * the end, the caller calls headers_close and then ebpo_h5_finish or ebpo_h5_discard. */
+/* Initialises the headers, which refer to the plan; the caller frees the plan after headers_close.
+ * At the end, the caller calls headers_close and then ebpo_h5_finish or ebpo_h5_discard. */
 static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
@@ -308,7 +308,7 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
  * together at most 8 MiB before compression, and at most 8 MiB compressed. */
 enum { WINDOW_CHUNKS = 128 };
 
-/* A chunk of the window. */
+/* A chunk of the window: its position, and its bytes before and after compression. */
 typedef struct window_chunk {
     const ebpo_array_out *array;
     uint64_t chunk;
@@ -360,14 +360,14 @@ static ebpo_status encode_chunks(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* Adds the chunks of the window to the digests of their arrays. Adds each digest that is then
- * complete to the content checksums. */
+/* Adds the chunks of the window to the digests of their arrays. Adds the digest of each array whose
+ * last chunk is in the window to the content checksums. */
 static void digest_window(writer *w)
 {
     for (unsigned i = 0; i < w->used; i++) {
         const window_chunk *s = &w->window[i];
         const ebpo_shape *shape = &s->array->shape;
-        uint64_t row = s->chunk * shape->chunk_rows, left = shape->rows - row;
+        uint64_t row = s->chunk * shape->chunk_rows, remaining = shape->rows - row;
         ebpo_array_digest *state = &w->digest[s->array - w->plan.array];
         uint8_t digest[32];
         if (!ebpo_content_has(&w->plan.info, s->array->id))
@@ -375,8 +375,9 @@ static void digest_window(writer *w)
         if (row == 0)
             ebpo_array_digest_begin(state);
         ebpo_array_digest_add(state, &w->plan.info, s->array->id, shape, row,
-                              left < shape->chunk_rows ? left : shape->chunk_rows, s->raw);
-        if (left > shape->chunk_rows)
+                              remaining < shape->chunk_rows ? remaining : shape->chunk_rows,
+                              s->raw);
+        if (remaining > shape->chunk_rows)
             continue;
         ebpo_array_digest_end(state, digest);
         ebpo_content_put(&w->content[ebpo_content_of(s->array->id, w->plan.info.solid)],
@@ -388,8 +389,8 @@ static void digest_window(writer *w)
 static ebpo_status compress_gates(window_chunk *s, ebpo_chunk_coder *coder, int level)
 {
     ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
-    uint64_t left = stored.rows - s->chunk * stored.chunk_rows,
-             rows = left < stored.chunk_rows ? left : stored.chunk_rows;
+    uint64_t remaining = stored.rows - s->chunk * stored.chunk_rows,
+             rows = remaining < stored.chunk_rows ? remaining : stored.chunk_rows;
     size_t ends[EBPO_GATES_ENDS], bytes = stored.chunk_rows * ebpo_shape_row_bytes(&stored);
     ebpo_gates_encode(s->raw, (uint32_t)rows, coder->scratch, ends);
     memset(coder->scratch + rows * EBPO_GATES_COLS, 0, bytes - rows * EBPO_GATES_COLS);
@@ -538,14 +539,15 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
     return status;
 }
 
+/* Allocates the buffers of the window and the rows of the lists. */
 static ebpo_status make_window(writer *w, ebpo_error *error)
 {
     size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX),
            buffer_bytes = EBPO_CHUNK_BYTES_MAX + bound;
-    uint64_t wanted = w->order.count < WINDOW_CHUNKS ? w->order.count : WINDOW_CHUNKS;
+    uint64_t chunk_count = w->order.count < WINDOW_CHUNKS ? w->order.count : WINDOW_CHUNKS;
     w->threads = ebpo_thread_count(w->options->threads);
     w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
-    uint8_t *buffers = ebpo_alloc(wanted, buffer_bytes);
+    uint8_t *buffers = ebpo_alloc(chunk_count, buffer_bytes);
     w->window[0].raw = buffers;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
     w->size_row = ebpo_alloc(w->head.list[CHUNK_SIZES].shape.rows, sizeof *w->size_row);
@@ -553,15 +555,15 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     w->first_checksum = ebpo_alloc(w->plan.count, sizeof *w->first_checksum);
     if (!w->coders || !buffers || !w->digest || !w->size_row || !w->checksum_row ||
         !w->first_checksum)
-        return ebpo_fail_memory(error, wanted * buffer_bytes);
-    for (unsigned i = 0; i < wanted; i++) {
+        return ebpo_fail_memory(error, chunk_count * buffer_bytes);
+    for (unsigned i = 0; i < chunk_count; i++) {
         w->window[i].raw = buffers + i * buffer_bytes;
         w->window[i].stored = w->window[i].raw + EBPO_CHUNK_BYTES_MAX;
     }
-    uint64_t before = 0;
+    uint64_t sum = 0;
     for (unsigned i = 0; i < w->plan.count; i++) {
-        w->first_checksum[i] = before;
-        before += ebpo_shape_chunks(&w->plan.array[i].shape);
+        w->first_checksum[i] = sum;
+        sum += ebpo_shape_chunks(&w->plan.array[i].shape);
     }
     return EBPO_OK;
 }
@@ -579,6 +581,7 @@ static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_
     return status;
 }
 
+/* Writes the content checksums of the parts. */
 static ebpo_status put_digests(writer *w, ebpo_error *error)
 {
     uint8_t digest[32];
@@ -603,12 +606,13 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
     return status;
 }
 
-/* Writes the whole file. Does not fail if libhdf5 places its metadata elsewhere. Another version of
- * libhdf5 may place metadata differently: readers accept such a file, but tests that compare bytes
- * fail. */
+/* Writes the whole file. Another version of libhdf5 may place its metadata elsewhere in the file.
+ * Then this function does not fail, and readers accept the file, but tests that compare bytes fail.
+ */
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint8_t first[256]; /* more than enough: the first chunk has two bytes before it is encoded */
+    uint8_t
+        first[256]; /* large enough, because the first chunk has two bytes before it is encoded */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)

@@ -1,4 +1,4 @@
-/* Writes a file without publishing it. */
+/* Writes a file into an existing file, and repacks files. */
 #ifndef EBPO_FORMAT_WRITE_FILE_H
 #define EBPO_FORMAT_WRITE_FILE_H
 
@@ -11,9 +11,11 @@ EBPO_MUST_USE ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char
                                                const char *shown, const ebpo_write_options *options,
                                                ebpo_error *error);
 
-/* Does what ebpo_file_repack does, after `change` has added parts with separate checksums to the
- * tree. NULL: no change. */
+/* Adds parts to the tree of ebpo_repack_with. The parts must have separate checksums (colours,
+ * surface). */
 typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, unsigned threads, ebpo_error *error);
+/* Same as ebpo_file_repack, but calls `change` after reading the tree and before writing it.
+ * `change` may be NULL. */
 EBPO_MUST_USE ebpo_status ebpo_repack_with(const ebpo_file *file, const char *path,
                                            const ebpo_read_options *read,
                                            const ebpo_write_options *write,

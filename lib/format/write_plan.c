@@ -1,7 +1,7 @@
 /* Plans a file to write: lists its arrays with shapes and codings, and encodes rows of an array to
- * bytes. The plan refers to the caller's checked tree. It owns only derived arrays: index arrays,
- * counts and sums of subtrees, and codings of attributes. In index arrays, counts of an absent part
- * are zeros. Encoding depends only on the plan and the rows, so threads encode chunks
+ * bytes. The plan refers to the caller's checked tree. The plan owns only derived arrays: index
+ * arrays, counts and sums of subtrees, and codings of attributes. In index arrays, counts of an
+ * absent part are zeros. Encoding depends only on the plan and the rows, so threads encode chunks
  * independently. */
 #include <inttypes.h>
 #include <stdio.h>
@@ -25,6 +25,7 @@
 #include "geometry/level_nodes.h"
 #include "hdf5_read/coding.h"
 
+/* Allocates an index array for `count` items. */
 static uint64_t *make_index(uint64_t count, unsigned cols)
 {
     return ebpo_alloc_zero((count / EBPO_INDEX_ROWS + 1) * cols, sizeof(uint64_t));
@@ -77,6 +78,8 @@ uint64_t *ebpo_index_leaves(const ebpo_level *level)
 
 /* --- attributes: checks --- */
 
+/* Checks the rows of attribute array i. Returns the error's text or NULL; check_names returns the
+ * same. */
 static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all, uint64_t i)
 {
     const ebpo_attribute *a = &all->array[i];
@@ -108,6 +111,8 @@ static const char *check_names(const ebpo_attribute *a)
 
 enum { SAMPLES = 8, SAMPLE_BYTES = 16384 };
 
+/* Returns the compressed size of a sample. `columns`: the values are encoded as differences within
+ * columns. */
 static uint64_t sample_bytes(ebpo_chunk_coder *coder, const uint8_t *values, size_t size,
                              bool floats, uint64_t rows, uint32_t cols, bool columns)
 {
@@ -123,6 +128,8 @@ static uint64_t sample_bytes(ebpo_chunk_coder *coder, const uint8_t *values, siz
                : 0;
 }
 
+/* Returns true if samples of the values take fewer bytes as columns of differences than as plain
+ * values. */
 static bool columns_are_less(ebpo_chunk_coder *coder, const uint8_t *values, size_t size,
                              bool floats, uint64_t rows, uint32_t cols)
 {
@@ -137,6 +144,7 @@ static bool columns_are_less(ebpo_chunk_coder *coder, const uint8_t *values, siz
     return columns < plain;
 }
 
+/* Chooses the codings of the values and of the lists' items. */
 static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
                            ebpo_chunk_coder *coder)
 {
@@ -238,6 +246,7 @@ static void attributes_add_arrays(ebpo_plan *plan, ebpo_pipeline pipeline)
         add_one(plan, i, pipeline);
 }
 
+/* Returns true if the array contains floating-point numbers. */
 static bool floats_in(const ebpo_plan *plan, const ebpo_array_out *array)
 {
     const ebpo_attribute *a = &plan->attributes->array[(array->level - 1) / 2];
@@ -246,15 +255,15 @@ static bool floats_in(const ebpo_plan *plan, const ebpo_array_out *array)
 }
 
 static void attributes_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
-                              uint64_t rows, uint8_t *file)
+                              uint64_t rows, uint8_t *encoded)
 {
     uint32_t cols = array->shape.cols ? array->shape.cols : 1;
     const uint8_t *values = array->values;
     values += row * cols * array->value_size;
     if (array->columns)
-        ebpo_columns_encode(values, array->value_size, floats_in(plan, array), rows, cols, file);
+        ebpo_columns_encode(values, array->value_size, floats_in(plan, array), rows, cols, encoded);
     else
-        ebpo_integers_encode(values, array->value_size, rows * cols, array->value_size, file);
+        ebpo_integers_encode(values, array->value_size, rows * cols, array->value_size, encoded);
 }
 
 /* --- attributes: HDF5 attributes --- */
@@ -328,17 +337,18 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
 /* --- encoding rows --- */
 
 static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint64_t row,
-                         uint64_t rows, uint8_t *file)
+                         uint64_t rows, uint8_t *encoded)
 {
     for (uint64_t i = row; i < row + rows; i++) {
         uint64_t skip =
             level->leaf_first[i] - (i ? level->leaf_first[i - 1] + level->leaf_new[i - 1] : 0);
-        ebpo_integers_encode(&skip, sizeof skip, 1, shape->element_size, file);
-        file += shape->element_size;
+        ebpo_integers_encode(&skip, sizeof skip, 1, shape->element_size, encoded);
+        encoded += shape->element_size;
     }
 }
 
-/* Returns the last row of leaf_index whose leaves' references begin at or before `ref`. */
+/* Returns the last row of leaf_index for which the references of the next leaf begin at or before
+ * `ref`. */
 static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t ref)
 {
     uint64_t low = 0, high = (leaves - 1) / EBPO_INDEX_ROWS;
@@ -353,7 +363,7 @@ static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t r
 }
 
 static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uint64_t row,
-                        uint64_t rows, uint8_t *file)
+                        uint64_t rows, uint8_t *encoded)
 {
     uint64_t block = block_of(leaf_index, level->leaf_count, row);
     uint64_t leaf = block * EBPO_INDEX_ROWS, before = leaf_index[block * 3 + 1], end = row + rows;
@@ -363,45 +373,45 @@ static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uin
         const uint32_t *refs = level->leaf_refs + before;
         for (uint64_t k = row > before ? row - before : 0; k < count && before + k < end; k++) {
             uint64_t above = k ? refs[count - k] : level->leaf_first[leaf];
-            ebpo_store32(file + 4 * (before + k - row),
+            ebpo_store32(encoded + 4 * (before + k - row),
                          (uint32_t)(above - 1 - refs[count - 1 - k]));
         }
     }
 }
 
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
-                      uint64_t rows, uint8_t *file)
+                      uint64_t rows, uint8_t *encoded)
 {
     const ebpo_tree *tree = plan->tree;
     const ebpo_level *level = &tree->level[array->level];
     uint64_t used;
     switch (array->id) {
-    case EBPO_A_LEAF_SKIP: encode_skips(level, &array->shape, row, rows, file); break;
+    case EBPO_A_LEAF_SKIP: encode_skips(level, &array->shape, row, rows, encoded); break;
     case EBPO_A_LEAF_REFS:
-        encode_refs(level, plan->index[array->level][EBPO_INDEX_LEAVES], row, rows, file);
+        encode_refs(level, plan->index[array->level][EBPO_INDEX_LEAVES], row, rows, encoded);
         break;
     case EBPO_A_VERTICES:
         if (tree->mesh.xyz32)
-            ebpo_points32_encode(tree->mesh.xyz32 + 3 * row, rows, file);
+            ebpo_points32_encode(tree->mesh.xyz32 + 3 * row, rows, encoded);
         else
-            ebpo_points64_encode(tree->mesh.xyz64 + 3 * row, rows, file);
+            ebpo_points64_encode(tree->mesh.xyz64 + 3 * row, rows, encoded);
         break;
     case EBPO_A_FACES:
         used = plan->faces_index[row / array->shape.chunk_rows];
         /* cannot fail, as index_faces has checked the faces */
-        (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, file);
+        (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, encoded);
         break;
     case EBPO_A_BORDER_POINTS:
-        ebpo_border_encode(&tree->border, plan->info.double_coordinates, row, rows, file);
+        ebpo_border_encode(&tree->border, plan->info.double_coordinates, row, rows, encoded);
         break;
-    case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, file); break;
-    case EBPO_A_ATTRIBUTE: attributes_encode(plan, array, row, rows, file); break;
-    case EBPO_A_FACE_SOURCE: ebpo_numbers_encode(tree->face_source + row, rows, file); break;
+    case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, encoded); break;
+    case EBPO_A_ATTRIBUTE: attributes_encode(plan, array, row, rows, encoded); break;
+    case EBPO_A_FACE_SOURCE: ebpo_numbers_encode(tree->face_source + row, rows, encoded); break;
     default: {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
         const uint8_t *values = array->values;
         ebpo_integers_encode(values + row * cols * array->value_size, array->value_size,
-                             rows * cols, array->shape.element_size, file);
+                             rows * cols, array->shape.element_size, encoded);
     }
     }
 }
@@ -426,6 +436,7 @@ static void summarise_levels(ebpo_info *info, const ebpo_tree *tree)
     }
 }
 
+/* Returns true if all texts end within their arrays and are UTF-8 without control characters. */
 static bool texts_ok(const ebpo_info *info)
 {
     const struct {
@@ -445,12 +456,12 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
-/* Returns true if faces are stored as gates. By default they are if
- * the tree has gates (info.gates), but not in an uncompressed file, as gates contain many zero
- * bytes. */
-static bool gates_wanted(const ebpo_info *info, bool had, ebpo_face_coding coding)
+/* Returns true if faces are to be stored as gates (hdf5_read/face_gates.h). By default, faces are
+ * stored as gates if the tree was read from a file with gates (`tree_has_gates`) and the new
+ * file is compressed, because gates contain many zero bytes. */
+static bool gates_wanted(const ebpo_info *info, bool tree_has_gates, ebpo_face_coding coding)
 {
-    bool by_default = had && info->codec != EBPO_CODEC_NONE;
+    bool by_default = tree_has_gates && info->codec != EBPO_CODEC_NONE;
     return info->parts & EBPO_PART_MESH &&
            (coding == EBPO_FACES_DEFAULT ? by_default : coding == EBPO_FACES_GATES);
 }
@@ -481,8 +492,8 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     if (!info->generator[0])
         snprintf(info->generator, sizeof info->generator, "ebpo %s", EBPO_VERSION);
     if (info->parts & EBPO_PART_MESH) {
-        bool one = !tree->mesh.xyz32 != !tree->mesh.xyz64;
-        if (!one || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count ||
+        bool one_precision = !tree->mesh.xyz32 != !tree->mesh.xyz64;
+        if (!one_precision || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count ||
             tree->mesh.face_count != info->face_count)
             return ebpo_check_fail(
                 check, -1, "/mesh",
@@ -490,7 +501,8 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
         info->double_coordinates = tree->mesh.xyz64 != NULL;
     }
     if (info->parts & EBPO_PART_MAPS && (!tree->vertex_source || !tree->face_source))
-        return ebpo_check_fail(check, -1, "/maps", "the maps are missing", error);
+        return ebpo_check_fail(check, -1, "/maps", "the source indices (part maps) are missing",
+                               error);
     if (info->level_count < 1 || info->level_count > EBPO_LEVELS_MAX || info->grid_level < 0 ||
         info->max_level < 0 || (unsigned)info->rule > EBPO_RULE_POSITIVE)
         return ebpo_check_fail(check, -1, "/levels",
@@ -506,6 +518,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     return ebpo_facts_check(info, check->shown, check->as, error);
 }
 
+/* Checks all arrays that will be written. */
 static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_tree *tree = plan->tree;
@@ -534,7 +547,7 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
 {
     for (int i = 0; i < plan->info.level_count; i++) {
         const ebpo_level *level = &plan->tree->level[i];
-        ebpo_level stored = *level; /* lacks the arrays of omitted parts */
+        ebpo_level stored = *level; /* the level without the arrays of omitted parts */
         if (!(plan->info.parts & EBPO_PART_MESH))
             stored.leaf_first = NULL;
         if (!(plan->info.parts & EBPO_PART_LEAF_PLANES))
@@ -550,6 +563,7 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Computes faces_index, and checks that the vertices are in the order of their first use. */
 static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = &plan->tree->mesh;
@@ -580,6 +594,7 @@ static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, 
     return all <= UINT8_MAX ? 1 : all <= UINT16_MAX ? 2 : 4;
 }
 
+/* Same as narrow_unsigned, for signed values. */
 static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uint64_t count)
 {
     int32_t low = 0, high = 0;
@@ -646,6 +661,7 @@ static ebpo_pipeline pipeline_of(ebpo_codec codec)
     return (ebpo_pipeline)codec;
 }
 
+/* Adds an array of a level or of the root to the plan, unless it has no rows or may be omitted. */
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
 {
     uint64_t rows = id == EBPO_A_SUBTREE_SHARED ? plan->subtrees.shared_count

@@ -1,4 +1,4 @@
-/* Plan of a file to write: the list of arrays, and the encoding of their rows. */
+/* Plans a file to write: lists its arrays, and encodes their rows. */
 #ifndef EBPO_FORMAT_WRITE_PLAN_H
 #define EBPO_FORMAT_WRITE_PLAN_H
 
@@ -16,11 +16,12 @@ void ebpo_plan_free(ebpo_plan *plan);
 /* Encodes rows [row, row + rows) of an array, as stored before compression. `row` is a multiple of
  * the rows of a chunk; `rows` is at most that number. */
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
-                      uint64_t rows, uint8_t *file);
+                      uint64_t rows, uint8_t *encoded);
 
-/* Return the rows of an index array: sums of counts before each EBPO_INDEX_ROWS-th item. With them
- * a reader can start in the middle of a level. Readers compare them with the sums in the file.
- * There is at least one row. Return NULL when out of memory. */
+/* Return the rows of an index array: sums of counts before each EBPO_INDEX_ROWS-th item. With these
+ * sums, a reader can start in the middle of a level. Readers compare the computed sums with the
+ * sums in the file. The result has at least one row, and the caller frees it. Return NULL when out
+ * of memory. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);

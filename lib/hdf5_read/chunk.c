@@ -1,11 +1,10 @@
 /* Encodes and decodes chunks as HDF5 stores them. A pipeline is a row of the table below: its HDF5
- * filters, and the functions that encode and decode. The row determines if the values are shuffled
- * before compression, and if a fletcher32 checksum follows. A new array gets the filters of the
- * row. The pipeline of an array in a file is recognized by these filters. A new codec needs a
- * number in chunk.h, a row, and its functions in a separate file, such as zstd_codec.c. Deflate
- * needs only two calls of zlib, which are in this file. The output is bit for bit the output of
- * libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section
- * 4. */
+ * filters, and the functions that encode and decode. The row also says whether values are shuffled
+ * before compression, and whether a fletcher32 checksum follows. A writer gives a new array the
+ * filters of the row; a reader recognises the pipeline by these filters. A new codec needs a number
+ * in chunk.h, a row, and its functions in a separate file, such as zstd_codec.c. Deflate needs only
+ * two calls of zlib, which are in this file. The output is bit for bit the output of libhdf5's own
+ * filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
 #include <string.h>
 #include <zlib.h>
 
@@ -62,7 +61,7 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     uint32_t low = 0, high = 0;
     size_t words = bytes / 2;
     while (words) {
-        /* the sums of this many words do not overflow 32 bits before they are folded */
+        /* the sums of 360 words fit 32 bits, before they are folded to 16 bits */
         size_t run = words > 360 ? 360 : words;
         words -= run;
         for (; run; run--, data += 2) {
@@ -137,6 +136,7 @@ static ebpo_status copy_in(ebpo_chunk_coder *coder, const uint8_t *stored, size_
     return EBPO_OK;
 }
 
+/* A row of the table. */
 typedef struct codec {
     ebpo_pipeline_facts facts;
     ebpo_status (*encode)(ebpo_chunk_coder *coder, int level, const uint8_t *raw, size_t raw_bytes,
@@ -222,6 +222,7 @@ static ebpo_chunk_blocks blocks_of_streams(size_t raw_bytes, const size_t *ends,
     return b;
 }
 
+/* Encodes bytes that are already shuffled, and appends the checksum if the pipeline has one. */
 static ebpo_status encode_bytes(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level,
                                 const uint8_t *raw, size_t raw_bytes, const ebpo_chunk_blocks *b,
                                 uint8_t *out, size_t *out_bytes)
@@ -268,9 +269,9 @@ ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, s
         stored_bytes -= 4;
     }
     bool shuffled = row->facts.compresses && element_size > 1;
-    uint8_t *into = shuffled ? coder->scratch : raw;
-    ebpo_status status = row->decode(coder, stored, stored_bytes, into, raw_bytes, why);
+    uint8_t *target = shuffled ? coder->scratch : raw;
+    ebpo_status status = row->decode(coder, stored, stored_bytes, target, raw_bytes, why);
     if (status == EBPO_OK && shuffled)
-        ebpo_unshuffle(into, raw_bytes, element_size, raw);
+        ebpo_unshuffle(target, raw_bytes, element_size, raw);
     return status;
 }

@@ -13,8 +13,7 @@
 #include "hdf5_read/codec.h"
 
 /* Filter pipelines. The first pipelines are those of ebpo_codec, in the order of ebpo_codec.
- * Shuffle comes first where elements have more than one byte (but not in the last two pipelines).
- */
+ * Shuffle comes first in the first two pipelines, if elements have more than one byte. */
 typedef enum ebpo_pipeline {
     EBPO_PIPELINE_ZSTD,     /* shuffle, zstd frame with content size and checksum */
     EBPO_PIPELINE_DEFLATE,  /* shuffle, zlib stream, fletcher32 */
@@ -33,7 +32,7 @@ enum {
 
 /* The properties of a pipeline; each is a row of the table in chunk.c. */
 typedef struct ebpo_pipeline_facts {
-    unsigned filter[2]; /* in the order of application, excluding shuffle */
+    unsigned filter[2]; /* HDF5 filter numbers in the order of application, without shuffle */
     int filter_count;
     int level;       /* default level, which headers state; 0: no levels */
     int level_max;   /* greatest allowed level */
@@ -47,6 +46,7 @@ const ebpo_pipeline_facts *ebpo_pipeline_facts_of(ebpo_pipeline pipeline);
 bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned element_size,
                               ebpo_pipeline *pipeline);
 
+/* Frees the memory of a coder. */
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder);
 
 /* Encodes raw_bytes (a multiple of element_size) into `out` of ebpo_chunk_bound(raw_bytes) bytes.
@@ -55,16 +55,16 @@ EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeli
                                             int level, size_t element_size, const uint8_t *raw,
                                             size_t raw_bytes, uint8_t *out, size_t *out_bytes);
 
-/* Same as ebpo_chunk_encode, for elements of one byte that form `count` consecutive streams and a
- * rest. Stream i ends at ends[i] (ascending; streams may be empty). zstd compresses each stream and
- * the rest separately. */
+/* Same as ebpo_chunk_encode, for elements of one byte that form `count` consecutive streams, and a
+ * last part. Stream i ends at ends[i] (ascending; streams may be empty), and the last part at
+ * raw_bytes. zstd compresses each stream and the last part separately. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_encode_streams(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                                     int level, const uint8_t *raw, size_t raw_bytes,
                                                     const size_t *ends, int count, uint8_t *out,
                                                     size_t *out_bytes);
 
-/* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string with the reason. Safe on
- * any bytes. */
+/* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string with the reason. Safe
+ * for any stored bytes. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                             size_t element_size, const uint8_t *stored,
                                             size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
@@ -79,8 +79,8 @@ void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_
  * sum is never reduced to 0). */
 uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes);
 
-/* The shape of an integer array: [rows] when cols is 0, else [rows][cols]. Its chunks have
- * chunk_rows rows. */
+/* The shape of an integer array: [rows] when cols is 0, else [rows][cols]. Each chunk has
+ * chunk_rows rows; the last chunk is padded. */
 typedef struct ebpo_shape {
     uint64_t rows;
     uint32_t cols;
@@ -96,8 +96,8 @@ typedef struct ebpo_chunk_location {
     uint32_t bytes;
 } ebpo_chunk_location;
 
-/* Returns the rows of a chunk: the largest power of two whose rows take at most 64 KiB, or all rows
- * when there are fewer. rows > 0. */
+/* Returns the number of rows in a chunk: the largest power of two so that a chunk takes at most 64
+ * KiB, or `rows` if that is less. rows > 0. */
 static inline uint32_t ebpo_full_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size)
 {
     uint32_t row = element_size * (cols ? cols : 1), full = 1;

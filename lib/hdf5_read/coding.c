@@ -161,6 +161,7 @@ static void store_integer(uint8_t *file, size_t size, uint64_t value)
     }
 }
 
+/* Converts the bits of a float or double to an integer of the same order, or back. */
 static uint64_t sortable_bits(uint64_t bits, size_t size)
 {
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);

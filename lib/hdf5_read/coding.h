@@ -1,6 +1,7 @@
-/* Number codings of format-spec/README.md, section 9, which turn arrays into small numbers
- * before compression. Encoding and decoding are exact inverses for every bit pattern. Arrays in
- * files are little-endian; `file` pointers need no alignment. Pure functions, any thread. */
+/* Number codings of format-spec/README.md, section 9, which turn arrays into small numbers before
+ * compression. Encoding and decoding are exact inverses for every bit pattern. Arrays in files are
+ * little-endian; pointers named `file` (encoded bytes) need no alignment. Pure functions, any
+ * thread. */
 #ifndef EBPO_HDF5_READ_CODING_H
 #define EBPO_HDF5_READ_CODING_H
 
@@ -13,8 +14,8 @@ static inline uint32_t ebpo_unzigzag32(uint32_t v) { return (v >> 1) ^ (0u - (v 
 static inline uint64_t ebpo_zigzag64(uint64_t v) { return (v << 1) ^ (UINT64_C(0) - (v >> 63)); }
 static inline uint64_t ebpo_unzigzag64(uint64_t v) { return (v >> 1) ^ (UINT64_C(0) - (v & 1)); }
 
-/* Converts the bits of a float to an integer of the same order. Applied twice, it gives the bits
- * again. */
+/* Converts the bits of a float to an integer of the same order. Applied twice, the function returns
+ * the original bits. */
 static inline uint32_t ebpo_float_order32(uint32_t bits)
 {
     return bits ^ ((0u - (bits >> 31)) & UINT32_C(0x7fffffff));
@@ -24,37 +25,39 @@ static inline uint64_t ebpo_float_order64(uint64_t bits)
     return bits ^ ((UINT64_C(0) - (bits >> 63)) & UINT64_C(0x7fffffffffffffff));
 }
 
-/* Encodes points, [rows][3]: for each component the difference to the previous row (to 0 in the
- * first row), modulo 2^32, in zigzag code. */
+/* Encode and decode points, [rows][3]: for each component the difference to the previous row (to 0
+ * in the first row), modulo 2^32 or 2^64, in zigzag code. Floats are first converted to integers of
+ * the same order. */
 void ebpo_points32_encode(const float *xyz, uint64_t rows, uint8_t *file);
 void ebpo_points32_decode(const uint8_t *file, uint64_t rows, float *xyz);
 void ebpo_points64_encode(const double *xyz, uint64_t rows, uint8_t *file);
 void ebpo_points64_decode(const uint8_t *file, uint64_t rows, double *xyz);
 
-/* Encodes numbers: the difference to the previous number (to 0 for the first), modulo 2^32, in
- * zigzag code. */
+/* Encode and decode numbers: the difference to the previous number (to 0 for the first), modulo
+ * 2^32, in zigzag code. */
 void ebpo_numbers_encode(const uint32_t *numbers, uint64_t rows, uint8_t *file);
 void ebpo_numbers_decode(const uint8_t *file, uint64_t rows, uint32_t *numbers);
 
-/* Encodes columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the machine's byte
- * order. `file` holds column after column; each value is coded as the difference to the previous
- * value (to 0 for the first value), modulo the integer's size, in zigzag code. `floats`: the values
- * are bits of floats (4 or 8 bytes), converted to integers of the same order. */
+/* Encode and decode columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the
+ * machine's byte order. `file` holds column after column; each value is coded as the difference to
+ * the previous value (to 0 for the first value), modulo the integer's size, in zigzag code.
+ * `floats`: the values are bits of floats (4 or 8 bytes), converted to integers of the same order.
+ */
 void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
                          uint8_t *file);
 void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t rows,
                          uint32_t cols, void *values);
 
-/* Encodes corners of faces, [rows][3], relative to the number `*seen` of vertices used so far: 0
- * means vertex *seen (*seen is then incremented), and k > 0 means vertex *seen - k. Returns false,
- * with the *seen of that corner, when a corner names a vertex beyond the next new one or, in
- * decoding, a vertex below 0. */
+/* Encode and decode corners of faces, [rows][3], relative to *seen, the number of vertices used so
+ * far. Code 0 means vertex *seen, and *seen is then incremented. Code k > 0 means vertex *seen - k.
+ * Return false if a corner to encode is a vertex above *seen, or a code is above *seen; then *seen
+ * is its value at this corner. */
 bool ebpo_corners_encode(const uint32_t *faces, uint64_t rows, uint64_t *seen, uint8_t *file);
 bool ebpo_corners_decode(const uint8_t *file, uint64_t rows, uint64_t *seen, uint32_t *faces);
 
-/* Converts little-endian integers of `file_size` bytes from and to integers of `size` bytes (1, 2,
- * 4, 8); file_size <= size, and the integers are signed or unsigned. The caller has checked that
- * the values fit. */
+/* Convert between little-endian integers of `file_size` bytes in a file and integers of `size`
+ * bytes (1, 2, 4, 8) in memory; file_size <= size. The integers are signed or unsigned. The caller
+ * has checked that the values fit. */
 void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t file_size,
                           uint8_t *file);
 void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed, uint64_t rows,

@@ -1,8 +1,9 @@
 /* Implements the coding "gates" of format-spec/gates.md. Faces follow each other across edges: each
- * face is written as its gate, which is one of the newest open edges, and its third vertex. Open
- * edges of earlier faces are kept in a short list, the newest last. Encoder and decoder keep the
- * same list, so the coding is invertible for all codes; the decoder accepts any bytes and rejects
- * bytes that represent no faces. Time is proportional to the number of faces. */
+ * face is written as its gate and its third vertex. An edge of an earlier face is open if the face
+ * on its other side has not been written yet. The gate is one of the newest open edges. Open edges
+ * are kept in a short list, the newest last. Encoder and decoder keep the same list, so the coding
+ * is invertible for all codes; the decoder accepts any bytes and rejects bytes that represent no
+ * faces. Time is proportional to the number of faces. */
 #include "hdf5_read/face_gates.h"
 
 #include <string.h>
@@ -11,19 +12,26 @@
 #include "hdf5_read/chunk.h"
 
 enum {
-    OPEN_MAX = 64,
-    NEAR = 32,
-    SPACE = 4 * OPEN_MAX,
-    FACE_MAX = 3 /* edges that a face opens */
+    OPEN_MAX = 64,        /* maximum length of the list of open edges */
+    NEAR = 32,            /* number of the newest edges that pass_edge compares */
+    SPACE = 4 * OPEN_MAX, /* size of the list's array */
+    FACE_MAX = 3          /* maximum number of edges that a face opens */
 };
-enum { IS_NEW, IS_LEFT, IS_RIGHT, BY_NUMBER, AT_OPEN }; /* kinds of corners beyond an edge */
+/* Kinds of the third vertex of a face with the gate (a, b). */
+enum {
+    IS_NEW,    /* the next vertex that no face has used */
+    IS_LEFT,   /* end of the newest open edge that starts at b */
+    IS_RIGHT,  /* start of the newest open edge that ends at a */
+    BY_NUMBER, /* a number follows in the stream `low` */
+    AT_OPEN    /* from here on: start of an open edge; AT_OPEN means the newest edge */
+};
 /* A vertex number takes one byte if its first byte in `low` is below LOW_END, and two bytes if that
  * byte is below TWO_BYTES_END. */
 enum { LOW_END = 224, TWO_BYTES_END = 240 };
-enum { AS_CODES = 1 }; /* first byte of a chunk without streams */
+enum { AS_CODES = 1 }; /* first byte of a chunk of shuffled codes, without gates */
 
 /* Open edges, newest last: (a, b) means that a face on the other side of the edge would run from a
- * to b. Vertices are counted from the first new one of the chunk, modulo 2^32, as in codes. */
+ * to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32, as in codes. */
 typedef struct open_edges {
     uint64_t edge[SPACE];
     uint32_t begin, end;
@@ -59,7 +67,7 @@ static void drop_edge(open_edges *o, uint32_t at)
         o->edge[at] = o->edge[at + 1];
 }
 
-/* Returns the newest edge that starts or ends at v; o->end: none. */
+/* Return the position of the newest edge that starts, or ends, at v; o->end if there is none. */
 static uint32_t find_starting(const open_edges *o, uint32_t v)
 {
     for (uint32_t i = o->end; i > o->begin; i--)
@@ -85,8 +93,8 @@ static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
     return any;
 }
 
-/* Processes the side of a face from a to b: closes the open edge (a, b) if it is among the newest
- * ones, otherwise opens the reverse edge. */
+/* Processes the side of a face from a to b: closes the open edge (a, b) if it is among the NEAR
+ * newest edges; otherwise opens the reverse edge. */
 static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
 {
     uint64_t wanted = edge_of(a, b);
@@ -101,13 +109,15 @@ static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
         push_edge(o, edge_of(b, a));
 }
 
+/* Opens all edges of a face. */
 static void open_all(open_edges *o, const uint32_t *face)
 {
     for (int k = 0; k < 3; k++)
         push_edge(o, edge_of(face[(k + 1) % 3], face[k]));
 }
 
-/* Updates the open edges after face (a, b, c) across (a, b), an edge that is not open any more. */
+/* Updates the open edges after face (a, b, c). Its gate (a, b) is already closed. `at`: position of
+ * the edge that gave c, for IS_LEFT and IS_RIGHT. */
 static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
                        uint32_t c)
 {
@@ -127,10 +137,11 @@ static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, ui
 /* ---- writing ---- */
 
 typedef struct writing {
-    uint8_t *gate, *third, *low, *more; /* next bytes */
+    uint8_t *gate, *third, *low, *more; /* next byte of each stream */
     open_edges open;
 } writing;
 
+/* Writes a vertex number to the streams `low` and `more`. */
 static void put_number(writing *w, uint32_t number)
 {
     if (number < LOW_END) {
@@ -145,7 +156,8 @@ static void put_number(writing *w, uint32_t number)
     }
 }
 
-/* Returns the open edge that is a side of the face, and its first corner; o->end: none. */
+/* Returns the position of the newest open edge that is a side of the face, or o->end if there is
+ * none. *first: the corner at which this side starts. */
 static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
 {
     uint64_t side[3];
@@ -160,8 +172,8 @@ static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
     return o->end;
 }
 
-/* Returns the kind of corner c beyond the edge; *at is the position of the open edge that gives the
- * corner. */
+/* Returns the kind of c, the third vertex of a face with the gate (a, b). *at: position of the open
+ * edge that gives c, if one does. */
 static uint32_t kind_of(const open_edges *o, uint32_t a, uint32_t b, uint32_t c, uint32_t *at)
 {
     if (c == o->seen)
@@ -209,8 +221,8 @@ static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
         ends[i] = 1 + (i + 1) * plane;
 }
 
-/* Moves `third` and the following streams together; they were built at positions where they cannot
- * overlap. */
+/* Moves the streams together, and sets their ends. The streams were built at positions where they
+ * cannot overlap. */
 static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
                          size_t ends[EBPO_GATES_ENDS])
 {
@@ -256,7 +268,8 @@ typedef struct reading {
     open_edges open;
 } reading;
 
-/* Reads a vertex by its number; `low` is long enough for all reads. */
+/* Reads a vertex by its number. Needs no check of the stream `low`, which find_streams has made
+ * long enough for all reads. */
 static bool get_vertex(reading *r, uint32_t seen, uint32_t *vertex)
 {
     uint32_t number = *r->low++;
@@ -274,6 +287,8 @@ static bool get_vertex(reading *r, uint32_t seen, uint32_t *vertex)
     return true;
 }
 
+/* Reads the third vertex of a face with the gate (a, b). Returns false if the kind is not possible.
+ */
 static bool get_third(reading *r, uint32_t kind, uint32_t a, uint32_t b, uint32_t *at, uint32_t *c)
 {
     const open_edges *o = &r->open;
@@ -294,6 +309,7 @@ static bool get_third(reading *r, uint32_t kind, uint32_t a, uint32_t b, uint32_
     return true;
 }
 
+/* Reads a face with a gate. */
 static bool read_across(reading *r, uint32_t gate, uint32_t *face)
 {
     static const uint8_t next[5] = { 0, 1, 2, 0, 1 };
@@ -312,7 +328,8 @@ static bool read_across(reading *r, uint32_t gate, uint32_t *face)
     return true;
 }
 
-static bool read_alone(reading *r, uint32_t *face)
+/* Reads a face without a gate. */
+static bool read_without_gate(reading *r, uint32_t *face)
 {
     uint32_t seen = r->open.seen;
     for (int k = 0; k < 3; k++) {
@@ -324,6 +341,7 @@ static bool read_alone(reading *r, uint32_t *face)
     return true;
 }
 
+/* Writes the codes of a face. Returns the number of vertices seen after the face. */
 static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
 {
     for (int k = 0; k < 3; k++) {
@@ -334,19 +352,21 @@ static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
     return seen;
 }
 
-/* Finds the beginnings of streams, each of which follows from the content of the streams before. */
+/* Finds the beginnings of the streams. The content of the previous streams determines the length of
+ * each stream. */
 static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
 {
-    size_t alone = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;
+    size_t without_gate = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;
     for (uint32_t i = 0; i < rows; i++)
-        alone += in[i] == 0;
-    size_t thirds = rows - alone;
+        without_gate += in[i] == 0;
+    size_t thirds = rows - without_gate;
     r->gate = in;
     r->third = in + rows;
     r->low = r->third + thirds;
     for (size_t i = 0; i < thirds; i++)
         numbers += r->third[i] / 3 == BY_NUMBER;
-    r->more = r->low + 3 * alone + numbers; /* at most 5 bytes a face so far */
+    /* the streams before `more` take at most 5 bytes for each face */
+    r->more = r->low + 3 * without_gate + numbers;
     r->end = in + bytes;
     start_edges(&r->open);
 }
@@ -375,7 +395,7 @@ bool ebpo_gates_decode(const uint8_t *in, uint32_t rows, uint8_t *codes)
     for (uint32_t i = 0; i < rows; i++, codes += 12) {
         uint32_t face[3], gate = *r.gate++;
         reserve_space(&r.open);
-        if (gate ? !read_across(&r, gate, face) : !read_alone(&r, face))
+        if (gate ? !read_across(&r, gate, face) : !read_without_gate(&r, face))
             return false;
         r.open.seen = put_codes(face, r.open.seen, codes);
     }

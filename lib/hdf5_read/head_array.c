@@ -36,12 +36,12 @@ typedef struct ebpo_head_layout {
 typedef struct ebpo_head_chunks {
     const ebpo_head_layout *layout;
     bool filtered;
-    /* number of chunks; bytes of a chunk before its filters, and the most bytes after them */
+    /* number of chunks; bytes of a chunk before its filters; greatest size of a chunk after them */
     uint64_t count, whole, bound;
-    uint64_t end;               /* of the file */
-    ebpo_chunk_location *place; /* out: `count` offsets and sizes */
-    uint64_t stored;            /* out: bytes of all chunks */
-    uint64_t at;                /* out: the invalid chunk; UINT64_MAX: none in particular */
+    uint64_t end;                   /* end of the file, in bytes */
+    ebpo_chunk_location *locations; /* out: `count` offsets and sizes */
+    uint64_t stored;                /* out: bytes of all chunks */
+    uint64_t at; /* out: index of the invalid chunk; UINT64_MAX: no single chunk is invalid */
 } ebpo_head_chunks;
 
 static const char missing[] = "the chunk is missing", cut[] = "its description is cut short",
@@ -50,6 +50,7 @@ static const char missing[] = "the chunk is missing", cut[] = "its description i
                   damaged[] = "the array's chunk index is damaged: the checksum differs",
                   beyond[] = "the array's chunk index is beyond the end of the file";
 
+/* Reads a layout of version 4 with chunks, from the flags on. */
 static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *foreign)
 {
     enum { SINGLE_FILTERED = 2 };
@@ -78,8 +79,8 @@ static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *
     return c->cut ? cut : NULL;
 }
 
-/* Returns an error text, or NULL. Sets *foreign if the layout is valid, but only libhdf5 reads it.
- */
+/* Returns an error text, or NULL. Sets *foreign to true if the layout is valid, but only libhdf5
+ * can read it. */
 static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *foreign)
 {
     enum { CHUNKED = 2, VIRTUAL = 3 };
@@ -98,7 +99,8 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
     return "the array's chunks are listed in a tree without checksums";
 }
 
-/* Stores the offset of the next chunk. */
+/* Checks and stores the offset of chunk i. `mask`: bits of the filters that the chunk lacks.
+ * Returns an error text, or NULL; the functions below return the same. */
 static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
                                 uint32_t mask)
 {
@@ -111,7 +113,7 @@ static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t addres
         return "the chunk is larger than its filters allow";
     if (address > t->end || bytes > t->end - address)
         return "the chunk is beyond the end of the file";
-    t->place[i] = (ebpo_chunk_location){ address, (uint32_t)bytes };
+    t->locations[i] = (ebpo_chunk_location){ address, (uint32_t)bytes };
     t->stored += bytes;
     t->at = UINT64_MAX;
     return t->stored > t->end ? "the array's chunks do not fit the file" : NULL;
@@ -147,8 +149,9 @@ static const char *read_implicit(ebpo_head_chunks *t)
 
 /* A fixed array: a header, then one block of pages. */
 typedef struct fixed_array {
-    uint64_t data; /* address of the block */
-    unsigned entry, size_bytes;
+    uint64_t data;       /* address of the block */
+    unsigned entry;      /* bytes of the entry of a chunk */
+    unsigned size_bytes; /* bytes of the chunk's size in an entry; 0: entries have no size */
 } fixed_array;
 
 static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks *t, fixed_array *f)
@@ -201,7 +204,7 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
     return wrong;
 }
 
-/* Checks that the bits of all pages say that the page is written. */
+/* Checks that the bit of each page is set, which means that the page was written. */
 static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                uint64_t prefix, uint64_t pages)
 {
@@ -245,9 +248,9 @@ static const char *read_fixed(ebpo_head_state *s, ebpo_head_chunks *t)
     wrong = check_pages(s, t, &f, prefix, pages);
     uint64_t at = f.data + prefix + 4;
     for (uint64_t first = 0; first < t->count && !wrong; first += page) {
-        uint64_t here = t->count - first < page ? t->count - first : page;
-        wrong = read_entries(s, t, &f, at, 0, first, here);
-        at += here * f.entry + 4;
+        uint64_t in_page = t->count - first < page ? t->count - first : page;
+        wrong = read_entries(s, t, &f, at, 0, first, in_page);
+        at += in_page * f.entry + 4;
     }
     return wrong;
 }
@@ -295,8 +298,8 @@ static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows
     return rows == full || (rule == EBPO_HEAD_ROWS_POWER && power && rows < full);
 }
 
-/* Returns the only message of a type, or NULL; *wrong is set to the reason, unless the message is
- * only absent. */
+/* Returns the only message of a type, or NULL. Sets *wrong to the reason if there is an error; a
+ * missing message is no error. */
 static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type,
                                          ebpo_head_refusal *wrong)
 {
@@ -314,7 +317,11 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
     return wrong->what ? NULL : found;
 }
 
-static ebpo_head_refusal fail_sound(const char *what) { return (ebpo_head_refusal){ what, false }; }
+/* Returns the refusal of a damaged or disallowed array. */
+static ebpo_head_refusal refuse_array(const char *what)
+{
+    return (ebpo_head_refusal){ what, false };
+}
 
 /* Returns the refusal of an array that is not damaged, but was rewritten by another program. */
 static ebpo_head_refusal fail_foreign(const char *what)
@@ -337,10 +344,10 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
                                   : "the array is not of little-endian integers");
     if (type.class != EBPO_CLASS_INTEGER ||
         (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8))
-        return fail_sound("the array is not of little-endian integers");
+        return refuse_array("the array is not of little-endian integers");
     if (space.rank < 1 || space.rank > 2 || !space.fixed || space.size[0] == 0 ||
         (space.rank == 2 && (space.size[1] == 0 || space.size[1] > COLS_MAX)))
-        return fail_sound("the array does not have one or two fixed dimensions");
+        return refuse_array("the array does not have one or two fixed dimensions");
     shape->element_size = (uint8_t)type.size;
     shape->is_signed = type.is_signed;
     shape->rows = space.size[0];
@@ -348,6 +355,7 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
     return wrong;
 }
 
+/* Reads the layout and the filters; sets the rows of chunks and the pipeline of `shape`. */
 static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows rule,
                                       ebpo_shape *shape, ebpo_head_layout *layout)
 {
@@ -357,7 +365,7 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
                             *layout_message = find_one(h, EBPO_M_LAYOUT, &wrong),
                             *filter_message = find_one(h, EBPO_M_PIPELINE, &wrong);
     if (external)
-        return fail_sound(
+        return refuse_array(
             "the array's values are in another file (external storage), which is never read");
     if (!layout_message)
         return wrong;
@@ -384,7 +392,7 @@ static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_sha
                                uint64_t *stored, ebpo_error *error)
 {
     enum { CHUNK_MIN = 4 };
-    char place[160];
+    char chunk_path[160];
     ebpo_head_chunks t = { .layout = layout,
                            .filtered = shape->pipeline != EBPO_PIPELINE_BARE,
                            .count = ebpo_shape_chunks(shape),
@@ -394,16 +402,16 @@ static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_sha
     if (t.count > 1 && t.count > head->end / CHUNK_MIN)
         return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1,
                             "the array has more chunks than the file can hold");
-    t.place = *places = ebpo_alloc(t.count, sizeof **places);
-    if (!t.place)
+    t.locations = *places = ebpo_alloc(t.count, sizeof **places);
+    if (!t.locations)
         return ebpo_fail_memory(error, t.count * sizeof **places);
     const char *wrong = read_chunk_table(head->state, &t);
     *stored = t.stored;
     if (!wrong)
         return EBPO_OK;
-    snprintf(place, sizeof place, "%s: chunk %" PRIu64, path, t.at);
+    snprintf(chunk_path, sizeof chunk_path, "%s: chunk %" PRIu64, path, t.at);
     head->state->refusal = (ebpo_head_refusal){ NULL, false };
-    return ebpo_head_fail(head, t.at == UINT64_MAX ? path : place, wrong, error);
+    return ebpo_head_fail(head, t.at == UINT64_MAX ? path : chunk_path, wrong, error);
 }
 
 static ebpo_status read_array(ebpo_head *head, const char *path, uint64_t most, ebpo_head_rows rows,

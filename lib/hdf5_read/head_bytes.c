@@ -1,8 +1,8 @@
-/* Reads the bytes of an open head in few reads, and keeps the first failure. The first bytes
- * hold all headers and are fetched at once. The chunk index of arrays with more than one chunk
- * is also read at once. All other bytes are read through a window. Bytes beyond the end of the
- * file are not read. After a failure of the input, nothing is read. An error gives the reason of
- * the refusal, or the input's error if the input failed. */
+/* Reads the bytes of an open head (head.h) in few reads, and keeps the first failure. The first
+ * bytes hold all headers and are fetched at once. The chunk index of arrays with more than one
+ * chunk is also read at once. All other bytes are read through a window. Bytes beyond the end of
+ * the file are not read. After a failure of the input, nothing is read. An error is the input's
+ * error if the input failed, and otherwise the reason why the reader refuses the file. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,7 +12,8 @@
 
 enum {
     FIRST_BYTES = 131072, /* holds all headers */
-    /* size of the window for all else: chunk indexes, and headers that were added later */
+    /* size of the window for all other bytes: headers that were added later, and chunk indexes
+       whose range is not known */
     WINDOW_BYTES = 131072
 };
 
@@ -37,6 +38,8 @@ void ebpo_head_bytes_close(ebpo_head_bytes *b)
     *b = (ebpo_head_bytes){ .status = EBPO_OK };
 }
 
+/* Returns the bytes [at, at + size) in a buffer of the range `held`, or NULL if the range does not
+ * contain them. */
 static const uint8_t *bytes_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
                                    uint64_t size)
 {
@@ -46,7 +49,7 @@ static const uint8_t *bytes_within(const uint8_t *buffer, ebpo_range held, uint6
     return buffer + (at - held.offset);
 }
 
-/* Reads a range into *buffer, which holds `capacity` bytes once allocated. */
+/* Reads a range into *buffer, and allocates *buffer with `capacity` bytes if it is NULL. */
 static bool read_into(ebpo_head_bytes *b, uint8_t **buffer, uint64_t capacity, ebpo_range range)
 {
     if (!*buffer)
@@ -64,8 +67,8 @@ static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 }
 
 /* Returns the range of the window to read for an offset. Windows begin at multiples of half their
- * size, so that reading back and forth around an offset does not move them. They end before the
- * chunk index, which is read at once. */
+ * size, so that reading back and forth around an offset does not move the window. A window before
+ * the chunk index ends there, because the index is read separately. */
 static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = b->input->source.size;
@@ -112,6 +115,7 @@ const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *b, uint64_t at, uint64_t size
 
 /* --- errors --- */
 
+/* Sets the error for a refusal. `what`: the beginning of the message, or "". */
 static ebpo_status fail_refused(const ebpo_head *head, const char *path, const char *what,
                                 const ebpo_head_refusal *why, ebpo_error *error)
 {

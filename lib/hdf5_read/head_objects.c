@@ -1,7 +1,8 @@
-/* Reads headers of objects: blocks with checksums, their messages, and the types, dimensions,
- * filters and attributes in the messages. The last read headers are kept. Counts and sizes are
- * bounded before memory is allocated for them, and each checksum is compared. Source: HDF5 File
- * Format Specification 3.0, section IV.A. */
+/* Reads headers of HDF5 objects (groups and arrays). A header consists of blocks with checksums.
+ * The blocks contain messages, which describe types, dimensions, filters and attributes. The
+ * headers that were read last stay in memory. Counts and sizes are bounded before memory is
+ * allocated for them, and each checksum is compared. Source: HDF5 File Format Specification 3.0,
+ * section IV.A. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -26,13 +27,14 @@ static const char *const damaged_block = "its header is beyond the end of the fi
 
 bool ebpo_head_sound(const uint8_t *block, uint64_t size)
 {
-    /* a fuzzing build does not compute the checksum, because it does not compare it, and a fuzzer
-     * would spend most of its time on it */
+    /* a fuzzing build does not compare checksums, and does not compute them either, because a
+     * fuzzer would spend most of its time on them */
     return size >= 4 &&
            (!EBPO_CHECKSUMS_COMPARED || !ebpo_sum_differs(ebpo_load32(block + size - 4),
                                                           ebpo_lookup3(block, (size_t)size - 4)));
 }
 
+/* Records a lack of memory as the input's failure. Returns false. */
 static bool record_memory(ebpo_head_state *s, uint64_t bytes)
 {
     s->bytes.status = ebpo_fail_memory(&s->bytes.error, bytes);
@@ -163,9 +165,10 @@ static bool read_blocks(ebpo_head_state *s, ebpo_head_header *h)
     return true;
 }
 
+/* Finds the kind of object that the messages describe. */
 static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
 {
-    unsigned array = 0;
+    unsigned array_messages = 0;
     h->kind = EBPO_HEAD_OTHER;
     for (uint64_t i = 0; i < h->count; i++) {
         const ebpo_head_message *m = &h->message[i];
@@ -181,13 +184,13 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
                 h->kind = EBPO_HEAD_GROUP;
             break;
         case EBPO_M_GROUP_INFO: h->kind = EBPO_HEAD_GROUP; break;
-        case EBPO_M_DATASPACE: array |= 1; break;
-        case EBPO_M_DATATYPE: array |= 2; break;
-        case EBPO_M_LAYOUT: array |= 4; break;
+        case EBPO_M_DATASPACE: array_messages |= 1; break;
+        case EBPO_M_DATATYPE: array_messages |= 2; break;
+        case EBPO_M_LAYOUT: array_messages |= 4; break;
         default: break; /* times, comments, counts: such messages do not affect reading */
         }
     }
-    if (h->kind == EBPO_HEAD_OTHER && array == 7)
+    if (h->kind == EBPO_HEAD_OTHER && array_messages == 7)
         h->kind = EBPO_HEAD_ARRAY;
     return true;
 }
@@ -228,8 +231,8 @@ void ebpo_head_headers_free(ebpo_head_state *s)
 
 static bool is_double(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
-    /* bit offset, bits, position and size of the exponent, position and size of the mantissa, bias
-     */
+    /* description of an IEEE double: bit offset, bits, position and size of the exponent, position
+     * and size of the mantissa, bias */
     static const uint8_t ieee[12] = { 0, 0, 64, 0, 52, 11, 0, 52, 255, 3, 0, 0 };
     const uint8_t *at = ebpo_cursor_take(c, sizeof ieee);
     return at && size == 8 && bits == 0x3f20 && memcmp(at, ieee, sizeof ieee) == 0;
@@ -261,7 +264,7 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c)
     return type;
 }
 
-/* Reads dimensions. Version 1 is read too, because programs with HDF5's default settings write it
+/* Reads dimensions. Also reads version 1, because programs with HDF5's default settings write it
  * when they add an attribute to a file. */
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c)
 {
@@ -310,8 +313,7 @@ ebpo_head_filters ebpo_head_read_filters(ebpo_head_cursor c)
     return filters;
 }
 
-/* Attributes of objects. */
-
+/* An attribute of an object. */
 typedef struct attribute {
     ebpo_head_type type;
     ebpo_head_space space;

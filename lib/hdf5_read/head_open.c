@@ -1,8 +1,8 @@
-/* Opens the head of an untrusted file, and finds objects by their paths. The head is the superblock
- * and the headers of all objects, at the start of the file. Objects are found by the names of
- * links, from the root group on. HDF5 features that this format does not allow are rejected with a
- * specific message. Source: HDF5 File Format Specification 3.0, sections II.A and IV.A.2.g;
- * format-spec/hdf5-messages.md. */
+/* Opens the head of an untrusted file, and finds objects by their paths. The head consists of the
+ * superblock and the headers of all objects, at the start of the file. Objects are found by the
+ * names of links, from the root group on. HDF5 features that this format does not allow are
+ * rejected with a specific message. Source: HDF5 File Format Specification 3.0, sections II.A and
+ * IV.A.2.g; format-spec/hdf5-messages.md. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,8 +20,8 @@ static const char signature[8] = "\211HDF\r\n\032\n";
 static bool has_user_block(ebpo_head_state *s)
 {
     for (uint64_t at = 512; at <= s->bytes.first_bytes; at *= 2) {
-        const uint8_t *there = ebpo_head_bytes_at(&s->bytes, at, sizeof signature);
-        if (there && memcmp(there, signature, sizeof signature) == 0)
+        const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, sizeof signature);
+        if (block && memcmp(block, signature, sizeof signature) == 0)
             return true;
     }
     return false;
@@ -85,7 +85,7 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
         return status;
     static const char unknown[] =
         "not a whole HDF5 file; was it cut off in copying, or is it something else?";
-    /* a message about a file that is not HDF5, such as a compressed one */
+    /* a message about a file that is not HDF5, such as a compressed file */
     const char *other_kind = ebpo_wrong_kind_of_file(s->bytes.first, s->bytes.first_bytes);
     if (other_kind && !s->refusal.what && !has_signature(s))
         return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", other_kind);
@@ -112,8 +112,8 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
 void ebpo_head_keep_ranges(ebpo_head *head)
 {
     head->state->keeps = true;
-    for (int i = 0; i < EBPO_HEAD_SLOTS;
-         i++) /* headers are read again, so that their ranges are kept too */
+    /* forget the headers in memory, so that they are read again and their ranges are recorded */
+    for (int i = 0; i < EBPO_HEAD_SLOTS; i++)
         head->state->slot[i].used = 0;
 }
 

@@ -1,7 +1,7 @@
-/* Private to lib/hdf5_read: the parts of an open head. These are its bytes, which are read in few
- * reads, a cursor in the bytes, headers of objects, and types, dimensions and filters. The
- * library's writer puts headers at the start of the file. It puts the chunk index of arrays with
- * more than one chunk after the first levels, as one contiguous range. */
+/* Declares the parts of an open head, private to lib/hdf5_read: its bytes, a cursor in bytes,
+ * headers of objects, and types, dimensions and filters. The library's writer puts headers at the
+ * start of the file, and the chunk index of all arrays with more than one chunk into one range
+ * after the first levels. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -15,12 +15,13 @@
 #include "hdf5_read/head.h"
 #include "io/byte_source.h"
 
+/* The bytes of an open head, which are read in few reads. */
 typedef struct ebpo_head_bytes {
     ebpo_input *input;
-    /* the file's first bytes, and a piece at another offset; NULL until needed */
+    /* the file's first bytes, and a range at another offset (the window); NULL until needed */
     uint8_t *first, *window;
     uint8_t *table; /* all of `index`, NULL until needed */
-    uint8_t *large; /* a range that fits none of these */
+    uint8_t *large; /* a range that fits none of the other buffers */
     uint64_t first_bytes, window_at, window_bytes, large_capacity;
     ebpo_range index; /* range of the chunk index (ebpo_head_hint_index), or empty */
     /* status of the input's first failure, after which nothing more is read */
@@ -28,7 +29,7 @@ typedef struct ebpo_head_bytes {
     ebpo_error error;
 } ebpo_head_bytes;
 
-/* Fetches the first bytes. Close it also after an error. */
+/* Fetches the first bytes. Call ebpo_head_bytes_close also after an error. */
 EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_input *input,
                                                ebpo_error *error);
 void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
@@ -141,7 +142,8 @@ typedef struct ebpo_head_state {
     ebpo_head_refusal refusal;              /* the last refusal */
     ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
     uint64_t kept_count, kept_capacity;
-    bool keeps, kept_no_memory; /* kept_no_memory: no memory to keep a range */
+    bool keeps;          /* ranges are recorded */
+    bool kept_no_memory; /* there was no memory to record a range */
 } ebpo_head_state;
 
 /* Records a range of the file that is in use, if ebpo_head_keep_ranges was called. */
@@ -168,10 +170,11 @@ static inline bool ebpo_refuse_foreign(ebpo_head_state *s, const char *what)
     return false;
 }
 
-/* Returns true if `size` bytes match their checksum, which is the last four of them. */
+/* Returns true if the checksum of a block is right. The checksum is the last four of its `size`
+ * bytes. */
 bool ebpo_head_sound(const uint8_t *block, uint64_t size);
 
-/* Returns the header at an address, valid until the next call. NULL: see the refusal. */
+/* Returns the header at an address, valid until the next call. NULL: s->refusal has the reason. */
 const ebpo_head_header *ebpo_head_header_at(ebpo_head_state *s, uint64_t address);
 void ebpo_head_headers_free(ebpo_head_state *s);
 
@@ -186,8 +189,8 @@ static inline ebpo_head_cursor ebpo_head_message_cursor(const ebpo_head_header *
  * and OTHER are reliable. */
 ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_object *object);
 
-/* Sets the error for a refusal: "`path`: `what`: the refusal". A failed input's own error takes
- * precedence. */
+/* Sets the error for a refusal: "`path`: `what`: the refusal". If the input has failed, sets the
+ * input's error instead. */
 EBPO_MUST_USE ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
                                          ebpo_error *error);
 
@@ -211,9 +214,10 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c);
 
 /* Dimensions. `values`: the product; 0 if there are no values or the product overflows 64 bits. */
 typedef struct ebpo_head_space {
-    unsigned rank; /* UINT32_MAX: not readable */
-    bool fixed;    /* the dimensions cannot grow */
-    uint64_t size[2], values;
+    unsigned rank;    /* number of dimensions; UINT32_MAX: not readable */
+    bool fixed;       /* the dimensions cannot grow */
+    uint64_t size[2]; /* the first two dimensions */
+    uint64_t values;
 } ebpo_head_space;
 
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c);

@@ -1,7 +1,8 @@
 /* Encodes and decodes chunks as zstd frames (RFC 8878), each with its content's size and a
- * checksum. Parts of a frame that neither zstd's decoder checks nor a checksum covers are checked
- * here: a changed bit must not go unnoticed. The blocks of a frame are the byte planes of shuffled
- * elements or the streams of a coding, because the statistics of these differ. */
+ * checksum. This file also checks the parts of a frame that neither zstd's decoder nor a checksum
+ * checks, so that every changed bit is detected. Each block of a frame is a byte plane of shuffled
+ * elements (the k-th bytes of all elements), or a stream of a coding, because byte planes and
+ * streams have different statistics. */
 #include <string.h>
 #include <zstd.h>
 
@@ -38,6 +39,7 @@ static size_t literals_bytes(const uint8_t *block, size_t size)
     return header + (size_t)(bits >> (4 + width) & ((1u << width) - 1));
 }
 
+/* Returns true if an unused bit of a compressed block is set. */
 static bool block_has_unused(const uint8_t *block, size_t size)
 {
     size_t at = size ? literals_bytes(block, size) : 0;
@@ -47,6 +49,7 @@ static bool block_has_unused(const uint8_t *block, size_t size)
     return at < size && block[at] & 3;
 }
 
+/* Returns the text of an error in a block, or NULL. `stated`: the size in the block's header. */
 static const char *block_fault(unsigned kind, const uint8_t *block, size_t stated)
 {
     if (kind == RLE && stated == 1)
@@ -89,34 +92,35 @@ bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
 
 /* --- encoding --- */
 
-/* Begins a frame. A shuffled chunk consists of planes of bytes that have little in common: the low
- * ones are noise, the high ones nearly constant. Each plane is a block and has a separate table of
- * codes. Short matches are not used: in such planes they cost more than single bytes. Chunks that
- * are too small to gain by this are encoded as HDF5's filter encodes them. */
+/* Begins a frame. A shuffled chunk consists of byte planes that have little in common: planes of
+ * low bytes are noise, planes of high bytes are nearly constant. Each byte plane is a block with a
+ * separate table of codes. Short matches are not used, because in such planes they take more bits
+ * than single bytes. Chunks that are too small to gain by these settings are encoded as HDF5's
+ * filter encodes them. */
 static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
 {
     enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
-    bool effort = !level && raw_bytes >= LARGE;
+    bool is_large = !level && raw_bytes >= LARGE;
     if (!level)
-        level = effort ? LEVEL_OF_LARGE : EBPO_ZSTD_LEVEL;
+        level = is_large ? LEVEL_OF_LARGE : EBPO_ZSTD_LEVEL;
     return !ZSTD_isError(ZSTD_CCtx_reset(out, ZSTD_reset_session_and_parameters)) &&
            !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_compressionLevel, level)) &&
            !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_checksumFlag, 1)) &&
-           (!effort || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
+           (!is_large || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
 }
 
 static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes,
                             const ebpo_chunk_blocks *b, uint8_t *out)
 {
     ZSTD_outBuffer to = { out, ebpo_chunk_bound(raw_bytes), 0 };
-    size_t left = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes), at = 0;
-    for (int i = 0; i <= b->count && left == 0; i++) {
+    size_t pending = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes), at = 0;
+    for (int i = 0; i <= b->count && pending == 0; i++) {
         size_t end = i < b->count ? b->end[i] : raw_bytes;
         ZSTD_inBuffer from = { raw + at, end - at, 0 };
-        left = ZSTD_compressStream2(zstd, &to, &from, i == b->count ? ZSTD_e_end : ZSTD_e_flush);
+        pending = ZSTD_compressStream2(zstd, &to, &from, i == b->count ? ZSTD_e_end : ZSTD_e_flush);
         at = end;
     }
-    return left ? (size_t)-1 : to.pos; /* an error, for ZSTD_isError */
+    return pending ? (size_t)-1 : to.pos; /* -1: an error, for ZSTD_isError */
 }
 
 ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
@@ -133,7 +137,7 @@ ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *
                            : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw,
                                             raw_bytes);
     *out_bytes = size;
-    /* the size of `out` excludes other causes */
+    /* `out` is large enough, so memory is the only possible cause */
     return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK;
 }
 
