@@ -1,8 +1,8 @@
-/* Rewrites files in another program's layout in this format's layout, by libhdf5 in a separate
- * process (separate_process.c). Chunks whose filters and rows fit are copied as stored; from other
- * layouts, filters and byte orders, libhdf5 decodes the values. Arrays that do not fit the format
- * are omitted, and the first one is reported. Depth and number of objects are bounded, because hard
- * links may form cycles. */
+/* Rewrites a file that another program has rewritten in an HDF5 layout of its choice: makes a copy
+ * in this format's layout, through libhdf5 in a separate process (separate_process.c). Chunks whose
+ * filters and rows fit the format are copied as stored. For other layouts, filters and byte orders,
+ * libhdf5 decodes the values. Arrays that do not fit the format are omitted, and the first one is
+ * reported. Depth and number of objects are bounded, because hard links may form cycles. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +19,7 @@
 
 enum {
     HEAD_BYTES = 262144,
-    DEPTH_MAX = 2,      /* /levels/00 */
+    DEPTH_MAX = 2,      /* greatest depth of a group: /levels/00 */
     OBJECTS_MAX = 8192, /* because hard links may form cycles */
     VALUE_MAX = 65536,  /* bytes of an attribute */
     LEVEL = 1,          /* compression level: the copy is short-lived */
@@ -31,7 +31,7 @@ typedef struct copying {
     hid_t from;
     ebpo_h5_out to;
     const char *from_path, *to_path, *shown;
-    bool from_goes;
+    bool from_goes; /* true: the name from_path is removed after opening */
     ebpo_h5_chunk_rows_fn chunk_rows;
     bool subtrees, kept;    /* arguments of chunk_rows (ebpo_h5_chunk_rows_fn) */
     ebpo_pipeline pipeline; /* filters of all arrays of the copy */
@@ -56,7 +56,7 @@ typedef struct attribute_copy {
     ebpo_h5_id to;
 } attribute_copy;
 
-/* Copies attributes of fixed size; the format has no others. */
+/* Copies an attribute of fixed size; the format has no other attributes. */
 static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *info, void *user)
 {
     (void)info;
@@ -75,11 +75,11 @@ static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *i
         return copy_fails(a->c, ebpo_text_ok(name) ? name : "",
                           "the file has too many objects and attributes");
     if (plain && H5Aread(attribute, type, value) >= 0) {
-        hid_t own = H5Tcopy(type); /* a copy, in case the type belongs to another object */
-        ebpo_status status = ebpo_h5_put_attribute(&a->c->to, a->to, name, own, H5Scopy(space), -1,
-                                                   value, a->c->error);
+        hid_t type_copy = H5Tcopy(type); /* a copy, in case the type belongs to another object */
+        ebpo_status status = ebpo_h5_put_attribute(&a->c->to, a->to, name, type_copy,
+                                                   H5Scopy(space), -1, value, a->c->error);
         a->c->status = a->c->status == EBPO_OK ? status : a->c->status;
-        H5Tclose(own);
+        H5Tclose(type_copy);
     }
     if (space >= 0)
         H5Sclose(space);
@@ -110,6 +110,7 @@ typedef struct array_copy {
     hid_t type;             /* type for reading values */
 } array_copy;
 
+/* Records the reason why the first omitted array is omitted. */
 static void omit_array(copying *c, const char *path, const char *what)
 {
     if (!*c->omitted.message)
@@ -143,7 +144,8 @@ static bool has_filter(hid_t plist, int id)
     return false;
 }
 
-/* Returns true if libhdf5 has all filters of the array. Otherwise reports the missing one. */
+/* Returns true if libhdf5 has all filters of the array. Otherwise omits the array, with the name of
+ * the missing filter. */
 static bool can_decode(copying *c, const array_copy *a)
 {
     for (int i = 0; i < H5Pget_nfilters(a->plist); i++) {
@@ -166,11 +168,13 @@ static bool can_decode(copying *c, const array_copy *a)
     return true;
 }
 
-/* Finds type and size. Returns NULL, or the reason why the array is not one of the format. */
+/* Finds the type and the size of the values. Returns NULL, or the reason why the array does not fit
+ * the format. */
 static const char *find_values(array_copy *a)
 {
     hsize_t dims[2] = { 0, 0 };
-    if (ebpo_h5_is_elsewhere(a->set)) /* first: H5Dget_space opens a virtual dataset's files */
+    if (ebpo_h5_is_elsewhere(
+            a->set)) /* checked first, because H5Dget_space opens the files of a virtual dataset */
         return "the array's values are stored in another file or in other arrays, which are "
                "never read";
     hid_t space = H5Dget_space(a->set), type = H5Dget_type(a->set);
@@ -195,7 +199,7 @@ static const char *find_values(array_copy *a)
     return NULL;
 }
 
-/* Finds the chunks in the file. */
+/* Finds the number of chunks in the file, and their rows if a chunk has all columns. */
 static void find_chunks(array_copy *a)
 {
     int rank = a->shape.cols ? 2 : 1;
@@ -230,8 +234,9 @@ static bool inspect_object(copying *c, array_copy *a)
     return can_decode(c, a);
 }
 
-/* Returns true if all chunks are stored. For missing chunks HDF5 would return the fill value. */
-static bool all_is_there(const array_copy *a)
+/* Returns true if all chunks are stored. HDF5 would silently return the fill value for missing
+ * chunks. */
+static bool has_all_chunks(const array_copy *a)
 {
     hsize_t chunks = 0;
     if (!a->stored_chunks)
@@ -265,7 +270,7 @@ static bool read_values(const array_copy *a, uint64_t first, uint64_t rows, void
     bool good = space >= 0 && memory >= 0 &&
                 H5Sselect_hyperslab(space, H5S_SELECT_SET, from, NULL, size, NULL) >= 0 &&
                 H5Dread(a->set, a->type, memory, space, H5P_DEFAULT, values) >= 0;
-    if (good) { /* otherwise libhdf5's reason would be erased */
+    if (good) { /* after a failure, closing would erase libhdf5's reason */
         ebpo_h5_close_space(space);
         ebpo_h5_close_space(memory);
     }
@@ -278,18 +283,18 @@ static bool make_chunk(copying *c, const array_copy *a, uint64_t first, uint8_t 
 {
     static ebpo_chunk_coder coder;
     static uint8_t values[EBPO_CHUNK_BYTES_MAX];
-    size_t row = ebpo_shape_row_bytes(&a->shape), all = a->shape.chunk_rows * row;
+    size_t row = ebpo_shape_row_bytes(&a->shape), chunk_bytes = a->shape.chunk_rows * row;
     uint64_t rows = a->shape.rows - first;
     if (rows > a->shape.chunk_rows)
         rows = a->shape.chunk_rows;
-    memset(values + rows * row, 0, all - (size_t)rows * row);
+    memset(values + rows * row, 0, chunk_bytes - (size_t)rows * row);
     if (!read_values(a, first, rows, values)) {
         copy_fails(c, a->path, "the array cannot be read; get a fresh copy of the file");
         return false;
     }
     c->status = ebpo_chunk_encode(&coder, a->shape.pipeline, LEVEL, a->shape.element_size, values,
-                                  all, data, bytes);
-    return c->status == EBPO_OK || (c->status = ebpo_fail_memory(c->error, all), false);
+                                  chunk_bytes, data, bytes);
+    return c->status == EBPO_OK || (c->status = ebpo_fail_memory(c->error, chunk_bytes), false);
 }
 
 static void copy_values(copying *c, const array_copy *a)
@@ -300,7 +305,7 @@ static void copy_values(copying *c, const array_copy *a)
     uint8_t *data = ebpo_alloc(bound, 1);
     if (!data)
         c->status = ebpo_fail_memory(c->error, bound);
-    else if (!all_is_there(a))
+    else if (!has_all_chunks(a))
         copy_fails(c, a->path, "a chunk is missing; get a fresh copy of the file");
     else
         c->status = ebpo_h5_make_array(&c->to, a->path, shape, &to, c->error);
@@ -316,10 +321,10 @@ static void copy_values(copying *c, const array_copy *a)
     free(data);
 }
 
-/* Makes the chunk directory, which must exist in the copy. Its content would describe the original
- * file, so it gets one row, which is never read: the attributes that make the directory valid are
- * missing. */
-static void make_places(copying *c, const char *path)
+/* Makes the chunk directory, an array that must exist in the copy. The original directory would
+ * describe other chunks. So the directory gets one row, and lacks the attributes that make it
+ * valid, so that it is never read. */
+static void make_empty_directory(copying *c, const char *path)
 {
     static const uint64_t none[2];
     ebpo_shape shape = { .rows = 1, .chunk_rows = 1, .element_size = 8, .pipeline = c->pipeline };
@@ -344,7 +349,7 @@ static void copy_array(copying *c, hid_t group, const char *name, const char *pa
     array_copy a = { .set = H5Dopen2(group, name, c->access), .path = path };
     a.plist = a.set >= 0 ? H5Dget_create_plist(a.set) : -1;
     if (strcmp(path, "/subtrees/chunk_directory") == 0 || strcmp(path, "/subtrees/places") == 0)
-        make_places(c, path);
+        make_empty_directory(c, path);
     else if (inspect_object(c, &a))
         copy_values(c, &a);
     ebpo_h5_close_list(a.plist);
@@ -352,8 +357,8 @@ static void copy_array(copying *c, hid_t group, const char *name, const char *pa
         H5Dclose(a.set);
 }
 
-/* Returns the rows of a chunk of an array of the file, 1 without chunks; 0 if the array is missing.
- */
+/* Returns the number of rows in a chunk of an array of the file; 1 for an array without chunks, 0
+ * if the array is missing. */
 static hsize_t rows_of(hid_t file, const char *path)
 {
     hid_t set = H5Dopen2(file, path, H5P_DEFAULT), plist = set >= 0 ? H5Dget_create_plist(set) : -1;
@@ -366,8 +371,8 @@ static hsize_t rows_of(hid_t file, const char *path)
     return chunk[0];
 }
 
-/* Chooses the filters of the copy, by those of an array that every file has, and finds out whether
- * the chunks have the rows of the format. */
+/* Chooses the filters of the copy: the filters of an array that every file has. Sets c->kept if the
+ * chunks in the file have the rows that the format requires. */
 static void inspect_file(copying *c)
 {
     array_copy a = { .set = H5Dopen2(c->from, "/levels/00/types", H5P_DEFAULT) };
@@ -404,10 +409,10 @@ static herr_t copy_link(hid_t group, const char *name, const H5L_info_t *info, v
     copying *c = g->c;
     char path[PATH];
     static const char *const known[] = { "levels", "mesh", "maps", "subtrees", "attributes" };
-    bool ours = *g->path || c->depth > 0;
+    bool is_part_of_format = *g->path || c->depth > 0;
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
-        ours = ours || strcmp(name, known[i]) == 0;
-    if (!ours || info->type != H5L_TYPE_HARD || !ebpo_text_ok(name) ||
+        is_part_of_format = is_part_of_format || strcmp(name, known[i]) == 0;
+    if (!is_part_of_format || info->type != H5L_TYPE_HARD || !ebpo_text_ok(name) ||
         snprintf(path, sizeof path, "%s/%s", g->path, name) >= PATH)
         return 0;
     if (++c->objects > OBJECTS_MAX)

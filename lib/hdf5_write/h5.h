@@ -14,13 +14,13 @@ typedef int64_t ebpo_h5_id; /* an open object; negative: none */
 /* Registers filter 32015 with libhdf5 in this process. */
 EBPO_MUST_USE ebpo_status ebpo_h5_register(ebpo_error *error);
 
-/* An output file. The first failure of a write is returned by the call that detects it, and by all
- * later calls. */
+/* An output file. The call that detects the first failed write, and all later calls, return this
+ * failure. */
 typedef struct ebpo_h5_out {
     const char *shown; /* for messages; owned by the caller */
     ebpo_h5_id file;
-    int codec_level; /* stated with the filters */
-    struct ebpo_h5_sink *sink;
+    int codec_level;           /* level that the headers state with the filters; 0: the default */
+    struct ebpo_h5_sink *sink; /* through which libhdf5 writes (h5_parts.h) */
 } ebpo_h5_out;
 #define EBPO_H5_OUT_INIT \
     {                    \
@@ -28,8 +28,8 @@ typedef struct ebpo_h5_out {
     }
 
 /* Closes an object that was opened or created by a function below. Call it before the file is
- * closed. A negative id is allowed. The next call reports a failure of it, ebpo_h5_finish at the
- * latest. */
+ * closed. A negative id is allowed. If closing fails, the next call returns this failure,
+ * ebpo_h5_finish at the latest. */
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id);
 
 /* Creates a file by name, or in memory when path is NULL. The first `head_bytes` bytes are for
@@ -41,8 +41,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, con
  * file. */
 EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes,
                                          ebpo_error *error);
-/* Opens the root group for its attributes, or creates a group with capacity for `links` links. The
- * caller closes the id. */
+/* ebpo_h5_root opens the root group for its attributes. ebpo_h5_make_group creates a group with
+ * capacity for `links` links. The caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links,
                                              ebpo_h5_id *id, ebpo_error *error);
@@ -66,10 +66,11 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, cons
 EBPO_MUST_USE ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                             const char *text, ebpo_error *error);
 
+/* Opens an array. The caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
                                              ebpo_error *error);
-/* The first creates an array, whose id the caller closes. The second writes its encoded chunks by
- * index. */
+/* ebpo_h5_make_array creates an array; the caller closes the id. ebpo_h5_put_chunk writes encoded
+ * chunk number `chunk` of an array. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path,
                                              const ebpo_shape *shape, ebpo_h5_id *id,
                                              ebpo_error *error);
@@ -77,16 +78,17 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, 
                                             const ebpo_shape *shape, uint64_t chunk,
                                             const void *data, size_t bytes, ebpo_error *error);
 
-/* For a file in memory: returns the number of bytes from the start to the end of the last metadata
- * so far. Raw data begins at first_raw. */
+/* Sets *bytes to the number of bytes from the start of a file in memory to the end of the last
+ * metadata so far. `first_raw`: offset at which raw data begins. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                                             ebpo_error *error);
 /* Returns the current size of the file in bytes. */
 EBPO_MUST_USE ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error);
-/* Flushes and closes. Harmless when already closed. The file is complete only after EBPO_OK. */
+/* Flushes and closes the file. Harmless if the file is closed already. The file is complete only
+ * after EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
-/* Closes without further writing, including remains of a failed call above. Harmless after
- * ebpo_h5_finish. */
+/* Closes the file without further writing, also after a failed call. Harmless after ebpo_h5_finish.
+ */
 void ebpo_h5_discard(ebpo_h5_out *out);
 
 /* HDF5 files for other programs: plain arrays of numbers that grow by rows, with filters that every
@@ -105,7 +107,7 @@ static inline size_t ebpo_h5_number_bytes(ebpo_h5_number number)
     return number == EBPO_H5_U8 ? 1 : number == EBPO_H5_I32 || number == EBPO_H5_F32 ? 4 : 8;
 }
 
-/* [rows] when cols is 0, else [rows][cols]. */
+/* An array that grows by rows: [rows] when cols is 0, else [rows][cols]. */
 typedef struct ebpo_h5_table {
     ebpo_h5_id id;
     char path[96];
@@ -132,7 +134,7 @@ EBPO_MUST_USE ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path,
 /* Appends rows, in the machine's byte order; stored little-endian. */
 EBPO_MUST_USE ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data,
                                          uint64_t rows, ebpo_error *error);
-/* Closes a table and writes the rest of its data; the next call reports a failure. */
+/* Closes a table, which writes its last data. If this fails, the next call returns the failure. */
 void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table);
 
 /* Writes an array at once: make, append and close. */
@@ -141,7 +143,7 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,
                                             uint64_t rows, ebpo_error *error);
 
 /* Creates a volume for other programs: an array of float64, [dims[0]][dims[1]][dims[2]], each at
- * least 1. It is written layer by layer. The caller closes the id. */
+ * least 1. ebpo_h5_put_layers then writes the volume layer by layer. The caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path,
                                               const uint64_t dims[3], ebpo_h5_id *id,
                                               ebpo_error *error);
@@ -155,24 +157,25 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path,
 
 typedef struct ebpo_process_limits {
     uint64_t memory_bytes; /* address space beyond the address space of this process */
-    uint64_t file_bytes;   /* bytes that it writes */
+    uint64_t file_bytes;   /* greatest size of a file that the process writes */
     unsigned seconds;      /* processor time */
 } ebpo_process_limits;
 
 /* Returns the number of rows of a chunk of an array in this format. `stored`: the array's shape in
- * the file, with the chunk_rows of the other program, 0 for none. `subtrees`: the file has
- * subtrees. `kept`: the arrays whose chunks are fixed by the format have such chunks in the file.
- */
+ * the file, with the chunk_rows that the other program has chosen, or 0 if there are no chunks.
+ * `subtrees`: the file has subtrees. `kept`: in the file, arrays whose chunk size the format fixes
+ * have chunks of this size. */
 typedef uint32_t (*ebpo_h5_chunk_rows_fn)(const char *path, const ebpo_shape *stored, bool subtrees,
                                           bool kept);
 
 /* Rewrites the parts of a file that belong to this format in this format's layout: from the file
  * `from` to the empty file `to`. libhdf5 opens files by name. The name `to` is removed as soon as
  * libhdf5 has opened that file, and so is `from` if `from_goes` is true. Chunks that fit the format
- * are copied as stored; from other layouts, filters and byte orders, libhdf5 reads the values.
+ * are copied as stored. For other layouts, filters and byte orders, libhdf5 decodes the values.
  * Arrays that do not fit the format are omitted; *omitted then describes the first such array and
- * the reason (EBPO_E_FORMAT). If no array is omitted, *omitted has no message; on failure it holds
- * the failure. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without libhdf5. */
+ * the reason (EBPO_E_FORMAT). If no array is omitted, *omitted has no message; on failure, *omitted
+ * is the same error as *error. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without
+ * libhdf5. */
 EBPO_MUST_USE ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                                              const char *shown, ebpo_h5_chunk_rows_fn chunk_rows,
                                              const ebpo_process_limits *limits, ebpo_error *omitted,

@@ -1,6 +1,7 @@
-/* Private to lib/hdf5_write: the use of libhdf5. Every call happens between enter and leave.
- * Debian's serial build is not thread-safe, so one mutex of the library serialises calls; HDF5's
- * error printing is switched off in between and then restored. */
+/* Declares how lib/hdf5_write uses libhdf5; private to this folder. Every call of libhdf5 is in a
+ * scope, between ebpo_h5_enter and ebpo_h5_leave. A scope locks one mutex of the library, because
+ * Debian's serial build of libhdf5 is not thread-safe. It also switches off HDF5's error printing,
+ * and restores it at the end. */
 #ifndef EBPO_HDF5_WRITE_H5_PARTS_H
 #define EBPO_HDF5_WRITE_H5_PARTS_H
 
@@ -18,8 +19,8 @@ typedef struct ebpo_h5_scope {
 void ebpo_h5_enter(ebpo_h5_scope *scope);
 void ebpo_h5_leave(ebpo_h5_scope *scope);
 
-/* Sets the error "shown: object: what (libhdf5: innermost message)". Call it inside the scope,
- * right after the failing call. `object` may be "". */
+/* Sets the error "shown: object: what (libhdf5: innermost message)". Call this function inside the
+ * scope, right after the failing libhdf5 call. `object` may be "". */
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what);
 
@@ -28,7 +29,7 @@ bool ebpo_h5_short_of_memory(void);
 
 /* Opens a file of another program to read. With `lock`, fails while another program has the file
  * open for writing, because the data may then be a mixture of two versions. If the file system has
- * no locks, the file is opened without one. -1 in *file on failure. */
+ * no locks, the file is opened without one. On failure, *file is -1. */
 EBPO_MUST_USE ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                                                hid_t *file, ebpo_error *error);
 
@@ -38,8 +39,8 @@ bool ebpo_h5_is_elsewhere(hid_t set);
 /* Returns the stored type for little-endian integers of `size` bytes; -1 for another size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
-/* A virtual file driver, through which libhdf5 writes. It stores the first failed write, but
- * reports every write to libhdf5 as successful; sink.c explains why. */
+/* A sink: a virtual file driver, through which libhdf5 writes. A sink stores the first failed
+ * write, but reports every write to libhdf5 as successful; sink.c explains why. */
 
 typedef struct ebpo_h5_sink {
     hid_t id;        /* libhdf5's registration of the driver */
@@ -56,8 +57,8 @@ typedef struct ebpo_h5_sink {
  * the scope. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
                                             ebpo_error *error);
-/* Makes a file access property list use the sink; returns false when libhdf5 refuses. Call it
- * inside the scope. */
+/* Makes a file access property list use the sink; returns false when libhdf5 refuses. Call this
+ * function inside the scope. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl);
 /* Stores a failure, if it is the first one. */
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);
@@ -70,8 +71,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *err
  * may call the driver again at any time. */
 void ebpo_h5_sink_abandon(ebpo_h5_sink *sink);
 
-/* Writing that all layouts have in common; call it inside the scope. These functions close the
- * spaces and property lists that they receive, also after an earlier failure. */
+/* The functions below write what all layouts have in common. Call them inside the scope. They close
+ * the spaces and property lists that they receive, also after an earlier failure. */
 
 /* Returns properties of a file that is written through the sink; -1 when libhdf5 refuses. */
 struct ebpo_h5_sink;
@@ -80,14 +81,15 @@ hid_t ebpo_h5_write_access(struct ebpo_h5_sink *sink, H5F_libver_t version);
 ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error);
 
 /* Returns EBPO_OK if the call succeeded and no write has failed so far; otherwise the first failed
- * write, or libhdf5's error. Call it right after the call, because others erase libhdf5's reason.
- */
+ * write, or libhdf5's error. Call this function right after the libhdf5 call, because further calls
+ * of libhdf5 erase its reason. */
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error);
 
-/* Creates a group; closes the property list. `good`: all properties were set. */
+/* Creates a group; closes the property list. `good`: false if setting a property failed, which
+ * makes this function fail. */
 ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gcpl, bool good,
                               ebpo_h5_id *id, ebpo_error *error);
-/* Creates a dataset; closes space and properties. */
+/* Creates a dataset; closes the space and the property list. `good`: as in ebpo_h5_put_group. */
 ebpo_status ebpo_h5_put_dataset(const ebpo_h5_out *out, const char *path, hid_t type, hid_t space,
                                 hid_t dcpl, bool good, ebpo_h5_id *id, ebpo_error *error);
 /* Writes an attribute, from values of the type `memory`, or of the stored type if `memory` is -1.
@@ -99,14 +101,14 @@ ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const ch
 void ebpo_h5_close_list(hid_t list);
 void ebpo_h5_close_space(hid_t space);
 
-/* The work in a separate process, with limits, in which libhdf5 reads untrusted files. There is no
- * other thread, no plugin is loaded, and libhdf5 prints nothing. Changes of memory are lost; files
- * that the work writes stay. */
+/* The work of a separate process, with limits, in which libhdf5 reads untrusted files. The process
+ * has no other thread, loads no plugin, and libhdf5 prints nothing. Changes of memory are lost;
+ * files that the work writes stay. */
 typedef ebpo_status (*ebpo_process_fn)(void *user, ebpo_error *error);
 
 /* Runs `work` in a separate process; a crash ends only that process. Returns the status and error
- * of the work; with EBPO_OK, *error may be set, too. EBPO_E_FORMAT when the process crashed or
- * exceeded a limit. `shown`: name of the file for messages. */
+ * of the work; even if the status is EBPO_OK, *error may have a message. EBPO_E_FORMAT if the
+ * process crashed or exceeded a limit. `shown`: name of the file for messages. */
 EBPO_MUST_USE ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *shown,
                                               const ebpo_process_limits *limits, ebpo_error *error);
 

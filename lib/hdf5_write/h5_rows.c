@@ -1,5 +1,5 @@
-/* Reads rows of numbers from untrusted files (ebpo/rows.h). libhdf5 reads them in a separate
- * process, which passes them on in an unnamed file. */
+/* Reads rows of numbers from untrusted files (ebpo/rows.h). libhdf5 reads the rows in a separate
+ * process, which writes them to an unnamed file for this process. */
 #include <ebpo/rows.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -20,20 +20,21 @@
 enum {
     COLUMNS_MAX = 64,
     ROWS_AT_ONCE = 16384,
-    /* The limit of the bytes of all rows is a multiple of the file's size, which is the most by
-     * which deflate can compress, but not less than a minimum. A file of a kilobyte can state any
-     * number of rows. */
+    /* The rows may take at most EXPANSION_MAX times the bytes of the file (deflate cannot compress
+       more), but at least EXPANSION_FREE bytes are allowed. Without a limit, a file of a kilobyte
+       could state any number of rows. */
     EXPANSION_MAX = 1024,
     EXPANSION_FREE = 64 << 20
 };
 
+/* A dataset to read, and the request. */
 typedef struct dataset {
-    const char *path, *name;
-    int to; /* descriptor to write the rows to */
-    unsigned least, most;
-    uint64_t bytes_max; /* limit for all rows */
-    double fill;
-    uint64_t first, end; /* the requested rows */
+    const char *path, *name; /* of the file; of the dataset in the file */
+    int to;                  /* descriptor to write the rows to */
+    unsigned least, most;    /* allowed numbers of columns */
+    uint64_t bytes_max;      /* limit for all rows */
+    double fill;             /* value of the columns that the dataset lacks */
+    uint64_t first, end;     /* the requested rows [first, end) */
     hid_t file, set, space, type;
     hsize_t size[2];
 } dataset;
@@ -43,6 +44,7 @@ static ebpo_status rows_fail(const dataset *d, const char *what, ebpo_error *err
     return ebpo_h5_fail(error, EBPO_E_FORMAT, d->path, d->name, what);
 }
 
+/* Callback of libhdf5 for an external link: refuses the link and records it. */
 static herr_t follow_none(const char *parent_file, const char *parent_group, const char *file,
                           const char *object, unsigned *flags, hid_t access, void *user)
 {
@@ -106,6 +108,7 @@ static const char *other_values(const dataset *d, hid_t set, hid_t type)
                         : "codes of the .ebpo.h5 format";
 }
 
+/* Returns true if the dataset has two dimensions and an allowed number of columns. */
 static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2])
 {
     return H5Sget_simple_extent_ndims(space) == 2 &&
@@ -166,12 +169,12 @@ static herr_t inspect_object(hid_t file, const char *name, const H5O_info_t *inf
     hsize_t size[2];
     if (++c->objects > OBJECTS_MAX)
         return 1;
-    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* because the name is printed */
+    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* the name will be printed */
         return 0;
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
-    /* first: H5Dget_space opens a virtual dataset's files */
-    bool here = set >= 0 && !ebpo_h5_is_elsewhere(set);
-    hid_t space = here ? H5Dget_space(set) : -1, type = here ? H5Dget_type(set) : -1;
+    /* checked first, because H5Dget_space opens the files of a virtual dataset */
+    bool in_file = set >= 0 && !ebpo_h5_is_elsewhere(set);
+    hid_t space = in_file ? H5Dget_space(set) : -1, type = in_file ? H5Dget_type(set) : -1;
     size_t at = strlen(c->names);
     if (space >= 0 && type >= 0 && has_rows(space, c->d->least, c->d->most, size) &&
         !other_values(c->d, set, type)) {
@@ -189,7 +192,7 @@ static herr_t inspect_object(hid_t file, const char *name, const H5O_info_t *inf
     return 0;
 }
 
-/* Fails in any case: lists the candidate datasets, or reports that there is none. */
+/* Sets an error that lists the candidate datasets, or that reports that the file has none. */
 static ebpo_status name_sets(dataset *d, ebpo_error *error)
 {
     candidates c = { .d = d };
@@ -204,8 +207,8 @@ static ebpo_status name_sets(dataset *d, ebpo_error *error)
                           *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
 }
 
-/* Reads rows from `first` on, into the first columns of rows with `most` columns. On failure sets
- * *short_of_memory if that is the reason. */
+/* Reads rows from `first` on, into the first columns of rows with `most` columns. On failure, sets
+ * *short_of_memory to true if a lack of memory is the reason. */
 static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *rows,
                        bool *short_of_memory)
 {
@@ -222,6 +225,7 @@ static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *r
     return good;
 }
 
+/* Writes the total number of rows, then the requested rows, to d->to. */
 static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
 {
     static double rows[ROWS_AT_ONCE * COLUMNS_MAX];
@@ -243,6 +247,7 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* The work of the separate process. */
 static ebpo_status read_apart(void *user, ebpo_error *error)
 {
     dataset *d = user;
@@ -286,7 +291,8 @@ static ebpo_status read_result(const dataset *d, double **rows, uint64_t *count,
     return EBPO_OK;
 }
 
-static ebpo_status make_ready(dataset *d, ebpo_error *error)
+/* Computes the limit of bytes, and opens the unnamed file for the rows. */
+static ebpo_status prepare_reading(dataset *d, ebpo_error *error)
 {
     const char *folder = getenv("TMPDIR");
     struct stat facts;
@@ -324,10 +330,10 @@ ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned lea
     if (least < 1 || most < least || most > COLUMNS_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be requested",
                          COLUMNS_MAX);
-    /* because datasets of this library's files have the library's filter */
+    /* datasets in this library's files may have the library's filter */
     ebpo_status status = ebpo_h5_register(error);
     if (status == EBPO_OK)
-        status = make_ready(&d, error);
+        status = prepare_reading(&d, error);
     limits.file_bytes = d.bytes_max + sizeof *total;
     if (status == EBPO_OK)
         status = ebpo_run_in_process(read_apart, &d, path, &limits, error);

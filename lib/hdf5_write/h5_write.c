@@ -1,8 +1,8 @@
-/* Creates files in this library's layout: with headers as one contiguous range at the start, links
- * and attributes in the object headers, and chunks that are already encoded. Spaces and property
+/* Creates files in this library's layout: headers are one contiguous range at the start, links and
+ * attributes are in the object headers, and chunks arrive already encoded. Spaces and property
  * lists are closed, also after an earlier failure. All calls after a failed write return the first
- * failure (sink.c). Attributes of all kinds, also those of tables for other programs, are written
- * here. */
+ * failure (sink.c). This file also writes the attributes of tables for other programs (tables.c).
+ */
 #include <string.h>
 
 #include "core/error.h"
@@ -10,7 +10,8 @@
 #include "hdf5_write/h5_parts.h"
 #include "hdf5_write/zstd_filter.h"
 
-/* Makes HDF5 store everything in object headers, where it would otherwise use B-trees and heaps. */
+/* With this limit of links and attributes, HDF5 stores them in object headers. HDF5 would otherwise
+ * use B-trees and heaps. */
 enum { COMPACT = 65535 };
 
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
@@ -25,8 +26,8 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
     ebpo_h5_leave(&scope);
 }
 
-/* Makes libhdf5 keep all metadata in memory. Metadata that must be read back may fail to be read,
- * and then libhdf5 cannot close the file. */
+/* Makes libhdf5 keep all metadata in memory. If libhdf5 had to read metadata again and this failed,
+ * libhdf5 could not close the file. */
 static bool keep_metadata(hid_t fapl)
 {
     H5AC_cache_config_t config = { .version = H5AC__CURR_CACHE_CONFIG_VERSION };
@@ -62,6 +63,7 @@ static hid_t file_access(ebpo_h5_sink *sink, uint64_t head_bytes)
     return ok ? fapl : -1;
 }
 
+/* Sets the properties of a group with `links` links. */
 static bool set_group(hid_t plist, unsigned links)
 {
     return plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0 &&
@@ -89,7 +91,8 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
     return status;
 }
 
-/* Closes the file, only once: libhdf5 has released the file even if closing failed. */
+/* Closes the file. Sets out->file to -1 even if closing fails, because libhdf5 has released the
+ * file then too. */
 static ebpo_status close_file(ebpo_h5_out *out, ebpo_error *error)
 {
     bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
@@ -289,9 +292,9 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
     return status;
 }
 
-/* Returns the size of the head. Metadata blocks end with a checksum, and unused space is zero: the
- * head ends at the last byte that is not zero, or a few bytes later if a checksum ends with zeros.
- */
+/* Returns the size of the head. Metadata blocks end with a checksum, and unused space is zero: so
+ * the head ends at the last byte that is not zero, or a few bytes later if a checksum ends with
+ * zeros. */
 ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                               ebpo_error *error)
 {
@@ -344,7 +347,7 @@ void ebpo_h5_discard(ebpo_h5_out *out)
         return;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    /* a failure makes the sink discard the rest, which is not needed any more */
+    /* after a failure, the sink ignores all further writes, so that closing writes nothing */
     (void)ebpo_fail(&unwanted, EBPO_E_CANCELLED, "given up");
     ebpo_h5_sink_fail(out->sink, &unwanted);
     if (out->file >= 0 && H5Fclose(out->file) < 0)
@@ -356,6 +359,8 @@ void ebpo_h5_discard(ebpo_h5_out *out)
     ebpo_h5_leave(&scope);
 }
 
+/* Returns the sink's first failure, or the failure of the call before (if `good` is false), or
+ * EBPO_OK. */
 static ebpo_status report_outcome(const ebpo_h5_out *out, const char *object, bool good,
                                   const char *what, ebpo_error *error)
 {

@@ -1,7 +1,7 @@
-/* Protects each use of libhdf5: by a mutex, because Debian's serial build is not thread-safe, and
- * HDF5's error printing, switched off and restored. Within it: messages that name file, object and
- * libhdf5's innermost reason, opening untrusted files to read, and registering the library's filter
- * once. */
+/* Provides the scope of each use of libhdf5 (h5_parts.h): a mutex, because Debian's serial build is
+ * not thread-safe, and HDF5's error printing switched off and restored. Also provides functions
+ * that are used within a scope: errors that name file, object and libhdf5's innermost reason, and
+ * opening untrusted files. Registers the library's filter. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -31,7 +31,8 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
     pthread_mutex_unlock(&library);
 }
 
-/* libhdf5's messages have the path first, then the error number, so both must fit */
+/* CAUSE_BYTES: libhdf5's messages have the path first and then the error number, so a path must
+ * fit. CAUSE_SHOWN: greatest length in our messages. */
 enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
 
 static herr_t copy_first_message(unsigned depth, const H5E_error2_t *entry, void *data)
@@ -42,6 +43,7 @@ static herr_t copy_first_message(unsigned depth, const H5E_error2_t *entry, void
     return 1; /* stop: only the innermost message is needed */
 }
 
+/* Sets *data to true for an error that is a lack of memory. */
 static herr_t record_memory(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
@@ -56,7 +58,8 @@ bool ebpo_h5_short_of_memory(void)
     return found;
 }
 
-/* Returns the system's error number in libhdf5's reason, 0 if there is none. */
+/* Returns the error number of the system (errno) in libhdf5's reason, or 0 if the reason has none.
+ */
 static int system_error(const char *cause)
 {
     const char *number = strstr(cause, "errno = ");

@@ -1,6 +1,6 @@
-/* Runs libhdf5 on untrusted files in a separate process: forked, with limits of memory, time and
- * bytes written, without plugins, and with a pipe for its status and error. A crash ends that
- * process and not this process. */
+/* Runs libhdf5 on untrusted files in a separate process, so that a crash does not end this process.
+ * The process is forked. It has limits of memory, time and bytes written, and loads no plugins. It
+ * reports its status and error through a pipe. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -41,16 +41,18 @@ static void limit_resource(int what, uint64_t most)
     }
 }
 
-static void set_limits(const ebpo_process_limits *limits, uint64_t has)
+/* Sets the limits of the separate process. `address_space`: bytes of addresses at the beginning; 0:
+ * not known. */
+static void set_limits(const ebpo_process_limits *limits, uint64_t address_space)
 {
     limit_resource(RLIMIT_CORE, 0);
     limit_resource(RLIMIT_FSIZE, limits->file_bytes);
     limit_resource(RLIMIT_CPU, limits->seconds);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    (void)has; /* sanitizers reserve all addresses */
+    (void)address_space; /* sanitizers reserve all addresses */
 #else
-    if (has)
-        limit_resource(RLIMIT_AS, has + limits->memory_bytes);
+    if (address_space)
+        limit_resource(RLIMIT_AS, address_space + limits->memory_bytes);
 #endif
 }
 
@@ -68,7 +70,8 @@ bool ebpo_process_write(int fd, const void *data, size_t bytes)
     return true;
 }
 
-/* Returns 1: all was read; 0: the other end was closed early; -1: reading failed. */
+/* Returns 1 if all bytes were read, 0 if the other end was closed early, and -1 if reading failed.
+ */
 static int read_all(int fd, void *data, size_t bytes)
 {
     for (char *at = data; bytes > 0;) {
@@ -83,8 +86,9 @@ static int read_all(int fd, void *data, size_t bytes)
     return 1;
 }
 
+/* Runs the work in the separate process, and reports the result. Does not return. */
 static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits *limits,
-                     uint64_t has, int out)
+                     uint64_t address_space, int out)
 {
     static const int handled[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
     report r = { EBPO_OK, EBPO_ERROR_INIT };
@@ -93,7 +97,7 @@ static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits
         signal(handled[i], SIG_DFL);
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
-    set_limits(limits, has);
+    set_limits(limits, address_space);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     H5PLset_loading_state(0);
     r.status = work(user, &r.error);
@@ -101,6 +105,7 @@ static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits
     _exit(0);
 }
 
+/* Sets the error for a process that ended without a result. `state`: from waitpid. */
 static ebpo_status fail_by_state(int state, const char *shown, ebpo_error *error)
 {
     if (!WIFSIGNALED(state)) /* the process ended by itself, but could not report its result */
@@ -135,13 +140,13 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
     report r;
     if (!make_pipe(ends))
         return ebpo_fail_errno(error, shown, "no process could be started for it");
-    uint64_t has = address_bytes();
-    ebpo_h5_enter(&scope); /* so that no thread is in libhdf5 when the process is copied */
+    uint64_t address_space = address_bytes();
+    ebpo_h5_enter(&scope); /* so that no thread is in libhdf5 when the process is forked */
     pid_t child = fork();
     if (child == 0) {
         ebpo_h5_leave(&scope);
         close(ends[0]);
-        run_work(work, user, limits, has, ends[1]);
+        run_work(work, user, limits, address_space, ends[1]);
     }
     int fault = errno;
     ebpo_h5_leave(&scope);
@@ -160,7 +165,7 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
         return ebpo_fail_errno(error, shown, "the result of the process that read it is invalid");
     if (!reported)
         return fail_by_state(state, shown, error);
-    /* terminates the texts, as the process may have written anything */
+    /* terminate the texts, because the process may have written any bytes */
     r.error.message[sizeof r.error.message - 1] = r.error.file[sizeof r.error.file - 1] =
         r.error.object[sizeof r.error.object - 1] = 0;
     if (r.status != EBPO_OK && r.status != r.error.status)

@@ -16,8 +16,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-/* Maximum number of bytes for one call of pread or pwrite. Some systems transfer no more than about
- * 2 GiB. */
+/* Maximum number of bytes for one call of pread or pwrite. Some systems transfer at most about 2
+ * GiB. */
 static const size_t CALL_BYTES_MAX = (size_t)1 << 30;
 
 /* An open file, as libhdf5 sees it. libhdf5 uses only the first member. */
@@ -75,6 +75,7 @@ ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *
     return EBPO_OK;
 }
 
+/* Closes the file, or frees the memory. */
 static void release_sink(ebpo_h5_sink *sink)
 {
     if (sink->fd >= 0 && close(sink->fd) != 0)
@@ -106,8 +107,8 @@ static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t a
 {
     (void)name;
     (void)address_max;
-    /* flags (create, truncate) are ignored: the sink is empty when it is made. libhdf5 may open it
-     * again later, and it must not be truncated then. */
+    /* The flags (create, truncate) are ignored. A new sink is empty anyway, and a sink that libhdf5
+     * opens again later must not be truncated. */
     (void)flags;
     const sink_settings *settings = H5Pget_driver_info(fapl);
     if (!settings)
@@ -214,14 +215,14 @@ static void write_memory(ebpo_h5_sink *sink, uint64_t at, size_t size, const uin
     uint64_t need = at + size, least = UINT64_C(1) << 20;
     if (need > sink->capacity) {
         uint64_t capacity = need < least / 2 ? least : 2 * need;
-        uint8_t *more = capacity <= SIZE_MAX ? realloc(sink->memory, (size_t)capacity) : NULL;
-        if (!more) {
+        uint8_t *bigger = capacity <= SIZE_MAX ? realloc(sink->memory, (size_t)capacity) : NULL;
+        if (!bigger) {
             errno = ENOMEM;
             fail_errno(sink, "could not be written to memory");
             return;
         }
-        memset(more + sink->capacity, 0, (size_t)(capacity - sink->capacity));
-        sink->memory = more;
+        memset(bigger + sink->capacity, 0, (size_t)(capacity - sink->capacity));
+        sink->memory = bigger;
         sink->capacity = capacity;
     }
     memcpy(sink->memory + at, data, size);

@@ -1,7 +1,7 @@
 /* Writes HDF5 files for other programs (VTKHDF, Python): arrays that grow by rows, and volumes that
- * are written layer by layer. They use filters that every HDF5 has, shuffle and deflate at its
- * fastest level: these files are read once or twice, and indices of nodes and corners compress
- * well even at that level. */
+ * are written layer by layer. The arrays use the filters shuffle and deflate, which every build of
+ * HDF5 has. Deflate uses its fastest level, because such files are read once or twice, and indices
+ * of nodes and corners compress well even at this level. */
 #include <stdio.h>
 #include <string.h>
 
@@ -85,6 +85,7 @@ ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_numbe
     return status;
 }
 
+/* Enlarges the table and writes the new rows. */
 static bool append_rows(ebpo_h5_table *table, const void *data, uint64_t rows)
 {
     int rank = table->cols ? 2 : 1;

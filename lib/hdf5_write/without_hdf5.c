@@ -1,5 +1,6 @@
 /* Replaces this module where the library is built without libhdf5 (-Dhdf5=disabled): the library
- * still reads its own files, and those functions of this module that return a status fail. */
+ * still reads files of this format, but the functions of this module fail. Only ebpo_h5_finish
+ * succeeds, because no file is open. */
 #include <ebpo/rows.h>
 
 #include "core/error.h"
@@ -9,7 +10,7 @@ static ebpo_status is_unsupported(const char *shown, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, shown,
                           "this library was built without libhdf5, and only reads files of this "
-                          "format; use one that was built with -Dhdf5=enabled");
+                          "format; use a library that was built with -Dhdf5=enabled");
 }
 
 ebpo_status ebpo_h5_register(ebpo_error *error) { return is_unsupported("HDF5", error); }

@@ -1,7 +1,7 @@
-/* Provides HDF5 filter 32015, which stores a chunk as one zstd frame. It is registered with libhdf5
- * in this process and, compiled a second time with EBPO_FILTER_IN_PLUGIN, is a plugin for h5dump,
- * h5py and all other programs. It uses only headers of HDF5 and does not link with HDF5's library,
- * so one plugin serves all builds. */
+/* Provides HDF5 filter 32015, which stores a chunk as one zstd frame. The library registers the
+ * filter with libhdf5 in its process. This file, compiled a second time with EBPO_FILTER_IN_PLUGIN,
+ * is a plugin for h5dump, h5py and all other programs. The file uses only headers of HDF5 and does
+ * not link with HDF5's library, so one plugin serves all builds of HDF5. */
 #include "hdf5_write/zstd_filter.h"
 
 #ifdef EBPO_FILTER_IN_PLUGIN
@@ -28,6 +28,7 @@ static size_t short_of_memory(void)
     return 0;
 }
 
+/* Replaces HDF5's buffer by `block`. Returns the number of bytes in use. */
 static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, size_t capacity,
                              size_t used)
 {
@@ -77,14 +78,14 @@ static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, voi
     return replace_buffer(buffer, buffer_size, block, (size_t)size, used);
 }
 
-/* Decodes a frame of another writer that does not state its size; the buffer grows. */
+/* Decodes a frame that does not state its size, as other writers make it, into a growing buffer. */
 static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
 {
     ZSTD_DCtx *context = ZSTD_createDCtx();
     ZSTD_inBuffer in = { *buffer, bytes, 0 };
     ZSTD_outBuffer out = { NULL, 0, 0 };
-    size_t left = 1;
-    while (context && left) {
+    size_t pending = 1;
+    while (context && pending) {
         if (out.pos == out.size) {
             uint64_t size = out.size ? 2 * (uint64_t)out.size : 65536;
             void *block = size <= CHUNK_MAX + 1 ? realloc(out.dst, (size_t)size) : NULL;
@@ -94,12 +95,12 @@ static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
             out.size = (size_t)size;
         }
         size_t before = out.pos;
-        left = ZSTD_decompressStream(context, &out, &in);
-        if (ZSTD_isError(left) || (left && in.pos == in.size && out.pos == before))
+        pending = ZSTD_decompressStream(context, &out, &in);
+        if (ZSTD_isError(pending) || (pending && in.pos == in.size && out.pos == before))
             break; /* damaged, or the frame ends early */
     }
     ZSTD_freeDCtx(context);
-    if (left == 0 && out.pos)
+    if (pending == 0 && out.pos)
         return replace_buffer(buffer, buffer_size, out.dst, out.size, out.pos);
     free(out.dst);
     return 0;

@@ -1,10 +1,12 @@
 /* Provides sources of files whose bytes arrive asynchronously (ebpo/async.h). Supplied bytes are
- * extents, in order and without overlaps. A read copies from extents, or notes the missing ranges
- * as wanted and returns EBPO_E_PENDING. Prefetch hints are noted in the same way, so the caller
- * fetches all ranges of a round trip together.
+ * stored in extents (ranges of the file), in order and without overlaps. A read copies from
+ * extents. If bytes are missing, the read notes its range as wanted and returns EBPO_E_PENDING.
+ * Prefetch hints are noted in the same way, so the caller fetches all ranges of a round trip
+ * together.
  *
- * A clock counts reads, supplied ranges and operations. An extent that was used since the oldest
- * running operation began is never removed. So the available bytes only grow while an operation is
+ * An operation is one call of the caller, which is repeated until all bytes are available. A clock
+ * counts reads, supplied ranges and operations. An extent that was used since the oldest running
+ * operation began is never removed. So the available bytes only grow while an operation is
  * repeated, which limits the number of repetitions. */
 #include <inttypes.h>
 #include <pthread.h>
@@ -17,10 +19,11 @@
 #include "core/error.h"
 
 enum {
-    HEAD_BYTES = 131072,   /* as for URLs (http_cache.h): opening reads only these bytes */
+    HEAD_BYTES = 131072,   /* the first bytes, which opening reads; as for URLs (http_cache.h) */
     RANGE_BYTES = 4 << 20, /* limit of one needed range */
-    GAP_BYTES = 16384,     /* smaller gaps are fetched too: that is faster than another request */
-    GAP_BYTES_OF_MANY = 32768,
+    /* smaller gaps between needed ranges are also fetched, which is faster than another request */
+    GAP_BYTES = 16384,
+    GAP_BYTES_OF_MANY = 32768, /* instead of GAP_BYTES, for more than MANY ranges */
     MANY = 256,
     COMPACT_COUNT = 1 << 16 /* number of wanted ranges that are merged before more are noted */
 };
@@ -34,12 +37,14 @@ typedef struct extent {
 struct ebpo_async {
     pthread_mutex_t lock;
     char *name, *version;
-    uint64_t size, memory, held;
-    bool changed;
+    uint64_t size;   /* of the file */
+    uint64_t memory; /* limit of the bytes in extents */
+    uint64_t held;   /* bytes in extents */
+    bool changed;    /* the file has changed: every call fails */
     uint64_t clock;
     extent *extents; /* [extent_count] by offset */
     uint64_t extent_count, extent_capacity;
-    ebpo_range *wanted; /* [wanted_count] in any order */
+    ebpo_range *wanted; /* [wanted_count] ranges of pending reads and of hints, in any order */
     uint64_t wanted_count, wanted_capacity;
     ebpo_range *needed; /* the last result of ebpo_async_needed */
     uint64_t needed_capacity;
@@ -64,7 +69,7 @@ static uint64_t find_extent(const ebpo_async *a, uint64_t at)
     return low;
 }
 
-/* Returns the part of [begin, end) that is missing first; empty at `end` if none is missing. */
+/* Returns the first missing part of [begin, end); an empty range at `end` if no byte is missing. */
 static ebpo_range first_missing(const ebpo_async *a, uint64_t begin, uint64_t end)
 {
     uint64_t i = find_extent(a, begin);
@@ -81,6 +86,7 @@ static bool is_available(const ebpo_async *a, uint64_t begin, uint64_t end)
     return first_missing(a, begin, end).size == 0;
 }
 
+/* Copies available bytes. */
 static void copy_bytes(ebpo_async *a, uint64_t begin, uint64_t end, uint8_t *to)
 {
     for (uint64_t i = find_extent(a, begin); begin < end; i++) {
@@ -93,7 +99,7 @@ static void copy_bytes(ebpo_async *a, uint64_t begin, uint64_t end, uint8_t *to)
     }
 }
 
-/* Inserts an extent for a missing range. */
+/* Inserts an extent for a missing range. Returns false if memory is short. */
 static bool insert_extent(ebpo_async *a, uint64_t begin, uint64_t end, const uint8_t *bytes)
 {
     if (!ebpo_grow(&a->extents, &a->extent_capacity, a->extent_count + 1, sizeof *a->extents))
@@ -110,7 +116,7 @@ static bool insert_extent(ebpo_async *a, uint64_t begin, uint64_t end, const uin
     return true;
 }
 
-/* Returns false if the bytes differ from available ones. */
+/* Returns false if the bytes differ from bytes that were supplied earlier. */
 static bool compare_bytes(const ebpo_async *a, uint64_t begin, uint64_t end, const uint8_t *bytes)
 {
     for (uint64_t i = find_extent(a, begin); i < a->extent_count && a->extents[i].begin < end;
@@ -155,6 +161,7 @@ static uint64_t find_oldest_kept(const ebpo_async *a)
     return last;
 }
 
+/* Removes the extents that were used least recently, until the memory limit is met. */
 static void remove_old(ebpo_async *a)
 {
     if (a->held <= a->memory || a->unlisted)
@@ -180,7 +187,7 @@ static int compare_offsets(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Sorts the wanted ranges, and merges those with gaps of at most `gap` bytes. */
+/* Sorts the wanted ranges, and merges ranges with gaps of at most `gap` bytes between them. */
 static void merge_wanted(ebpo_async *a, uint64_t gap)
 {
     uint64_t kept = 0;
@@ -259,7 +266,7 @@ static void async_prefetch(void *user, const ebpo_range *ranges, size_t count)
     for (size_t i = 0; i < count; i++)
         if (!is_available(a, ranges[i].offset, ranges[i].offset + ranges[i].size) &&
             !record_wanted(a, ranges[i]))
-            break; /* without memory, there is no hint */
+            break; /* if memory is short, the range has no hint */
     pthread_mutex_unlock(&a->lock);
 }
 
@@ -354,13 +361,13 @@ ebpo_status ebpo_async_needed(ebpo_async *a, const ebpo_range **ranges, size_t *
                               ebpo_error *error)
 {
     uint64_t found = 0;
-    bool noted = true;
+    bool added = true;
     pthread_mutex_lock(&a->lock);
     ebpo_status status = a->changed ? fail_changed(a, error) : EBPO_OK;
     merge_wanted(a, a->wanted_count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES);
-    for (uint64_t i = 0; i < a->wanted_count && noted; i++)
-        noted = add_needed(a, a->wanted[i].offset, a->wanted[i].offset + a->wanted[i].size, &found);
-    if (!noted && status == EBPO_OK)
+    for (uint64_t i = 0; i < a->wanted_count && added; i++)
+        added = add_needed(a, a->wanted[i].offset, a->wanted[i].offset + a->wanted[i].size, &found);
+    if (!added && status == EBPO_OK)
         status = ebpo_fail_memory(error, (found + 1) * sizeof *a->needed);
     a->wanted_count = 0;
     pthread_mutex_unlock(&a->lock);
@@ -369,7 +376,8 @@ ebpo_status ebpo_async_needed(ebpo_async *a, const ebpo_range **ranges, size_t *
     return status;
 }
 
-/* Returns true if the version is that of the file. The first version that is known is kept. */
+/* Returns true if the version is the version of the file. The first version that is not "" becomes
+ * the version of the file. */
 static bool check_version(ebpo_async *a, const char *version)
 {
     if (!version || strcmp(version, a->version) == 0)
@@ -381,7 +389,7 @@ static bool check_version(ebpo_async *a, const char *version)
         free(a->version);
         a->version = copy;
     }
-    return true; /* without memory, the next call compares nothing either */
+    return true; /* if memory is short, the version stays unknown */
 }
 
 static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end, const uint8_t *bytes,
@@ -390,7 +398,8 @@ static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end, c
     for (ebpo_range m = first_missing(a, begin, end); m.size;
          m = first_missing(a, m.offset + m.size, end)) {
         if (m.offset < HEAD_BYTES && m.offset + m.size > HEAD_BYTES)
-            m.size = HEAD_BYTES - m.offset; /* the head is never removed, what follows is */
+            m.size = HEAD_BYTES -
+                     m.offset; /* the head is a separate extent, because it is never removed */
         if (!insert_extent(a, m.offset, m.offset + m.size, bytes + (m.offset - begin)))
             return ebpo_fail_memory(error, m.size);
     }

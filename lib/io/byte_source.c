@@ -126,7 +126,7 @@ bool ebpo_input_can_advise(const ebpo_input *input)
 
 void ebpo_input_advise(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
-    enum { LARGE = 1 << 20 }; /* within larger ranges, the system reads ahead by itself */
+    enum { LARGE = 1 << 20 }; /* bytes; within larger ranges, the system reads ahead by itself */
 #ifdef POSIX_FADV_WILLNEED
     const path_source *s = input->source.user;
     for (size_t i = 0; i < count && ebpo_input_can_advise(input); i++)
@@ -200,7 +200,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
-    if (status != EBPO_E_PENDING) { /* a pending read is repeated, and counted then */
+    if (status != EBPO_E_PENDING) { /* a pending read is repeated later, and counted then */
         atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
                                   memory_order_relaxed);
         atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
@@ -208,7 +208,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (status == EBPO_OK)
         return EBPO_OK;
     if (*cause.message) {
-        cause.status = status; /* a source of the caller may have set only the message */
+        cause.status = status; /* the caller's source may have set only the message */
         return ebpo_fail_with(error, &cause);
     }
     return ebpo_fail_at(error, status, input->shown, "", (int64_t)offset,
@@ -232,9 +232,10 @@ bool ebpo_is_url(const char *name)
     return strncasecmp(name, "http://", 7) == 0 || strncasecmp(name, "https://", 8) == 0;
 }
 
+/* Appends as much of the text as fits. Returns the new length. */
 static size_t append_text(char *out, size_t used, size_t capacity, const char *text, size_t length)
 {
-    size_t left = capacity - 1 - used, taken = length < left ? length : left;
+    size_t space = capacity - 1 - used, taken = length < space ? length : space;
     memcpy(out + used, text, taken);
     return used + taken;
 }
@@ -248,8 +249,8 @@ char *ebpo_url_redact(const char *name, char *out, size_t capacity)
         const char *host = strstr(name, "//") + 2;
         used = append_text(out, 0, capacity, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            /* The last @ ends the password. A password that contains an @ makes the URL invalid,
-             * but must not be shown either. */
+            /* The last @ ends the password. A password with an @ makes the URL invalid, but such a
+             * password must not be shown either. */
             if (host[i - 1] == '@') {
                 host += i;
                 break;

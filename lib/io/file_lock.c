@@ -1,7 +1,7 @@
 /* Locks the file at a path: a lock file beside it, locked by flock, which the system releases when
- * the process ends. If the lock file has lost its name by the time it is locked, it is released,
- * and another one is made. Locks affect only users of this library, and some file systems have
- * none, so replacing a file also compares versions (publish.c). */
+ * the process ends. If another process has removed the lock file by the time it is locked, the lock
+ * file is released, and a new lock file is made. Locks affect only users of this library, and some
+ * file systems have no locks, so replacing a file also compares versions (publish.c). */
 #include "io/file_lock.h"
 
 #include <errno.h>
@@ -21,9 +21,9 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-/* Opens the lock file, and makes it if necessary. It is opened for writing, because locks over NFS
- * need that, or, if it belongs to another user, for reading. errno EACCES: it cannot be made or
- * read. */
+/* Opens the lock file, and makes it if necessary. Opens it for writing, because locks over NFS
+ * require this; opens it for reading if it belongs to another user. errno EACCES: the lock file
+ * cannot be made or read. */
 static int open_lock_file(const char *path)
 {
     enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
@@ -35,22 +35,24 @@ static int open_lock_file(const char *path)
     return fd;
 }
 
-/* Returns false for a file that has the lock file's name but is not one, and must not be removed.
- */
+/* Returns false for a file that has the name of a lock file but is no lock file, and therefore must
+ * not be removed. */
 static bool is_lock_file(int fd)
 {
     struct stat st;
     return fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
-/* Returns true if the descriptor's file still has its name, which the previous holder removes. */
+/* Returns true if the descriptor's file still has the name `path`. The previous holder of the lock
+ * removes the name. */
 static bool has_its_name(int fd, const char *path)
 {
-    struct stat open_one, named;
-    return fstat(fd, &open_one) == 0 && lstat(path, &named) == 0 &&
-           open_one.st_dev == named.st_dev && open_one.st_ino == named.st_ino;
+    struct stat opened, named;
+    return fstat(fd, &opened) == 0 && lstat(path, &named) == 0 && opened.st_dev == named.st_dev &&
+           opened.st_ino == named.st_ino;
 }
 
+/* NO_LOCKS: locking is not possible here. */
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
 /* Tries to take the lock without waiting. Tries again if another process made or removed the lock
@@ -60,7 +62,7 @@ static attempt try_lock(ebpo_file_lock *lock)
     for (int tries = 0; tries < 100; tries++) {
         int fd = open_lock_file(lock->path);
         if (fd < 0 && (errno == EEXIST || errno == EINTR))
-            continue; /* another process has just made or removed it */
+            continue; /* another process has just made or removed the lock file */
         if (fd < 0)
             return NO_LOCKS;
         if (!is_lock_file(fd)) {
@@ -124,8 +126,8 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
         if (ebpo_seconds() - begun >= seconds) {
             ebpo_file_lock_release(lock);
             return ebpo_fail_file(error, EBPO_E_IO, path,
-                                  "another program has been changing it for %.3g s; try again "
-                                  "after that, or write to another file",
+                                  "another program has been changing the file for %.3g s; try "
+                                  "again later, or write to another file",
                                   seconds);
         }
         pause_between(i);
@@ -144,7 +146,7 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
 void ebpo_file_lock_release(ebpo_file_lock *lock)
 {
     if (lock->fd >= 0 && lock->process == (long)getpid()) {
-        /* before the release, so that the next holder sees that the name is gone */
+        /* remove the name before the release, so that the next holder sees that it is gone */
         unlink(lock->path);
         flock(lock->fd, LOCK_UN);
     }

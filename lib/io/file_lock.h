@@ -1,4 +1,4 @@
-/* Locks for programs that read, change and replace the file at a path. They affect only programs
+/* Locks for programs that read, change and replace the file at a path. Locks affect only programs
  * that use this library.
  *
  * The lock of NAME is the empty file ".NAME.lock" beside it, which is locked by flock, and removed
@@ -11,10 +11,9 @@
 #include <ebpo/base.h>
 
 typedef struct ebpo_file_lock {
-    int fd; /* descriptor of the lock file; -1: not held */
-    int slot;
-    long
-        process; /* process that took the lock: a child inherits the descriptor, but not the lock */
+    int fd;       /* descriptor of the lock file; -1: not held */
+    int slot;     /* in the registry of unfinished files (unfinished.h); -1: none */
+    long process; /* id of the process that took the lock; a child process must not release it */
     char *path;
 } ebpo_file_lock;
 
@@ -30,7 +29,7 @@ typedef struct ebpo_file_lock {
  * "waiting" to `progress`, which may be NULL. Also returns EBPO_OK, with fd = -1, where locking is
  * not possible: on file systems without locks, in folders without write permission, or where the
  * lock file's name belongs to a file that is not empty. EBPO_E_IO: another program still has the
- * lock. EBPO_E_CANCELLED, EBPO_E_MEMORY. */
+ * lock. EBPO_E_CANCELLED: `progress` has stopped the call. EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path,
                                               double seconds, const ebpo_progress *progress,
                                               ebpo_error *error);

@@ -1,8 +1,8 @@
-/* Reads whole files into memory or a workspace: meshes, images, scenes. A file that changes
- * while it is read is rejected. The size and the times of the file show a change; if the times
- * are not reliable, the bytes are compared. A file whose name comes from another file is opened
- * only below a given folder, with one system call (openat2) if available. Files of other kinds
- * are recognised by their first bytes, and the message gives a remedy. */
+/* Reads complete files (meshes, images, scenes) into memory or a workspace. A file that changes
+ * while it is read is rejected. The size and the times of the file show a change; if the times are
+ * not reliable, the bytes are compared. A file whose name comes from another file is opened only
+ * below a given folder, with one system call (openat2) if available. Files of other kinds are
+ * recognised by their first bytes, and the message gives a remedy. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -40,7 +40,7 @@ static bool is_fresh(const struct stat *st)
 ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_error *error)
 {
     *out = (ebpo_whole_file)EBPO_WHOLE_FILE_INIT;
-    /* non-blocking: a pipe must not block */
+    /* O_NONBLOCK: opening a pipe must not wait */
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (fd < 0)
         return ebpo_fail_errno(error, path, "cannot be opened for reading");
@@ -128,7 +128,7 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
                              "reading", error);
 }
 
-/* Compares the file's current content with the loaded bytes. */
+/* Compares the file's current content with the loaded bytes. Sets *same. */
 static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *same,
                                  ebpo_error *error)
 {
@@ -139,8 +139,8 @@ static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, 
         return ebpo_fail_memory(error, STEP);
     *same = true;
     EBPO_FOR_ITEMS_EVERY(file->workspace, 64, step, 0, (file->size + STEP - 1) / STEP) {
-        uint64_t at = step * STEP, left = file->size - at;
-        size_t bytes = left < STEP ? (size_t)left : STEP;
+        uint64_t at = step * STEP, remaining = file->size - at;
+        size_t bytes = remaining < STEP ? (size_t)remaining : STEP;
         status = ebpo_whole_file_read(file, at, now, bytes, path, error);
         *same = status == EBPO_OK && memcmp(now, file->data + at, bytes) == 0;
         if (!*same)
@@ -158,6 +158,7 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
         return ebpo_fail_errno(error, path, "cannot be examined");
     bool same = (uint64_t)st.st_size == file->size && st.st_mtim.tv_sec == file->mtime_s &&
                 st.st_mtim.tv_nsec == file->mtime_ns;
+    /* the modification time proves nothing then */
     bool doubtful =
         file->fresh || st.st_ctim.tv_sec != file->ctime_s || st.st_ctim.tv_nsec != file->ctime_ns;
     ebpo_status status =
@@ -223,16 +224,17 @@ static bool open_at_once(int top, const char *name, int *fd)
 #endif
 }
 
-/* Opens the folders of the path one after the other, then the file. */
-static int open_word_by_word(int top, char *name)
+/* Opens the folders of the path one after the other, then the file, without following links.
+ * Changes `name`. */
+static int open_folder_by_folder(int top, char *name)
 {
-    char *left = NULL, *word = strtok_r(name, "/", &left), *next;
+    char *remaining = NULL, *word = strtok_r(name, "/", &remaining), *next;
     int folder = dup(top), fd = -1;
     if (!word || folder < 0) {
         errno = word ? errno : ENOENT;
         return -1;
     }
-    for (; folder >= 0 && (next = strtok_r(NULL, "/", &left)); word = next) {
+    for (; folder >= 0 && (next = strtok_r(NULL, "/", &remaining)); word = next) {
         int below = strcmp(word, "..") == 0
                         ? (errno = EXDEV, -1)
                         : openat(folder, word, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
@@ -258,7 +260,7 @@ int ebpo_open_below(const char *folder, const char *name)
         return -1;
     if (!open_at_once(top, name, &fd)) {
         char *copy = strdup(name);
-        fd = copy ? open_word_by_word(top, copy) : -1;
+        fd = copy ? open_folder_by_folder(top, copy) : -1;
         int why = copy ? errno : ENOMEM;
         free(copy);
         errno = why;
@@ -269,6 +271,7 @@ int ebpo_open_below(const char *folder, const char *name)
     return fd;
 }
 
+/* ebpo_bytes_are_text checks this number of bytes */
 enum { CHECKED_BYTES = 512 };
 
 static const struct {
@@ -295,7 +298,7 @@ static const struct {
     { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
 };
 
-/* Returns true for UTF-16 text without a byte order mark: every other byte is zero. */
+/* Returns true for UTF-16 text without a byte order mark: every second byte is zero. */
 static bool is_wide(const uint8_t *data, uint64_t size)
 {
     enum { CHARACTERS = 8 };
@@ -320,7 +323,7 @@ static bool begins_with(const char *text, uint64_t size, const char *word)
     return size >= n && strncasecmp(text, word, n) == 0;
 }
 
-/* Finds markup, which may follow white space. */
+/* Recognises HTML and XML, also after white space. Returns a description and a remedy, or NULL. */
 static const char *find_markup(const char *text, uint64_t size)
 {
     for (; size && (*text == ' ' || (*text >= '\t' && *text <= '\r')); size--)

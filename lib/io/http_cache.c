@@ -1,10 +1,10 @@
-/* Caches fetched parts of a file on a server, in memory and in a folder. In memory there are cached
- * ranges, in order and without overlaps. One request fetches each range, which is kept while memory
- * allows. Ranges with prefetch hints that are not read yet are kept longest, then ranges that were
- * read last. The cache folder, if there is one, holds blocks as files, named by a digest of address
- * and version, each with a SHA-256. Blocks are written under temporary names, so any number of
- * processes may share the folder. When its limit is reached, the oldest blocks are removed. Nothing
- * depends on the folder: missing or damaged blocks are fetched. */
+/* Caches fetched parts of a file on a server, in memory and in a folder. The ranges in memory are
+ * in order and without overlaps. One request fetches a range, which stays in memory while the limit
+ * allows. Ranges that have a prefetch hint and are not read yet stay longest; then ranges that were
+ * read last. The cache folder, if there is one, contains blocks as files with a SHA-256. Their
+ * names contain a digest of URL and version. Blocks are written under temporary names, so any
+ * number of processes may share the folder. When its limit is reached, the oldest blocks are
+ * removed. The cache works without the folder: missing or damaged blocks are fetched. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -25,22 +25,22 @@
 #include "core/os.h"
 #include "io/http_cache.h"
 
-/* A block's file consists of a magic number, the block's number, its size, the SHA-256 of these
- * three and the bytes, and the bytes. */
+/* The file of a block consists of a magic number, the block's index, its size, a digest, and the
+ * block's bytes. The digest is the SHA-256 of all other bytes of the file. */
 enum { MAGIC_BYTES = 8, DIGEST_AT = 24, HEAD_BYTES = 56, NAME_BYTES = 128 };
 static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block",
                                       TEMPORARY[] = ".ebpo-part-";
-/* the writer of a temporary file older than this has ended */
+/* a temporary file that is older was left by a process that has ended */
 static const double STALE_SECONDS = 3600;
 
 struct ebpo_disk {
-    int folder;
-    uint64_t limit;
-    char key[65];
+    int folder;     /* descriptor */
+    uint64_t limit; /* bytes of all blocks */
+    char key[65];   /* digest of URL and version: beginning of the blocks' names */
     pthread_mutex_t lock;
-    uint64_t written; /* bytes since the folder was last scanned */
-    uint64_t number;  /* for temporary names */
-    uint64_t held, others;
+    uint64_t written;      /* bytes since the folder was last scanned */
+    uint64_t number;       /* for temporary names */
+    uint64_t held, others; /* see ebpo_disk_held */
 };
 
 static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t size,
@@ -53,7 +53,8 @@ static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t
     ebpo_sha256_end(&sha, out);
 }
 
-/* Makes the key; blocks of the default size keep their original names. */
+/* Makes the key. The block size is part of the key only if it is not the default, so that blocks of
+ * the default size keep the names that they had before other sizes existed. */
 static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_http_version *v)
 {
     uint8_t size[8], of_block[8], out[32];
@@ -93,7 +94,8 @@ static int is_older(const void *a, const void *b)
     return x->tv_nsec < y->tv_nsec ? -1 : x->tv_nsec > y->tv_nsec;
 }
 
-/* Lists the files of this library in the folder, and no others. */
+/* Lists the blocks in the folder. Removes old temporary files of this library. Ignores other files.
+ */
 static entry *list_entries(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
 {
     entry *entries = NULL;
@@ -133,8 +135,9 @@ static void count_held(ebpo_disk *d)
     uint64_t count, bytes;
     entry *entries = list_entries(d, &count, &bytes);
     for (uint64_t i = 0; i < count; i++) {
-        uint64_t own = entries[i].bytes > HEAD_BYTES ? entries[i].bytes - HEAD_BYTES : 0;
-        *(strncmp(entries[i].name, d->key, sizeof d->key - 1) == 0 ? &d->held : &d->others) += own;
+        uint64_t bytes_in_block = entries[i].bytes > HEAD_BYTES ? entries[i].bytes - HEAD_BYTES : 0;
+        *(strncmp(entries[i].name, d->key, sizeof d->key - 1) == 0 ? &d->held : &d->others) +=
+            bytes_in_block;
     }
     free(entries);
 }
@@ -145,8 +148,8 @@ void ebpo_disk_held(const ebpo_disk *d, uint64_t *held, uint64_t *others)
     *others = d->others;
 }
 
-/* Removes the oldest blocks; called after each eighth of the limit is written, so one process alone
- * stays below the limit. */
+/* Removes the oldest blocks; called after each eighth of the limit is written, so that a single
+ * process stays below the limit. */
 static void trim_folder(ebpo_disk *d)
 {
     uint64_t count, bytes;
@@ -198,7 +201,7 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     *out = NULL;
     int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !is_writable(fd)) {
-        /* with too many open files or without memory, another folder does not help */
+        /* if too many files are open or memory is short, another folder does not help */
         bool folders = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
         ebpo_status status = ebpo_fail_file(error, folders ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
                                             "cannot be used as a cache folder: %s%s",
@@ -270,8 +273,8 @@ static bool write_fully(int fd, const void *data, size_t size)
     return true;
 }
 
-/* Reads a block of `size` bytes (the last block of the file has fewer). Returns false if it is
- * missing. */
+/* Reads a block of `size` bytes (the last block of the file is smaller). Returns false if the block
+ * is missing or damaged. */
 static bool get_block(ebpo_disk *d, uint64_t block, void *data, size_t size)
 {
     char name[NAME_BYTES];
@@ -288,13 +291,14 @@ static bool get_block(ebpo_disk *d, uint64_t block, void *data, size_t size)
         good = memcmp(sum, head + DIGEST_AT, sizeof sum) == 0;
     }
     if (good)
-        (void)!futimens(fd, NULL); /* marks it as used now; may fail in a read-only folder */
+        (void)!futimens(fd, NULL); /* marks the block as used now; fails in a read-only folder */
     close(fd);
     if (!good)
         unlinkat(d->folder, name, 0);
     return good;
 }
 
+/* Writes a block. Ignores failures. */
 static void put_block(ebpo_disk *d, uint64_t block, const void *data, size_t size)
 {
     char name[NAME_BYTES], temporary[NAME_BYTES];
@@ -334,15 +338,16 @@ enum {
      * another request */
     GAP_BYTES = 16384,
     GAP_BYTES_OF_MANY = 32768,
-    MANY = 256,
-    STALE_AFTER = 64 /* after so many later hints, a hinted range will probably not be read */
+    MANY = 256, /* for more ranges, GAP_BYTES_OF_MANY is used */
+    STALE_AFTER =
+        64 /* after this number of later hints, a hinted range will probably not be read */
 };
 
 typedef enum range_state {
     RANGE_NOTED,   /* nothing fetched */
     RANGE_LOADING, /* a thread reads the range from disk */
     RANGE_COMING,  /* requested */
-    RANGE_THERE
+    RANGE_IN_MEMORY
 } range_state;
 
 struct ebpo_cached_range {
@@ -352,9 +357,9 @@ struct ebpo_cached_range {
     uint64_t used;      /* time of the last read, by p->clock */
     bool fresh;         /* made for the current prefetch hint */
     range_state state;
-    unsigned users; /* threads that need the range to stay in the list */
+    unsigned users; /* number of threads that need the range to stay in the list */
     bool demanded;  /* a reader waits for the range, and receives the error of its request */
-    bool to_store;  /* fetched, not on disk yet */
+    bool to_store;  /* to be written to disk when it has been fetched */
     /* the requested part: blocks at the ends of the range may have come from disk */
     uint64_t fetch_begin, fetch_end;
     ebpo_request request;
@@ -451,15 +456,15 @@ static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 
 /* --- fetching --- */
 
-/* Returns true if a range holds the whole block at an offset, or as much of it as the file has.
- * Only such blocks are stored on disk. */
+/* Returns true if a range that ends at `end` contains the whole block that begins at `at`. The last
+ * block of the file ends with the file. Only whole blocks are stored on disk. */
 static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 {
     return at % p->block == 0 && (end - at >= p->block || end == p->size);
 }
 
-/* Reads blocks from disk, from both ends inwards; the lock is released meanwhile. The rest must be
- * requested. */
+/* Reads blocks of a range from disk, from both ends inwards; the lock is released meanwhile. Sets
+ * fetch_begin and fetch_end to the part in the middle that must be requested. */
 static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
 {
     uint64_t begin = range->begin, end = range->end, got = 0;
@@ -487,14 +492,16 @@ static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
     p->disk_hits += begin == end;
 }
 
-/* Returns true if no thread needs the range to stay. */
+/* Returns true if no thread needs the range, and its data can be dropped. */
 static bool is_idle(const ebpo_cached_range *range)
 {
     return range->users == 0 && range->data &&
-           (range->state == RANGE_THERE || (range->state == RANGE_COMING && range->request.done));
+           (range->state == RANGE_IN_MEMORY ||
+            (range->state == RANGE_COMING && range->request.done));
 }
 
-/* Drops the range that was read least recently; if none was read, a range with an old hint. */
+/* Drops the range that was read least recently; if there is none, a range with an old hint. Returns
+ * false if no range can be dropped. */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
@@ -515,16 +522,18 @@ static bool forget_one(ebpo_range_cache *p)
     return true;
 }
 
+/* Drops ranges until `bytes` more bytes fit the limit, as far as possible. */
 static void reserve_space(ebpo_range_cache *p, uint64_t bytes)
 {
     while (p->held + bytes > p->held_limit && forget_one(p))
         ;
 }
 
-/* Requests a range that is only noted (RANGE_NOTED). Returns false when memory is short. */
+/* Loads a range with the state RANGE_NOTED from disk, and requests the missing part. Returns false
+ * when memory is short. */
 static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool urgent)
 {
-    range->users++; /* must not be dropped here */
+    range->users++; /* so that reserve_space does not drop this range */
     reserve_space(p, bytes_of(range));
     range->users--;
     range->data = ebpo_alloc(bytes_of(range), 1);
@@ -540,7 +549,7 @@ static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool ur
     }
     range->to_store = p->disk && range->fetch_begin < range->fetch_end;
     if (range->fetch_begin == range->fetch_end) {
-        range->state = RANGE_THERE;
+        range->state = RANGE_IN_MEMORY;
         pthread_cond_broadcast(&p->done);
         return true;
     }
@@ -553,8 +562,8 @@ static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool ur
     return true;
 }
 
-/* Ends this thread's use of a range, after reading `read` bytes of it. Its data stays until the
- * memory is needed. */
+/* Ends this thread's use of a range, after reading `read` bytes of the range. The data stays until
+ * the memory is needed. */
 static void release_range(ebpo_range_cache *p, ebpo_cached_range *range, uint64_t read)
 {
     range->users--;
@@ -571,7 +580,7 @@ static void release_range(ebpo_range_cache *p, ebpo_cached_range *range, uint64_
         remove_at(p, find_range(p, range->begin));
 }
 
-/* Reads ahead from an offset in the file, as far as the limit allows. */
+/* Requests the hinted ranges from an offset on, as far as the limit allows. */
 static void read_ahead(ebpo_range_cache *p, uint64_t from)
 {
     for (uint64_t i = find_range(p, from); i < p->count; i = find_range(p, from)) {
@@ -579,7 +588,7 @@ static void read_ahead(ebpo_range_cache *p, uint64_t from)
         from = range->end;
         if (range->state != RANGE_NOTED || range->wanted == 0)
             continue;
-        range->users++; /* must not be dropped here */
+        range->users++; /* so that reserve_space does not drop this range */
         reserve_space(p, bytes_of(range));
         bool fits = p->held + bytes_of(range) <= p->held_limit && start_request(p, range, false);
         release_range(p, range, 0);
@@ -610,7 +619,8 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
     }
 }
 
-/* Makes cached ranges for hinted ranges (sorted), one for hinted ranges that are close together. */
+/* Makes cached ranges for the hinted ranges, which are sorted. Hinted ranges that are close
+ * together become one cached range. */
 static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
     uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
@@ -627,7 +637,8 @@ static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t 
     uint64_t first = find_range(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
-        p->range[i]->fresh |= p->range[i]->wanted == 0; /* was read before, and is needed again */
+        p->range[i]->fresh |=
+            p->range[i]->wanted == 0; /* the range was read before, and is needed again */
     for (size_t i = 0; i < count; i++)
         add_wanted(p, &sorted[i]);
     for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
@@ -652,25 +663,26 @@ void ebpo_range_cache_hint(ebpo_range_cache *p, const ebpo_range *ranges, size_t
 
 /* --- reading --- */
 
-/* Stores a block; the lock is released meanwhile. */
-static void store_block(ebpo_range_cache *p, ebpo_cached_range *range)
+/* Stores the fetched blocks of a range on disk; the lock is released meanwhile. */
+static void store_blocks(ebpo_range_cache *p, ebpo_cached_range *range)
 {
     range->to_store = false;
     pthread_mutex_unlock(&p->lock);
     for (uint64_t at = range->fetch_begin; at < range->fetch_end; at += p->block) {
-        uint64_t left = range->fetch_end - at;
+        uint64_t remaining = range->fetch_end - at;
         if (has_block(p, at, range->fetch_end))
             put_block(p->disk, at / p->block, range->data + (at - range->begin),
-                      (size_t)(left < p->block ? left : p->block));
+                      (size_t)(remaining < p->block ? remaining : p->block));
     }
     pthread_mutex_lock(&p->lock);
 }
 
-static bool has_come(const ebpo_cached_range *range)
+/* Returns true if a range has been fetched and is not on disk yet. */
+static bool is_to_be_stored(const ebpo_cached_range *range)
 {
-    return range->to_store &&
-           (range->state == RANGE_THERE || (range->state == RANGE_COMING && range->request.done &&
-                                            range->request.status == EBPO_OK));
+    return range->to_store && (range->state == RANGE_IN_MEMORY ||
+                               (range->state == RANGE_COMING && range->request.done &&
+                                range->request.status == EBPO_OK));
 }
 
 /* Stores one range that has arrived but has not been read, so that it is not lost when the process
@@ -679,10 +691,10 @@ static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
         ebpo_cached_range *range = p->range[i];
-        if (!has_come(range))
+        if (!is_to_be_stored(range))
             continue;
         range->users++;
-        store_block(p, range);
+        store_blocks(p, range);
         range->users--;
         return true;
     }
@@ -693,10 +705,10 @@ static bool store_one(ebpo_range_cache *p)
  * again. */
 static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, ebpo_error *error)
 {
-    while (range->state != RANGE_THERE) {
+    while (range->state != RANGE_IN_MEMORY) {
         if (range->state == RANGE_COMING && range->request.done) {
             if (range->request.status == EBPO_OK) {
-                range->state = RANGE_THERE;
+                range->state = RANGE_IN_MEMORY;
                 break;
             }
             if (range->demanded || range->request.status == EBPO_E_CANCELLED) {
@@ -719,11 +731,11 @@ static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, eb
             pthread_cond_wait(&p->done, &p->lock);
     }
     if (range->to_store)
-        store_block(p, range);
+        store_blocks(p, range);
     return EBPO_OK;
 }
 
-/* Reads bytes [at, end) as far as one range has them; advances *at. */
+/* Reads bytes [*at, end) as far as one range contains them; advances *at. */
 static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, uint8_t *data,
                               ebpo_error *error)
 {
@@ -748,7 +760,7 @@ static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, u
     return status;
 }
 
-/* Requests all ranges of a long range at the same time. */
+/* Requests all cached ranges of [begin, end) at the same time. */
 static void begin_read(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = find_range(p, begin); i < p->count && p->range[i]->begin < end;
@@ -780,7 +792,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
     }
     for (uint64_t i = find_range(p, at);
          status != EBPO_OK && i < p->count && p->range[i]->begin < end; i++)
-        /* this reader does not receive failures of these requests any more */
+        /* this reader gives up, and does not receive the errors of these requests any more */
         p->range[i]->demanded = p->range[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);

@@ -1,7 +1,8 @@
 /* Parses the head of a server's response line by line, and compares it with the request. A response
- * is a part of the file, all of it, a reason to try again later, or refused: ranges, lengths,
- * versions (entity tags or dates) and encodings must all fit. This file reads nothing from the
- * network, so tests and fuzzers pass any bytes. Source: RFC 9110, sections 8.8, 14 and 15. */
+ * is a part of the file, or the whole file, or a reason to try again later; all other responses are
+ * refused. Ranges, lengths, versions (entity tags or dates) and encodings must fit the request.
+ * This file reads nothing from the network, so tests and fuzzers pass any bytes. Source: RFC 9110,
+ * sections 8.8, 14 and 15. */
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -53,7 +54,8 @@ static bool parse_token(const char **at, const char *end, char c)
     return true;
 }
 
-/* Parses "bytes 0-99/1000" or "bytes * / 1000" without the blanks; a size of "*" means no size. */
+/* Parses "bytes 0-99/1000" or "bytes * / 1000" without the blanks; a size of "*" means that the
+ * size is not known. */
 static bool content_range(ebpo_http_response *a, const char *at, const char *end)
 {
     uint64_t begin = 0, last = 0, total = 0;
@@ -82,7 +84,8 @@ static bool content_range(ebpo_http_response *a, const char *at, const char *end
     return true;
 }
 
-/* Returns "text/html" of "Text/HTML; charset=utf-8". */
+/* Stores the type in lower case and without parameters: "text/html" for "Text/HTML; charset=utf-8".
+ */
 static void keep_type(char out[EBPO_HTTP_TYPE_BYTES], const char *text, size_t length)
 {
     size_t i = 0;
@@ -100,7 +103,8 @@ bool ebpo_http_response_is_text(const char *type)
            (length >= 3 && strcmp(type + length - 3, "xml") == 0);
 }
 
-/* Stores a text, or its digest if the text is too long, because it is only used in comparisons. */
+/* Stores a text, or its digest if the text is too long. The text is only compared, so a digest
+ * suffices. */
 static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
 {
     if (length < EBPO_HTTP_TAG_BYTES) {
@@ -165,6 +169,7 @@ static ebpo_verdict give_verdict(ebpo_verdict verdict, char why[EBPO_WHY_BYTES],
     return verdict;
 }
 
+/* Returns true for a status after which the same request may succeed later. */
 static bool is_temporary(int code)
 {
     return code == 408 || code == 429 || code == 500 || code == 502 || code == 503 || code == 504;
@@ -191,6 +196,7 @@ static const char *what_changed(const ebpo_http_response *a, const ebpo_http_req
     return NULL;
 }
 
+/* Judges a response with status 206 (a part). */
 static ebpo_verdict judge_part(const ebpo_http_response *a, const ebpo_http_request *request,
                                char why[EBPO_WHY_BYTES])
 {
@@ -217,6 +223,7 @@ static ebpo_verdict judge_part(const ebpo_http_response *a, const ebpo_http_requ
     return EBPO_HTTP_PART;
 }
 
+/* Judges a response with status 200 (the whole file). */
 static ebpo_verdict judge_whole(const ebpo_http_response *a, const ebpo_http_request *request,
                                 ebpo_status *status, char why[EBPO_WHY_BYTES])
 {

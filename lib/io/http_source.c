@@ -1,6 +1,7 @@
 /* Provides the source for a URL: its options are checked and copied, the first request returns the
  * file's size, version and head, and reads use the cache of ranges (http_cache.c). A server that
- * does not support ranges sends the whole file, which is then kept in memory, up to a limit. */
+ * does not support ranges sends the whole file, which then stays in memory, if it is not larger
+ * than a limit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,8 +18,8 @@ typedef struct http_source {
     char *url;
     char shown_url[EBPO_SHOWN_BYTES]; /* for messages: without passwords */
     ebpo_http_options options;        /* owns its texts */
-    ebpo_range_cache cache;           /* also has the lock and the transfers */
-    bool has_lock;
+    ebpo_range_cache cache;           /* also contains the lock and the transfers */
+    bool has_lock;                    /* the lock and the condition of `cache` exist */
     ebpo_http_version version;
     uint8_t *head; /* the first bytes, or the whole file, kept in memory */
     uint64_t head_bytes;
@@ -77,7 +78,8 @@ static void free_options(ebpo_http_options *o)
     free((void *)(uintptr_t)o->headers);
 }
 
-/* Returns true for a single header line; a line break could inject another header. */
+/* Returns true for a single line "Name: value". A line break is refused, because it could inject
+ * another header. */
 static bool header_ok(const char *line)
 {
     const char *colon = strchr(line, ':');
@@ -194,7 +196,8 @@ static void pin_version(http_source *s)
     pthread_mutex_unlock(&s->cache.lock);
 }
 
-/* Rejects an HTML or XML page: servers send one with a success status where a login is required. */
+/* Rejects an HTML or XML page. Servers send such a page with a success status if a login is
+ * required. */
 static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_error *error)
 {
     static const char signature[] = "\211HDF", blanks[] = " \t\r\n\357\273\277";
@@ -206,8 +209,8 @@ static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_
                      (s->head_bytes >= 4 && memcmp(s->head, signature, 4) == 0)))
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_IO, s->shown_url,
-                          "the server returned %s, not a model; check the address, and whether it "
-                          "wants a login",
+                          "the server returned %s, not a model; check the address, and whether the "
+                          "server requires a login",
                           *r->type ? r->type : "a page of HTML or XML");
 }
 
@@ -234,8 +237,8 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return check_type(s, &r, error);
 }
 
-/* Reads the whole file at once. This is necessary without ETag and Last-Modified: two responses may
- * then belong to different versions. */
+/* Reads the whole file with one request. Without ETag and Last-Modified this is necessary, because
+ * two responses may belong to different versions. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)

@@ -1,9 +1,10 @@
 /* Sends requests for byte ranges through libcurl, which one thread drives. Requests wait in a
- * queue, urgent ones first; up to EBPO_SLOTS_MAX run at once, each in a slot with a reusable
- * handle. A response is judged by its head (http_response.c), before its body is accepted. If a
- * body breaks off, its bytes are kept, and the next attempt requests the rest, after growing
- * pauses. At most five redirects are followed, never from https to http, and the caller's
- * credentials are not sent to another server. The lock belongs to the caller (http_transfer.h). */
+ * queue, urgent requests first. At most EBPO_SLOTS_MAX requests run at once, each in a slot with a
+ * reusable handle. A response is judged by its head (http_response.c), before its body is accepted.
+ * If a body breaks off, the received bytes are kept, and the next attempt requests the missing
+ * bytes, after a pause that grows with each attempt. At most five redirects are followed, never
+ * from https to http, and the caller's credentials are not sent to another server. The lock belongs
+ * to the caller (http_transfer.h). */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -21,13 +22,14 @@
 #include "io/http_response.h"
 #include "io/http_transfer.h"
 
-/* --- redirects: the target of a request, and whether it is still the original server --- */
+/* --- redirects: the target of a request, and whether the target is still on the original server
+ * --- */
 
 /* Redirects of one attempt; zeroed: none so far. */
 typedef struct ebpo_redirect {
-    CURLU *at;      /* the latest address, or NULL: the original one */
-    char *target;   /* target in the current head, or NULL */
-    bool elsewhere; /* the scheme, host or port differs, or is not known */
+    CURLU *at;      /* the latest address; NULL: the original address */
+    char *target;   /* target that the current head names, or NULL */
+    bool elsewhere; /* the scheme, host or port differs from the original, or is not known */
 } ebpo_redirect;
 
 /* Clears the redirects, for another attempt or at the end. */
@@ -63,7 +65,7 @@ static bool stays_on_server(ebpo_redirect *r, const char *url)
         if (r->at && curl_url_set(r->at, CURLUPART_URL, url, 0) != CURLUE_OK)
             r->elsewhere = true;
     }
-    /* the second address may be relative to the first */
+    /* the target may be relative to the latest address */
     bool stays = first && r->at && curl_url_set(first, CURLUPART_URL, url, 0) == CURLUE_OK &&
                  curl_url_set(r->at, CURLUPART_URL, r->target, CURLU_URLENCODE) == CURLUE_OK &&
                  same_server(first, r->at);
@@ -71,6 +73,7 @@ static bool stays_on_server(ebpo_redirect *r, const char *url)
     return stays;
 }
 
+/* Stores the target without surrounding blanks. */
 static void keep_target(ebpo_redirect *r, const char *from, size_t size)
 {
     while (size && (*from == ' ' || *from == '\t')) {
@@ -84,23 +87,23 @@ static void keep_target(ebpo_redirect *r, const char *from, size_t size)
     r->elsewhere = r->elsewhere || !r->target;
 }
 
-/* Reads one unmodified line of a head; `code` is that of the response. Returns true when the line
- * redirects the request to another server for the first time. */
+/* Reads one unmodified line of a head. `code`: status of the response. Returns true when the line
+ * redirects the request to another server, and no earlier line did. */
 static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line,
                                size_t size)
 {
     static const char name[] = "location:";
-    bool ends = size <= 2 && (size == 0 || line[0] == '\r' || line[0] == '\n'),
-         before = r->elsewhere;
+    bool is_last = size <= 2 && (size == 0 || line[0] == '\r' || line[0] == '\n'),
+         was_elsewhere = r->elsewhere;
     if (size >= sizeof name && strncasecmp(line, name, sizeof name - 1) == 0)
         keep_target(r, line + sizeof name - 1, size - (sizeof name - 1));
-    if (!ends || !r->target)
-        return r->elsewhere && !before;
+    if (!is_last || !r->target)
+        return r->elsewhere && !was_elsewhere;
     if (code / 100 == 3 && !stays_on_server(r, url))
         r->elsewhere = true;
     free(r->target);
     r->target = NULL;
-    return r->elsewhere && !before;
+    return r->elsewhere && !was_elsewhere;
 }
 
 /* --- slots for running requests --- */
@@ -114,7 +117,7 @@ typedef struct ebpo_slot {
     ebpo_transfers *owner;
     CURL *easy;
     ebpo_request *request;    /* NULL: free */
-    ebpo_http_version pinned; /* a copy for this attempt */
+    ebpo_http_version pinned; /* the required version, copied for this attempt */
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
@@ -125,8 +128,8 @@ typedef struct ebpo_slot {
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
     uint64_t begin, end;                /* range of this attempt */
-    uint64_t received, taken, unwanted; /* bytes of its body */
-    char trouble[CURL_ERROR_SIZE];
+    uint64_t received, taken, unwanted; /* bytes of the body: all, accepted, ignored */
+    char trouble[CURL_ERROR_SIZE];      /* libcurl's error message */
 } ebpo_slot;
 
 struct ebpo_transfers {
@@ -135,14 +138,14 @@ struct ebpo_transfers {
     pthread_mutex_t *lock;
     pthread_cond_t *done;
     CURLM *multi;
-    struct curl_slist *headers, *bare_headers; /* with and without the caller's headers */
+    struct curl_slist *headers, *bare_headers; /* headers with, and without, those of the caller */
     pthread_t thread;
     bool running;
     ebpo_slot slots[EBPO_SLOTS_MAX];
     unsigned slot_count, active;
     /* Guarded by the lock. */
     bool quit, cancelled;
-    ebpo_request *queue; /* urgent ones first */
+    ebpo_request *queue; /* urgent requests first */
     ebpo_http_version pinned;
     bool is_pinned;
     ebpo_http_stats stats;
@@ -152,15 +155,16 @@ struct ebpo_transfers {
 
 enum {
     REDIRECTS_MAX = 5,
-    STALL_BYTES = 100, /* per second */
-    /* an unwanted body up to this size is read to its end, which keeps the connection */
+    STALL_BYTES = 100, /* fewer bytes per second are a stall */
+    /* an unwanted body up to this size is read to its end, so that the connection can be used again
+     */
     DRAIN_BYTES = 65536
 };
 
 /* --- callbacks of libcurl --- */
 
-/* Checks for stalls, some ten times a second during a request. libcurl's own measure of speed is an
- * average over several seconds. */
+/* Checks for stalls, about ten times a second during a request. Returns a number other than 0 to
+ * stop the request. libcurl's own measure of speed is an average over several seconds. */
 static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
                        curl_off_t uploaded)
 {
@@ -186,7 +190,8 @@ static size_t receive_header(char *line, size_t size, size_t count, void *user)
     ebpo_slot *s = user;
     s->moved = ebpo_seconds();
     ebpo_http_response_line(&s->response, line, size * count);
-    /* headers for one server are not for others, but libcurl would send them */
+    /* the caller's headers are for the original server only, but libcurl would send them to any
+     * server */
     if (take_redirect_line(&s->redirect, s->owner->url, s->response.code, line, size * count))
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, s->owner->bare_headers);
     if (s->response.header_bytes <= EBPO_HTTP_HEADERS_MAX)
@@ -267,8 +272,8 @@ static size_t receive_body(char *bytes, size_t size, size_t count, void *user)
 
 static bool is_https(const char *url) { return url[4] == 's' || url[4] == 'S'; }
 
-/* Sets the options that are the same for all requests. The owner's url, options and headers are
- * set. */
+/* Sets the options that are the same for all requests. The url, options and headers of s->owner
+ * must be set. */
 static bool set_up_slot(ebpo_slot *s)
 {
     const ebpo_transfers *t = s->owner;
@@ -318,8 +323,8 @@ static bool set_up_slot(ebpo_slot *s)
 }
 
 enum {
-    CHECK_MS = 100, /* between checks of `stop` and for stalls */
-    IDLE_MS = 60000
+    CHECK_MS = 100, /* milliseconds between checks of `stop` and for stalls */
+    IDLE_MS = 60000 /* greatest waiting time without running requests */
 };
 static const double PAUSE_FIRST = 0.2, PAUSE_MAX = 8, PAUSE_BY_SERVER_MAX = 60; /* seconds */
 
@@ -482,8 +487,9 @@ static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status statu
 
 /* --- attempts, by the thread --- */
 
-/* Returns the seconds until the next attempt: doubling, with jitter so that many readers do not
- * return at once. A longer pause that the server requests takes precedence. */
+/* Returns the seconds until the next attempt. The pause doubles with each failure and is varied at
+ * random, so that many readers do not return at the same time. If the server requests a longer
+ * pause, returns that pause. *by_server: true if it does. */
 static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server)
 {
     curl_off_t retry_after = 0;
@@ -501,10 +507,10 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
     char range[64];
-    bool begun = r->first && r->got > 0;
+    bool has_version = r->first && r->got > 0;
     s->request = r;
-    s->is_pinned = t->is_pinned || begun;
-    s->pinned = begun ? r->version : t->pinned;
+    s->is_pinned = t->is_pinned || has_version;
+    s->pinned = has_version ? r->version : t->pinned;
     s->response = (ebpo_http_response){ .code = 0 };
     s->has_verdict = s->stopped = s->stalled = s->sent = false;
     s->status = EBPO_E_IO;
@@ -514,13 +520,13 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     s->received = s->taken = s->unwanted = 0;
     if (r->deadline <= 0)
         r->deadline = now + t->options->time_limit;
-    double left = (r->deadline - now) * 1000;
+    double remaining_ms = (r->deadline - now) * 1000;
     snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
     if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
     clear_redirect(&s->redirect);
-    curl_easy_setopt(s->easy, CURLOPT_TIMEOUT_MS, (long)(left > 1 ? left : 1));
+    curl_easy_setopt(s->easy, CURLOPT_TIMEOUT_MS, (long)(remaining_ms > 1 ? remaining_ms : 1));
     t->stats.requests++;
     t->stats.retries += r->failures > 0;
     t->active++;
@@ -546,7 +552,8 @@ static bool is_temporary(CURLcode code)
     }
 }
 
-/* Keeps received bytes, so that the next attempt requests only the rest. */
+/* Keeps received bytes, so that the next attempt requests only the missing bytes. Returns true if
+ * the request is complete. */
 static bool keep_arrived(ebpo_slot *s, CURLcode code)
 {
     ebpo_request *r = s->request;
@@ -565,14 +572,14 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
         memcpy(r->version.etag, s->response.etag, sizeof r->version.etag);
         memcpy(r->version.modified, s->response.modified, sizeof r->version.modified);
     }
-    free(r->whole); /* an earlier response began to send everything */
+    free(r->whole); /* from an earlier response that began to send the whole file */
     r->whole = NULL;
     r->whole_capacity = 0;
     r->got = s->begin - r->offset + s->taken;
     return r->got == r->size;
 }
 
-/* Returns the text of libcurl's error. libcurl reports a line that is too long for it as a lack of
+/* Returns the text of libcurl's error. libcurl reports a header line that is too long as a lack of
  * memory. */
 static const char *error_text(const ebpo_slot *s, CURLcode code)
 {
@@ -597,8 +604,8 @@ static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t 
         snprintf(out, capacity, "%s", trouble);
 }
 
-/* Returns true if the rest may come in another response; false if a change of version would go
- * unnoticed. */
+/* Returns true if another response may complete the request. Returns false if the version is not
+ * known, because a change of version would then remain undetected. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
@@ -613,7 +620,7 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     if (code == CURLE_OK && s->has_verdict && s->verdict == EBPO_HTTP_PART && s->taken &&
         s->taken == s->response.last - s->response.begin + 1 && may_join(t, r) &&
         now < r->deadline) {
-        r->due = now; /* the server sends smaller parts than requested: not a failure */
+        r->due = now; /* the server sends smaller parts than requested, which is no failure */
         enqueue_request(t, r);
         return;
     }
@@ -647,6 +654,7 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     finish_request(t, r, EBPO_E_IO, why);
 }
 
+/* Ends an attempt: finishes the request, or schedules another attempt. `code`: libcurl's result. */
 static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
     long connections = 0, redirects = 0;
@@ -688,8 +696,8 @@ static void cancel_queue(ebpo_transfers *t)
     }
 }
 
-/* Returns the number of slots, fewer for large requests: they would only share the bandwidth, and
- * the first one would arrive last. */
+/* Returns the number of slots that a request may use. The number is less for large requests: they
+ * would only share the bandwidth, so that the first request would end late. */
 static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
 {
     enum { LARGE_BYTES = 1 << 20, LARGE_AT_A_TIME = 6 };
@@ -697,8 +705,9 @@ static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
                                                                     : t->slot_count;
 }
 
-/* Lock held. Ends requests that have waited too long for a slot; *wait: seconds until the next is
- * due. */
+/* Lock held. Removes the next request that can start from the queue and returns it, or NULL. Ends
+ * requests that have waited too long. Shortens *wait to the seconds until the next request is due.
+ */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
 {
     for (ebpo_request **at = &t->queue; *at;) {
@@ -734,7 +743,7 @@ static ebpo_slot *free_slot(ebpo_transfers *t)
     return NULL;
 }
 
-/* Starts due requests. Returns false at the end. */
+/* Starts due requests. Returns false when the thread must end. *wait: as in next_due. */
 static bool start_due(ebpo_transfers *t, double *wait)
 {
     ebpo_request *r;
@@ -755,6 +764,7 @@ static bool start_due(ebpo_transfers *t, double *wait)
     return !quit;
 }
 
+/* Cancels all requests if the caller's `stop` function returns true. */
 static void check_stop(ebpo_transfers *t)
 {
     const ebpo_http_options *o = t->options;
@@ -775,21 +785,23 @@ static void check_stop(ebpo_transfers *t)
     pthread_mutex_unlock(t->lock);
 }
 
+/* The thread that drives libcurl. */
 static void *drive_transfers(void *transfers)
 {
     ebpo_transfers *t = transfers;
     for (;;) {
-        int running = 0, left = 0;
+        int running = 0, message_count = 0;
         double wait = IDLE_MS * 0.001;
         if (!start_due(t, &wait))
             return NULL;
         curl_multi_perform(t->multi, &running);
         bool ended = false;
-        for (CURLMsg *m; (m = curl_multi_info_read(t->multi, &left)) != NULL;) {
+        for (CURLMsg *m; (m = curl_multi_info_read(t->multi, &message_count)) != NULL;) {
             char *private = NULL;
             if (m->msg != CURLMSG_DONE)
                 continue;
-            CURLcode code = m->data.result; /* the message becomes invalid with the handle */
+            CURLcode code =
+                m->data.result; /* read now, because end_attempt makes the message invalid */
             curl_easy_getinfo(m->easy_handle, CURLINFO_PRIVATE, &private);
             end_attempt(t, (ebpo_slot *)(void *)private, code);
             ended = true;

@@ -9,36 +9,38 @@
 
 #include "io/http_response.h"
 
-/* A requested byte range, and its result. Zero-initialise it, fill in the members up to `first`,
- * and do not move it until it is done. */
+/* A requested byte range, and its result. Initialise a request with zeros, fill in the members up
+ * to `first`, and do not move the request until it is done. */
 typedef struct ebpo_request {
     uint64_t offset, size; /* size > 0 */
     uint8_t *data;         /* [size] */
-    /* true while the file's size and version are not known: the file may be shorter than the range,
-     * and the server may send all of it */
+    /* true for the first request, when the file's size and version are not known: the file may be
+     * shorter than the range, and the server may send the whole file */
     bool first;
     /* Valid when done. */
     bool done;
     ebpo_status status;
     ebpo_error error;
     uint64_t got; /* bytes received; fewer than `size` only if `first` and the file is shorter */
-    /* if `first` and the server has no ranges: all version.size bytes of the file, which the
-     * receiver frees; `data` is unused then */
+    /* if `first` is true and the server does not support ranges: all version.size bytes of the
+     * file, which the caller frees; `data` is then unused */
     uint8_t *whole;
-    ebpo_http_version version; /* `first` */
+    ebpo_http_version version; /* set if `first` is true */
     char type[EBPO_HTTP_TYPE_BYTES];
     /* Private to the transfers. */
     struct ebpo_request *next;
     unsigned failures;
-    double due, deadline; /* seconds; deadline 0: no reader waits and nothing was sent yet */
+    double due;      /* time of the next attempt, in seconds of ebpo_seconds */
+    double deadline; /* end of the time limit; 0: no reader waits and nothing was sent yet */
     uint64_t whole_capacity;
 } ebpo_request;
 
 typedef struct ebpo_transfers ebpo_transfers;
 
-/* Makes transfers. The texts of `options` must outlive them. Functions marked "Lock held" are
- * called with `lock` held; wait for a request on `done`, which is broadcast whenever one ends.
- * `url`: with user and password, if any; `shown`: for messages. */
+/* Makes transfers: a queue of requests, and the thread that sends them. The texts of `options` must
+ * outlive the transfers. Functions marked "Lock held" are called with `lock` held. `done` is
+ * broadcast whenever a request ends. `url`: with user and password, if any; `shown`: the URL for
+ * messages. */
 EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url,
                                               const char *shown, const ebpo_http_options *options,
                                               pthread_mutex_t *lock, pthread_cond_t *done,
@@ -47,12 +49,12 @@ EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *
  * is allowed. The lock must not be held. */
 void ebpo_transfers_free(ebpo_transfers *transfers);
 
-/* Lock held. Queues a request; `urgent` ones come first. */
+/* Lock held. Queues a request. Urgent requests are sent before all others. */
 void ebpo_transfers_add(ebpo_transfers *transfers, ebpo_request *request, bool urgent);
-/* Lock held. Marks a request as waited for: it moves to the front of the queue, and its time limit
- * begins. */
+/* Lock held. Marks a request as waited for: the request becomes urgent, and its time limit begins.
+ */
 void ebpo_transfers_urge(ebpo_transfers *transfers, ebpo_request *request);
-/* Lock held. Requires this version in all further responses. */
+/* Lock held. Refuses responses with another version from now on. */
 void ebpo_transfers_pin(ebpo_transfers *transfers, const ebpo_http_version *version);
 /* Lock held. Adds the numbers of requests, retries, connections and bytes to *stats. */
 void ebpo_transfers_add_stats(const ebpo_transfers *transfers, ebpo_http_stats *stats);

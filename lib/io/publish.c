@@ -28,14 +28,15 @@
 /* --- properties that a new file takes over from the replaced one --- */
 
 #ifdef EBPO_HAVE_XATTR
-/* No system allows more bytes of names or of a value. */
+/* Bytes of all names, and of a value; no system allows more. */
 enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
 static void copy_attribute(int from, int to, const char *name, void *value)
 {
     ssize_t size = fgetxattr(from, name, value, VALUE_MAX);
     if (size >= 0)
-        (void)!fsetxattr(to, name, value, (size_t)size, 0); /* where the system allows */
+        (void)!fsetxattr(to, name, value, (size_t)size,
+                         0); /* may fail: the system need not allow it */
 }
 
 static void copy_attributes(int from, int to)
@@ -53,9 +54,9 @@ static void copy_attributes(int from, int to)
 static void copy_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
-/* Sets the owner and group of `was`, and returns the mode that fits them. If the process may not
- * give the file away, the file stays the process's, without the bits that let it act for its owner
- * (set-user-ID). */
+/* Gives the file the owner and group of `was`, and returns the mode to set. If the system does not
+ * allow this, the new file belongs to this process's user, and the mode lacks the bits that let a
+ * program act for its owner (set-user-ID). */
 static mode_t copy_owner(int to, const struct stat *was)
 {
     struct stat is;
@@ -134,15 +135,16 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         }
         if (strlen(publish->temporary) >= PATH_MAX)
             return ebpo_fail_file(error, EBPO_E_IO, publish->shown,
-                                  "the path is too long; write to a folder with a shorter one");
-        /* Registered for the signal handler before the file exists, so that a signal never leaves
-         * it behind. */
+                                  "the path is too long; write to a folder with a shorter path");
+        /* Registers the name for the signal handler before the file exists, so that a signal never
+         * leaves the file behind. */
         ebpo_unfinished_set(publish->slot, publish->temporary);
-        /* Content that others may not read stays private meanwhile. */
+        /* Mode 0600: the file that is replaced may be private, so its new content stays private,
+         * too. */
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
         if (publish->fd >= 0) {
-            /* for programs that remove abandoned files */
+            /* shows programs that remove abandoned files that this file is in use */
             (void)flock(publish->fd, LOCK_EX | LOCK_NB);
             return EBPO_OK;
         }
@@ -151,7 +153,7 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
             break;
     }
     ebpo_status status =
-        ebpo_fail_errno(error, publish->shown, "no temporary file can be created beside it");
+        ebpo_fail_errno(error, publish->shown, "no temporary file can be created in its folder");
     free(publish->temporary);
     publish->temporary = NULL;
     return status;
@@ -215,8 +217,8 @@ void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 
 const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
 
-/* Opens the stream with an explicit buffer: a lack of memory for the buffer is then reported, and
- * writes are few. */
+/* Opens the stream with an explicit buffer, so that a lack of memory for the buffer is reported,
+ * and writes are few. */
 FILE *ebpo_publish_stream(ebpo_publish *publish)
 {
     enum { BUFFER = 1 << 16 };
@@ -227,7 +229,7 @@ FILE *ebpo_publish_stream(ebpo_publish *publish)
     publish->stream = publish->buffer ? fdopen(publish->fd, "w+b") : NULL;
     if (!publish->stream)
         return NULL;
-    publish->fd = -1;                                                 /* the stream owns it now */
+    publish->fd = -1; /* the stream owns the descriptor now */
     (void)!setvbuf(publish->stream, publish->buffer, _IOFBF, BUFFER); /* cannot fail */
     return publish->stream;
 }
@@ -264,7 +266,8 @@ static bool sync_folder(const char *path)
     return fd >= 0 && sync_and_close(fd);
 }
 
-/* Closes and syncs by name, because a library may have written through its own descriptor. */
+/* Closes the temporary file, and syncs it by its name, because a library may have written through
+ * another descriptor. */
 static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
 {
     errno = 0;
@@ -284,7 +287,8 @@ static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns true if the target is the expected version, or missing: then nothing can be lost. */
+/* Returns true if the target has the expected version, or is missing: then no other program's data
+ * can be lost. */
 static bool is_expected(const ebpo_publish *publish)
 {
     struct stat st;
@@ -301,16 +305,17 @@ static ebpo_status put_in_place(ebpo_publish *publish, ebpo_error *error)
     if (!is_expected(publish))
         return ebpo_fail_file(
             error, EBPO_E_IO, publish->shown,
-            "another program has changed it since it was read, and it was not replaced; read it "
-            "again and repeat the change, or write to another file");
+            "another program has changed the file since it was read; the file was not replaced; "
+            "read it again and repeat the change, or write to another file");
     if (rename(publish->temporary, publish->target) != 0)
         return ebpo_fail_errno(error, publish->shown,
-                               "the finished temporary file could not be renamed to it");
+                               "the finished temporary file could not be renamed to the output");
     free(publish->temporary);
     publish->temporary = NULL;
     return EBPO_OK;
 }
 
+/* Syncs the folder of the target. */
 static ebpo_status sync_name(const ebpo_publish *publish, ebpo_error *error)
 {
     return sync_folder(publish->folder)
@@ -341,14 +346,15 @@ static bool exchange_files(const ebpo_publish *publish)
     return renameat2(AT_FDCWD, publish->temporary, AT_FDCWD, publish->target, RENAME_EXCHANGE) == 0;
 #else
     struct stat st;
-    /* otherwise errno says whether there was nothing to exchange */
+    /* if the target is missing, lstat has set errno to ENOENT */
     if (lstat(publish->target, &st) == 0)
         errno = ENOSYS;
     return false;
 #endif
 }
 
-/* Restores the first file, because the second could not be renamed to its target. */
+/* Restores the first target, because the second temporary file could not be renamed. `exchanged`:
+ * the previous file still exists under the temporary name. `fresh`: there was no previous file. */
 static ebpo_status restore_first(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
                                  ebpo_error *error)
 {

@@ -1,9 +1,9 @@
-/* Removes unfinished files: outputs and locks, when a signal ends this process. Their names are
- * in fixed storage with lock-free states, because a signal handler reads them. Temporary files and
- * folders of killed processes are recognised by their names, which contain the process id; they are
- * removed when the process has ended and no process holds their lock. New folders are created
- * atomically: they are made beside their target and renamed. Files that cannot be examined or
- * removed stay. */
+/* Removes unfinished files: outputs and locks, when a signal ends this process. The names of these
+ * files are in fixed storage with lock-free states, because a signal handler reads the names.
+ * Temporary files and folders of killed processes are recognised by their names, which contain the
+ * process id; they are removed when the process has ended and no process holds their lock. New
+ * folders are created atomically: they are made under another name in the same parent folder, and
+ * renamed. Files that cannot be examined or removed stay. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -27,7 +27,7 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
+enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE }; /* LIVE: `path` is a file to remove */
 static struct slot {
     atomic_int state;
     char path[PATH_MAX];
@@ -80,6 +80,7 @@ static long process_of(const char *file, const char *name)
     return strcmp(end, ".tmp") == 0 ? process : 0;
 }
 
+/* Removes a file if no process holds its lock. */
 static void remove_if_stale(int folder, const char *file)
 {
     struct stat facts;
@@ -107,8 +108,8 @@ void ebpo_remove_stale_files(const char *folder, const char *name)
 
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
-/* Returns a number of the system that process ids belong to: the same for all processes in this
- * namespace since this start of the machine. 0: not known. */
+/* Returns a number that is the same for all processes in this namespace of process ids until the
+ * machine is restarted. 0: not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
@@ -147,8 +148,8 @@ static char *making_name(const char *folder)
     return path;
 }
 
-/* Renames the folder made by mkdtemp, with its inode number in place of XXXXXX, so that another
- * folder that is put in its place is not mistaken for it. */
+/* Renames the folder that mkdtemp has made: its inode number replaces XXXXXX. If another folder
+ * later gets this name, its inode number differs. */
 static void settle_making(char **made)
 {
     char *path;
@@ -165,9 +166,9 @@ static void settle_making(char **made)
     }
 }
 
-/* Returns the text behind the process id, or NULL if the process exists or the name has another
- * form. */
-static const char *rest_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
+/* Returns the text after the process id in a name made by making_name, or NULL if that process
+ * exists or the name has another form. */
+static const char *suffix_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
 {
     char *end;
     size_t mark = sizeof MARK - 1;
@@ -183,15 +184,17 @@ static void empty_folder(int fd)
 {
     DIR *d = fdopendir(fd);
     for (struct dirent *e; d && (e = readdir(d));)
-        (void)unlinkat(dirfd(d), e->d_name, 0); /* the library makes no folders here: any stay */
+        (void)unlinkat(dirfd(d), e->d_name,
+                       0); /* the library makes no folders here, so folders stay */
     if (d)
         closedir(d);
     else
         close(fd);
 }
 
-/* Removes one folder; if its name has no inode number yet, it is empty. */
-static void remove_one(int parent, const char *file, const char *rest)
+/* Removes one folder of this user. Removes its files only if the name ends with the folder's inode
+ * number; a folder without this number in its name is empty. */
+static void remove_one(int parent, const char *file, const char *suffix)
 {
     struct stat facts;
     char inode[32];
@@ -200,7 +203,7 @@ static void remove_one(int parent, const char *file, const char *rest)
         return;
     bool ours = fstat(fd, &facts) == 0 && facts.st_uid == geteuid();
     snprintf(inode, sizeof inode, "%ju", ours ? (uintmax_t)facts.st_ino : 0);
-    if (ours && strcmp(rest, inode) == 0)
+    if (ours && strcmp(suffix, inode) == 0)
         empty_folder(fd);
     else
         close(fd);
@@ -218,9 +221,9 @@ static void remove_stale_folders(const char *folder)
     char *parent = system ? name ? strndup(folder, name) : strdup(".") : NULL;
     DIR *d = parent ? opendir(parent) : NULL;
     for (struct dirent *e; d && (e = readdir(d));) {
-        const char *rest = rest_of_dead(e->d_name, folder + name, end - name, system);
-        if (rest)
-            remove_one(dirfd(d), e->d_name, rest);
+        const char *suffix = suffix_of_dead(e->d_name, folder + name, end - name, system);
+        if (suffix)
+            remove_one(dirfd(d), e->d_name, suffix);
     }
     if (d)
         closedir(d);

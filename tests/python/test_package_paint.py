@@ -51,7 +51,7 @@ class Painting(Case):
         other.add_layer(title="Other")
         one.save("two.paint.h5")
         for late in other, paint:
-            with self.assertRaisesRegex(ebpo.IOFailure, "another program has changed it since it was read"):
+            with self.assertRaisesRegex(ebpo.IOFailure, "another program has changed the file since it was read"):
                 late.save("two.paint.h5")
         other.save("copy.paint.h5")
         self.assertEqual([layer["title"] for layer in ebpo.Paint.open("two.paint.h5").layers][2:], ["One"])

@@ -204,7 +204,8 @@ START_TEST(test_lock_waits_and_leaves_no_file)
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK && lock.fd >= 0);
     ck_assert(ebpo_file_lock_take(&other, target, 0.1, NULL, &error) == EBPO_E_IO);
-    ck_assert(other.fd == -1 && strstr(error.message, "has been changing it for 0.1 s") != NULL);
+    ck_assert(other.fd == -1 &&
+              strstr(error.message, "has been changing the file for 0.1 s") != NULL);
     ebpo_file_lock_release(&lock);
     ck_assert(scratch_entries() == 0);
     ck_assert(ebpo_file_lock_take(&other, target, 0, NULL, NULL) == EBPO_OK && other.fd >= 0);
@@ -330,7 +331,8 @@ START_TEST(test_output_replaces_only_its_source_version)
             ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
     }
     ck_assert(ebpo_publish_commit(&out, &error) == EBPO_E_IO);
-    ck_assert(strstr(error.message, "another program has changed it since it was read") != NULL);
+    ck_assert(strstr(error.message, "another program has changed the file since it was read") !=
+              NULL);
     check_content(target, "her");
     ck_assert(scratch_entries() == 1);
     ebpo_whole_file_close(&read);

@@ -495,7 +495,7 @@ START_TEST(test_subset_of_replaced_file_is_refused)
                              : i == 2 ? ebpo_subset(file, path, &fit, &error)
                                       : ebpo_file_repack(file, path, NULL, NULL, &error);
         ck_assert_int_eq(status, EBPO_E_IO);
-        ck_assert(strstr(error.message, "another program has changed it since it was read") !=
+        ck_assert(strstr(error.message, "another program has changed the file since it was read") !=
                   NULL);
         ebpo_close(file);
         fine(ebpo_open(path, &file, &error), &error);
