@@ -1,5 +1,5 @@
 /* Computes the adjacency of faces: the faces at each vertex (stars), faces with equal corners, and
- * the faces at an edge, sorted around it by exact predicates. */
+ * the faces at an edge, sorted around the edge by exact predicates. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -12,6 +12,8 @@
 #include "geometry/predicates.h"
 #include "mesh/adjacency.h"
 
+/* Number of faces for each call of a thread's function; maximum length of lists that are sorted by
+ * insertion. */
 enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
 
 typedef struct build {
@@ -48,7 +50,8 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Stores a face. first[v] is initially the end of the row and counts down to its beginning. */
+/* Stores a face in the row of vertex v. first[v] is initially the end of the row and counts down to
+ * its beginning. */
 static inline void put_face(ebpo_stars *stars, uint32_t v, uint64_t f)
 {
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
@@ -259,7 +262,7 @@ void ebpo_edge_faces_sort(ebpo_edge_faces *e)
 }
 
 /* Returns the sign of the first nonzero component of the normal of the face v, w, p, and sets *axis
- * to that component. */
+ * to the axis of that component. */
 static int normal_sign(const edge *e, const double p[3], int *axis)
 {
     for (*axis = 0; *axis < 3; ++*axis) {
@@ -291,10 +294,10 @@ static int compare_turn(const void *x, const void *y, void *context)
 
 bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v, uint32_t w)
 {
-    edge of;
+    edge ends;
     int first_sign = 0, first_axis = 0;
-    ebpo_mesh_position(mesh, v, of.v);
-    ebpo_mesh_position(mesh, w, of.w);
+    ebpo_mesh_position(mesh, v, ends.v);
+    ebpo_mesh_position(mesh, w, ends.w);
     for (uint64_t i = 0; i < e->count; i++) {
         ebpo_edge_face *f = &e->face[i];
         const uint32_t *corner = mesh->faces + 3 * (uint64_t)f->face;
@@ -302,21 +305,21 @@ bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v,
         while (corner[k] == v || corner[k] == w)
             k++;
         ebpo_mesh_position(mesh, corner[k], f->at);
-        int sign = normal_sign(&of, f->at, &axis);
+        int sign = normal_sign(&ends, f->at, &axis);
         if (!sign)
             return false;
         if (i == 0)
             first_sign = sign, first_axis = axis;
-        int side = ebpo_orient3d(of.v, of.w, e->face[0].at, f->at);
-        bool same_side = ebpo_normal_sign(first_axis, of.v, of.w, f->at) == first_sign;
+        int side = ebpo_orient3d(ends.v, ends.w, e->face[0].at, f->at);
+        bool same_side = ebpo_normal_sign(first_axis, ends.v, ends.w, f->at) == first_sign;
         f->quarter = side > 0 ? 1 : side < 0 ? 3 : same_side ? 0 : 2;
         f->reversed = sign < 0;
         f->source = ebpo_mesh_source_face(mesh, f->face);
     }
     if (e->count > 1)
-        ebpo_sort_with(e->face, e->count, sizeof *e->face, compare_turn, &of);
+        ebpo_sort_with(e->face, e->count, sizeof *e->face, compare_turn, &ends);
     for (uint64_t i = 1; i < e->count; i++)
-        e->face[i].layered = compare_angles(&e->face[i - 1], &e->face[i], &of) == 0;
+        e->face[i].layered = compare_angles(&e->face[i - 1], &e->face[i], &ends) == 0;
     return true;
 }
 

@@ -1,19 +1,20 @@
-/* Finds the faces at vertices and edges. */
+/* Finds the faces at vertices and edges. The star of a vertex is the set of faces at the vertex; a
+ * patch is a set of faces joined across edges. */
 #ifndef EBPO_MESH_ADJACENCY_H
 #define EBPO_MESH_ADJACENCY_H
 
 #include "mesh/mesh_parts.h"
 
-/* Compressed rows: the faces at vertex v are face[first[v] .. first[v + 1]), each once, unordered.
- * 12 bytes a face and 8 bytes a vertex. */
+/* The stars of all vertices: the faces at vertex v are face[first[v] .. first[v + 1]), each once,
+ * in any order. The arrays take 12 bytes for each face and 8 bytes for each vertex. */
 typedef struct ebpo_stars {
     uint64_t *first; /* [vertex_count + 1] */
     uint32_t *face;
-    ebpo_workspace *workspace; /* the mesh's; owns both arrays */
+    ebpo_workspace *workspace; /* workspace of the mesh; owns both arrays */
 } ebpo_stars;
 
-/* Builds the stars. Checks every index first; EBPO_E_FORMAT names the lowest bad face. `out` is
- * cleared on failure. */
+/* Builds the stars. Checks every index first; the message of EBPO_E_FORMAT names the lowest bad
+ * face. `out` is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned threads,
                                            const ebpo_progress *progress, ebpo_error *error);
 void ebpo_stars_free(ebpo_stars *stars);
@@ -26,10 +27,11 @@ static inline uint64_t ebpo_stars_degree(const ebpo_stars *stars, uint32_t v)
 /* One use of an edge at a vertex by one face. */
 typedef struct ebpo_link {
     uint64_t key; /* neighbour << 32 | face */
-    /* index of the face within the star; EBPO_NO_INDEX for a face that repeats a vertex */
+    /* index of the face among the faces of the star that repeat no vertex; EBPO_NO_INDEX for a face
+     * that repeats a vertex */
     uint32_t entry;
     uint8_t out;    /* 1: the face runs from the vertex to the neighbour */
-    uint8_t corner; /* the edge is the face's corner .. corner + 1 */
+    uint8_t corner; /* the edge runs from this corner of the face to the next corner */
 } ebpo_link;
 
 static inline uint32_t ebpo_link_neighbour(const ebpo_link *link)
@@ -42,9 +44,9 @@ static inline uint32_t ebpo_link_face(const ebpo_link *link) { return (uint32_t)
 typedef struct ebpo_star {
     ebpo_link *links; /* sorted by neighbour, then by face: each edge at the vertex is one run */
     uint64_t count;
-    uint64_t faces; /* entries: faces that repeat no vertex */
+    uint64_t faces; /* number of faces that repeat no vertex */
     uint64_t capacity;
-    ebpo_workspace *workspace; /* the mesh's, once something was gathered */
+    ebpo_workspace *workspace; /* workspace of the mesh; set by the first call that gathers */
 } ebpo_star;
 
 /* Gathers the edge uses at vertex v. Returns false when memory is short. */
@@ -78,7 +80,7 @@ typedef struct ebpo_same_faces {
     ebpo_same_face *item; /* equal faces are adjacent, in the order of the source */
     uint64_t count;
     uint64_t capacity;
-    ebpo_workspace *workspace; /* the mesh's, once something was gathered */
+    ebpo_workspace *workspace; /* workspace of the mesh; set by the first call that gathers */
 } ebpo_same_faces;
 
 /* Gathers the faces that have three distinct vertices of which v is the lowest. Returns false when
@@ -87,7 +89,7 @@ bool ebpo_same_faces_gather(ebpo_same_faces *out, const ebpo_stars *stars, const
                             uint32_t v);
 void ebpo_same_faces_free(ebpo_same_faces *faces);
 
-/* Returns true if item i has the same vertices as the previous one. */
+/* Returns true if item i has the same vertices as item i - 1. */
 static inline bool ebpo_same_faces_repeats(const ebpo_same_faces *faces, uint64_t i)
 {
     return i > 0 && faces->item[i].corners == faces->item[i - 1].corners;
@@ -96,17 +98,18 @@ static inline bool ebpo_same_faces_repeats(const ebpo_same_faces *faces, uint64_
 /* The faces at one edge, sorted by patch or by angle around the edge. */
 
 typedef struct ebpo_edge_face {
-    uint64_t patch; /* number of the patch, shifted by 1; the lowest bit belongs to the caller */
+    uint64_t patch; /* index of the patch, shifted left by 1; the caller uses the lowest bit */
     uint32_t face;
-    uint8_t out; /* 1: the face runs from the edge's first vertex to the other one */
+    uint8_t out; /* 1: the face runs from the edge's first vertex to the second vertex */
 
-    /* set during sorting: the third corner, and the position in the turn from the first face: 0: at
-     * the first face; 1: before the half turn; 2: at the half turn; 3: after it */
+    /* the following fields are set by ebpo_edge_faces_turn; `quarter`: angle from the first face
+     * around the edge: 0: zero; 1: less than a half turn; 2: a half turn; 3: more than a half turn
+     */
     uint8_t quarter;
-    bool layered;    /* coplanar with the face before it */
+    bool layered;    /* the face has the same angle as the previous face */
     bool reversed;   /* among coplanar faces, greater indices come first */
     uint64_t source; /* index in the source */
-    double at[3];
+    double at[3];    /* position of the corner that is not on the edge */
 } ebpo_edge_face;
 
 /* Initialise it with zeros; free `face` with free(). */

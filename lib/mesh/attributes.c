@@ -1,5 +1,6 @@
-/* Attributes of a mesh: numeric arrays for vertices, faces and other elements. Creates, copies and
- * frees them; selects, reorders and compares rows; reads ranges and names. */
+/* Implements the attributes of a mesh: numeric arrays for vertices, faces and other elements.
+ * Creates, copies and frees arrays; selects, reorders and compares rows; finds ranges of values and
+ * groups of names. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -126,7 +127,8 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
            ebpo_array_grow(workspace, &a->values, &a->item_capacity, items, bytes);
 }
 
-/* Appends to the text `to` of `size` bytes, or appends "and more" when it is full. */
+/* Appends a note to the text `to` of `size` bytes. Appends "and more" instead when the note does
+ * not fit. */
 static void append_note(char *to, size_t size, const char *format, va_list args) EBPO_PRINTF(3, 0);
 
 static void append_note(char *to, size_t size, const char *format, va_list args)
@@ -190,6 +192,7 @@ static ebpo_status copy_array(ebpo_attributes *to, const ebpo_attribute *from, e
     return EBPO_OK;
 }
 
+/* Makes attributes from others: `array` borrows or copies each array. */
 static ebpo_status make_of(ebpo_attributes **out, const ebpo_attributes *from,
                            ebpo_workspace *workspace,
                            ebpo_status (*array)(ebpo_attributes *to, const ebpo_attribute *from,
@@ -328,7 +331,7 @@ ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *elemen
     return EBPO_OK;
 }
 
-/* Moves row rows[i] to row i. As rows[i] >= i, no unread row is overwritten. */
+/* Moves row rows[i] to row i. Because rows[i] >= i, no row is overwritten before it is read. */
 static void keep_columns(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
                          uint64_t count)
 {
@@ -471,6 +474,7 @@ static int length_before(const ebpo_attribute_name *name, const char *end)
     return name->n >= n && memcmp(name->s + name->n - n, end, n) == 0 ? (int)(name->n - n) : -1;
 }
 
+/* Returns the number of names if they have the endings `ends` after the same beginning, else 1. */
 static unsigned count_matching(const char *const ends[4], const ebpo_attribute_name *names,
                                unsigned count)
 {

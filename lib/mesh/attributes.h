@@ -1,23 +1,24 @@
-/* Attributes of a mesh: numeric data beyond positions and corners, such as colours, normals and
- * labels. Each array belongs to the vertices or faces, in the order of the source, or to another
- * element of the source. Source: format-spec/attributes.md. For use by one thread. */
+/* Stores the attributes of a mesh: numeric data beyond positions and corners, such as colours,
+ * normals and labels. Each array belongs to the vertices or faces, in the order of the source, or
+ * to another element of the source. Source: format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_ATTRIBUTES_H
 #define EBPO_MESH_ATTRIBUTES_H
 
 #include <ebpo/mesh.h>
 
 enum {
-    EBPO_ATTRIBUTE_COLUMNS = 64,  /* most columns of an array, and most items of equal lists */
-    EBPO_ATTRIBUTE_ARRAYS = 1000, /* most arrays of a mesh */
+    EBPO_ATTRIBUTE_COLUMNS =
+        64, /* greatest number of columns, and of items in lists that become columns */
+    EBPO_ATTRIBUTE_ARRAYS = 1000, /* greatest number of arrays of a mesh */
     EBPO_ATTRIBUTE_NO_LIST = -1,
-    EBPO_ATTRIBUTE_HEADER = 1 << 20,   /* most bytes of a header */
+    EBPO_ATTRIBUTE_HEADER = 1 << 20,   /* greatest size of a header in bytes */
     EBPO_ATTRIBUTE_ELEMENT_BYTES = 64, /* including the terminating zero */
     EBPO_ATTRIBUTE_NAMES_BYTES = 256
 };
 
 typedef struct ebpo_attribute {
-    char element[EBPO_ATTRIBUTE_ELEMENT_BYTES];
-    char names[EBPO_ATTRIBUTE_NAMES_BYTES]; /* names of the columns, separated by one space */
+    char element[EBPO_ATTRIBUTE_ELEMENT_BYTES]; /* "vertex", "face", ... */
+    char names[EBPO_ATTRIBUTE_NAMES_BYTES];     /* names of the columns, separated by one space */
     ebpo_attribute_type type;
     int list;         /* type of a list length in the source, or EBPO_ATTRIBUTE_NO_LIST */
     uint32_t columns; /* at least 1 */
@@ -34,15 +35,15 @@ typedef struct ebpo_attributes {
     ebpo_workspace *workspace;
     ebpo_attribute *array;
     uint64_t count, capacity;
-    char *header; /* from malloc; NULL: none */
+    char *header; /* header of the source file, from malloc; NULL: none */
     uint64_t header_bytes;
     char lost[400]; /* description of source data that are not kept; "": none */
-    /* description of data that reading the mesh omitted or did not find; set even if attributes are
+    /* description of data that the mesh reader omitted or did not find; set even if attributes are
      * not requested */
     char unread[400];
 } ebpo_attributes;
 
-/* Returns NULL when memory is short. */
+/* Makes empty attributes. Returns NULL when memory is short. */
 ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace);
 void ebpo_attributes_free(ebpo_attributes *attributes); /* accepts NULL */
 
@@ -55,8 +56,8 @@ static inline bool ebpo_attributes_hold(const ebpo_attributes *attributes)
     return attributes && (attributes->count || attributes->header);
 }
 
-/* Return the number of bytes of a value (1, 2, 4 or 8), the name of a type in files, and the type
- * with a name, or -1. */
+/* ebpo_attribute_bytes returns the size of a value (1, 2, 4 or 8). ebpo_attribute_type_name returns
+ * the name of a type in files. ebpo_attribute_type_of returns the type with a name, or -1. */
 unsigned ebpo_attribute_bytes(ebpo_attribute_type type);
 const char *ebpo_attribute_type_name(ebpo_attribute_type type);
 int ebpo_attribute_type_of(const char *name);
@@ -67,8 +68,8 @@ static inline bool ebpo_attribute_is_float(ebpo_attribute_type type)
 }
 
 bool ebpo_attribute_is_of(const ebpo_attribute *a, const char *element);
-/* Returns true for attributes of the mesh's vertices or faces, which are selected and sorted with
- * them. */
+/* Returns true for attributes of the mesh's vertices or faces, which are selected and sorted
+ * together with the vertices or faces. */
 bool ebpo_attribute_is_of_mesh(const ebpo_attribute *a);
 /* The element for images that the source names (mesh/textures.h). */
 #define EBPO_TEXTURE_ELEMENT "ebpo:texture"
@@ -85,19 +86,20 @@ static inline uint64_t ebpo_attribute_value_count(const ebpo_attribute *a)
     return !a->ends ? a->rows * a->columns : a->rows ? a->ends[a->rows - 1] : 0;
 }
 
-/* Adds an array like `like`, without values. Returns NULL when there are too many or memory is
- * short. */
+/* Adds an array with the names and types of `like`, without values. Returns NULL when there are too
+ * many arrays or memory is short. */
 ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *like);
 void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index);
 
 /* Removes the arrays of elements other than vertices, faces and textures. Accepts NULL. */
 void ebpo_attributes_drop_others(ebpo_attributes *from);
 
-/* Reserves space for more rows and list items. */
+/* Reserves space for `rows` rows and `items` list items. Returns false when memory is short. */
 bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64_t rows,
                             uint64_t items);
 
-/* Records data that cannot be kept, as a phrase such as "property x of vertex". */
+/* Records source data that the attributes cannot store, as a phrase such as "property x of vertex".
+ */
 void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...) EBPO_PRINTF(2, 3);
 /* Records data that reading omitted, as a sentence without a full stop. */
 void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format, ...)
@@ -105,14 +107,14 @@ void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format
 /* Records "what: count", unless count is 0. */
 void ebpo_attributes_count_unread(ebpo_attributes *attributes, const char *what, uint64_t count);
 
-/* Replaces the arrays of an element by `count` rows: row i is the old row rows[i], or zeros and
- * empty lists if it does not exist. EBPO_E_MEMORY, EBPO_E_IO. */
+/* Replaces the arrays of an element by `count` rows: row i is the old row rows[i]; if that row does
+ * not exist, row i has zeros and empty lists. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *element,
                                                const uint32_t *rows, uint64_t count,
                                                ebpo_error *error);
 
-/* Keeps only the `count` rows of an element that are listed in `rows`, ascending. Cannot fail, as
- * it needs no memory. */
+/* Keeps only the `count` rows of an element that are listed in `rows`, ascending. Cannot fail,
+ * because it needs no memory. */
 void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, const uint32_t *rows,
                           uint64_t count);
 
@@ -128,17 +130,18 @@ bool ebpo_attributes_equal_rows(const ebpo_attributes *attributes, const char *e
 /* Converts lists of equal length, from 1 to EBPO_ATTRIBUTE_COLUMNS items, to columns. */
 void ebpo_attribute_even_out(ebpo_workspace *workspace, ebpo_attribute *a);
 
-/* Returns the number of leading names that form a group, such as red green blue: at least 1. */
+/* A name; not terminated by zero. */
 typedef struct ebpo_attribute_name {
     const char *s;
     size_t n;
 } ebpo_attribute_name;
+/* Returns the number of leading names that form a group, such as red green blue: at least 1. */
 unsigned ebpo_attribute_names_together(const ebpo_attribute_name *names, unsigned count);
 
-/* Returns the value of this type at any address, exactly. */
+/* Returns the value of this type at `at`, exactly; `at` need not be aligned. */
 double ebpo_attribute_number(const uint8_t *at, ebpo_attribute_type type);
 
-/* Finds the least and greatest value, ignoring NaN. Returns false when there is none. */
+/* Finds the least and greatest value, ignoring NaN. Returns false if no value is a number. */
 bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, double range[2]);
 
 /* Creates attributes whose values are borrowed from `from` until rows are selected; NULL for NULL.
@@ -152,7 +155,7 @@ EBPO_MUST_USE ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo
 
 enum { EBPO_COLOUR_CHANNELS = 4 }; /* red, green, blue and an optional alpha */
 
-/* A column of a numeric array; `of` is NULL when there is none. */
+/* A column of a numeric array. `of` is NULL if the mesh has no such column. */
 typedef struct ebpo_colour_column {
     const ebpo_attribute *of;
     uint32_t column;

@@ -1,8 +1,8 @@
 /* Finds the boundary edges of a mesh, which only one face uses, and the closed chains (loops) that
  * they form: the holes. Threads collect edges, which are then joined and sorted by their first
- * vertex. Where several loops pass one vertex, the fans of faces around it decide which edge
- * continues which. Loops begin at their least vertex and follow the source's order, so the result
- * depends neither on threads nor on the order of the faces. */
+ * vertex. Where several loops pass one vertex, the fans of faces around this vertex decide which
+ * departing edge continues an arriving edge. Loops begin at their least vertex and follow the
+ * source's order, so the result depends neither on threads nor on the order of the faces. */
 #include "mesh/boundary.h"
 
 #include <stdlib.h>
@@ -62,20 +62,21 @@ void ebpo_loops_free(ebpo_loops *loops)
     *loops = (ebpo_loops){ .count = 0 };
 }
 
+/* An edge, sorted by the vertex at which it arrives. */
 typedef struct arrival {
-    uint64_t key; /* to << 32 | the source index of from */
-    uint64_t edge;
+    uint64_t key;  /* to << 32 | source index of `from` */
+    uint64_t edge; /* index in chaining.edges */
 } arrival;
 
 typedef struct chaining {
     ebpo_boundary_edge *edges; /* sorted by key */
     uint64_t count;
-    arrival *arrivals;  /* sorted by key */
-    uint64_t *next;     /* [edges] edge that continues each edge; NONE when there is none */
-    uint8_t *continued; /* true if the edge continues another edge */
-    uint8_t *walked;
-    uint32_t *place; /* [vertex_count] position on the path, or EBPO_NO_INDEX */
-    uint32_t *path;
+    arrival *arrivals;       /* sorted by key */
+    uint64_t *next;          /* [edges] edge that continues each edge; NONE when there is none */
+    uint8_t *continued;      /* true if the edge continues another edge */
+    uint8_t *walked;         /* true if a walk has visited the edge */
+    uint32_t *path_position; /* [vertex_count] position on the path, or EBPO_NO_INDEX */
+    uint32_t *path;          /* vertices of the current walk that are in no loop yet */
     uint64_t path_length;
     uint64_t start; /* key of the current walk, for ebpo_loops.start */
     uint64_t steps; /* steps of all walks */
@@ -97,8 +98,8 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Compares edges for the sort. Keys of edges that are used once are unique, so this function
- * decides nothing. */
+/* Compares edges for the sort. The keys of boundary edges are unique, so the result never matters.
+ */
 static int compare_edges(const void *a, const void *b)
 {
     const ebpo_boundary_edge *x = a, *y = b;
@@ -137,8 +138,8 @@ static void store_arrivals(void *context, uint64_t place, const void *records, u
 
 static const ebpo_progress silent = { NULL, NULL };
 
-/* Returns the bit position from which on the keys (vertex << 32) have the bits that the sort uses.
- */
+/* Returns the shift of the keys (vertex << 32) for the sort: the leading bits that remain number at
+ * most EBPO_SORT_BINS bins. */
 static unsigned leading_shift(const ebpo_mesh *mesh)
 {
     unsigned shift = 32;
@@ -178,21 +179,22 @@ static void release_pages(const chaining *c, uint64_t steps)
         ebpo_release_pages(c->mesh->workspace);
 }
 
+/* Makes `next` the edge that continues `edge`. */
 static void connect_edges(chaining *c, uint64_t edge, uint64_t next)
 {
     c->next[edge] = next;
     c->continued[next] = 1;
 }
 
-/* Returns the neighbour to which `face` leaves the vertex. */
+/* Returns the corner of `face` that follows the vertex. */
 static uint32_t leaves_to(const chaining *c, uint32_t vertex, uint32_t face)
 {
     const uint32_t *v = c->mesh->faces + 3 * (uint64_t)face;
     return v[0] == vertex ? v[1] : v[1] == vertex ? v[2] : v[0];
 }
 
-/* Walks around c->star, from the face of an arriving edge across edges that are used twice. Returns
- * the neighbour at the end of the fan. */
+/* Walks around the vertex of c->star, from the face of an arriving edge across edges that are used
+ * twice. Returns the neighbour at the boundary edge that ends the fan, or EBPO_NO_INDEX. */
 static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 {
     for (uint64_t steps = 0; steps <= c->star.faces; steps++) {
@@ -211,8 +213,7 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
     return EBPO_NO_INDEX;
 }
 
-/* Returns the edge that leaves for `neighbour` (a source index) in the sorted range [begin, end),
- * or NONE. */
+/* Returns the edge to `neighbour` (a source index) in the sorted range [begin, end), or NONE. */
 static uint64_t find_departure(const chaining *c, uint64_t begin, uint64_t end, uint64_t neighbour)
 {
     while (begin < end) {
@@ -229,7 +230,7 @@ static uint64_t find_departure(const chaining *c, uint64_t begin, uint64_t end, 
 }
 
 /* Connects the arriving edges [a, b) and the departing edges [d, e) at one vertex: first by fans,
- * then the others in ascending order. */
+ * then the remaining edges in ascending order. Returns false when memory is short. */
 static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d,
                            uint64_t e)
 {
@@ -283,49 +284,50 @@ static bool connect_all(chaining *c)
 
 /* --- loops --- */
 
-/* Removes the path back to `place` as a loop. */
-static void emit_loop(chaining *c, uint64_t place)
+/* Removes the vertices of the path from `position` on, and adds them as a loop. */
+static void emit_loop(chaining *c, uint64_t position)
 {
     ebpo_loops *out = c->out;
     uint64_t at = out->first[out->count];
-    for (uint64_t i = place; i < c->path_length; i++) {
+    for (uint64_t i = position; i < c->path_length; i++) {
         out->vertex[at++] = c->path[i];
-        c->place[c->path[i]] = EBPO_NO_INDEX;
+        c->path_position[c->path[i]] = EBPO_NO_INDEX;
     }
     out->start[out->count++] = c->start;
     out->first[out->count] = at;
-    c->path_length = place;
+    c->path_length = position;
 }
 
 static void visit_vertex(chaining *c, uint32_t vertex)
 {
-    if (c->place[vertex] != EBPO_NO_INDEX)
-        emit_loop(c, c->place[vertex]);
-    c->place[vertex] = (uint32_t)c->path_length;
+    if (c->path_position[vertex] != EBPO_NO_INDEX)
+        emit_loop(c, c->path_position[vertex]);
+    c->path_position[vertex] = (uint32_t)c->path_length;
     c->path[c->path_length++] = vertex;
 }
 
-/* Returns the key that the edge has in the source's order. */
+/* Returns a key for the edge that consists of source indices. */
 static uint64_t source_key(const chaining *c, uint64_t edge)
 {
     return ebpo_mesh_source_vertex(c->mesh, c->edges[edge].from) << 32 |
            (uint32_t)c->edges[edge].key;
 }
 
-/* Returns the first edge in the source of a closed chain; the walk begins there. Chains share no
- * edges, so the order in which chains are walked does not matter. */
+/* Returns the edge of a closed chain that is first in the source; the walk of the chain begins with
+ * this edge. Chains share no edges, so the order in which chains are walked does not matter. */
 static uint64_t first_of_cycle(chaining *c, uint64_t edge)
 {
     uint64_t first = edge, key = source_key(c, edge);
     for (uint64_t e = c->next[edge]; e != edge; e = c->next[e]) {
-        uint64_t other = source_key(c, e);
-        first = other < key ? e : first;
-        key = other < key ? other : key;
+        uint64_t e_key = source_key(c, e);
+        first = e_key < key ? e : first;
+        key = e_key < key ? e_key : key;
         release_pages(c, ++c->steps);
     }
     return first;
 }
 
+/* Walks a chain from an edge on, and adds its loops. */
 static void walk_chain(chaining *c, uint64_t edge)
 {
     c->path_length = 0;
@@ -340,7 +342,7 @@ static void walk_chain(chaining *c, uint64_t edge)
     if (c->path_length > 1)
         c->out->open_chains++;
     for (uint64_t i = 0; i < c->path_length; i++)
-        c->place[c->path[i]] = EBPO_NO_INDEX;
+        c->path_position[c->path[i]] = EBPO_NO_INDEX;
 }
 
 static bool allocate_arrays(chaining *c)
@@ -351,16 +353,16 @@ static bool allocate_arrays(chaining *c)
     c->next = ebpo_array_alloc(w, n, sizeof *c->next);
     c->continued = ebpo_array_zero(w, n, 1);
     c->walked = ebpo_array_zero(w, n, 1);
-    c->place = ebpo_array_alloc(w, vertices, sizeof *c->place);
+    c->path_position = ebpo_array_alloc(w, vertices, sizeof *c->path_position);
     c->path = ebpo_array_alloc(w, n + 1, sizeof *c->path);
     c->out->first = ebpo_array_zero(w, n / 3 + 2, sizeof *c->out->first);
     c->out->vertex = ebpo_array_alloc(w, n, sizeof *c->out->vertex);
     c->out->start = ebpo_array_alloc(w, n / 3 + 1, sizeof *c->out->start);
-    if (!c->arrivals || !c->next || !c->continued || !c->walked || !c->place || !c->path ||
+    if (!c->arrivals || !c->next || !c->continued || !c->walked || !c->path_position || !c->path ||
         !c->out->first || !c->out->vertex || !c->out->start)
         return false;
     ebpo_array_fill(w, c->next, 0xff, n * sizeof *c->next);
-    ebpo_array_fill(w, c->place, 0xff, vertices * sizeof *c->place);
+    ebpo_array_fill(w, c->path_position, 0xff, vertices * sizeof *c->path_position);
     return true;
 }
 
@@ -368,7 +370,8 @@ static ebpo_status chain_edges(chaining *c, ebpo_error *error)
 {
     ebpo_workspace *w = c->mesh->workspace;
     if (!allocate_arrays(c))
-        return ebpo_workspace_fail(w, c->count * 56 + c->mesh->vertex_count * sizeof *c->place,
+        return ebpo_workspace_fail(w,
+                                   c->count * 56 + c->mesh->vertex_count * sizeof *c->path_position,
                                    error);
     ebpo_status status = sort_all(c, error);
     if (status != EBPO_OK)
@@ -403,7 +406,7 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
     ebpo_array_free(mesh->workspace, c.next);
     ebpo_array_free(mesh->workspace, c.continued);
     ebpo_array_free(mesh->workspace, c.walked);
-    ebpo_array_free(mesh->workspace, c.place);
+    ebpo_array_free(mesh->workspace, c.path_position);
     ebpo_array_free(mesh->workspace, c.path);
     if (status != EBPO_OK)
         ebpo_loops_free(out);
@@ -437,7 +440,7 @@ static ebpo_status make_ranks(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Compares loops of one walk by the order of their removal. */
+/* Compares loops with equal keys (from one walk) by the order in which they were found. */
 static int compare_ranks(const void *a, const void *b)
 {
     const rank *x = a, *y = b;
@@ -455,8 +458,10 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
 {
     ranking r = { .loops = loops,
                   .sorted = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *r.sorted) };
-    uint64_t *before = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *before), sum = 0;
-    ebpo_status status = r.sorted && before
+    uint64_t *triangles_before =
+                 ebpo_array_alloc(mesh->workspace, loops->count, sizeof *triangles_before),
+             sum = 0;
+    ebpo_status status = r.sorted && triangles_before
                              ? EBPO_OK
                              : ebpo_workspace_fail(mesh->workspace, loops->count * 24, error);
     for (int part = 0; part < 2 && status == EBPO_OK; part++) {
@@ -475,14 +480,14 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
                            .take = store_ranks };
         status = ebpo_sort_run(&sort, error);
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, status == EBPO_OK ? count : 0) {
-            before[r.sorted[i].number] = sum;
+            triangles_before[r.sorted[i].number] = sum;
             sum += r.sorted[i].triangles;
         }
     }
     ebpo_array_free(mesh->workspace, r.sorted);
     if (status != EBPO_OK)
-        ebpo_array_free(mesh->workspace, before);
+        ebpo_array_free(mesh->workspace, triangles_before);
     else
-        *triangles = before;
+        *triangles = triangles_before;
     return status;
 }

@@ -1,4 +1,5 @@
-/* Builds box trees of points, and of faces, whose tree is built from their centres. */
+/* Builds box trees of points, and of items that are divided by one point each (for faces, the
+ * centre). */
 #include "core/strict_fp.h"
 
 #include "core/workspace.h"
@@ -25,7 +26,8 @@ static ebpo_point_box box_of_points(const ebpo_tree_point *p, uint64_t count)
     return box;
 }
 
-/* Compares half lengths, as the full difference may overflow. */
+/* Returns the axis of the longest side. Compares half lengths, because the full difference may
+ * overflow. */
 static int longest_axis(const ebpo_point_box *box)
 {
     int best = 0;

@@ -1,4 +1,5 @@
-/* Tree of boxes over points or items with boxes, for finding neighbours without a full scan. */
+/* Builds a tree of boxes over points, or over items with boxes, to find neighbours without
+ * comparing all pairs. */
 #ifndef EBPO_MESH_BOX_TREE_H
 #define EBPO_MESH_BOX_TREE_H
 
@@ -9,7 +10,7 @@ enum { EBPO_BOX_TREE_LEAF = 8 }; /* maximum number of points in a leaf node */
 typedef struct ebpo_tree_point {
     double at[3];
     uint32_t number; /* index of the point's item */
-    int32_t value;
+    int32_t value;   /* for the caller */
 } ebpo_tree_point;
 
 typedef struct ebpo_point_box {
@@ -26,18 +27,19 @@ typedef struct ebpo_box_tree {
      * / 2 points */
     ebpo_point_box *node;
     uint64_t node_capacity;
-    /* like node, for the boxes of items; NULL: points only */
+    /* [nodes] for each node, the box of its items' boxes; NULL: a tree of points */
     ebpo_point_box *filled;
 } ebpo_box_tree;
 
 /* Returns space for one more point, or NULL when memory is short. */
 ebpo_tree_point *ebpo_box_tree_add(ebpo_box_tree *tree);
 
+/* Writes the box of an item. */
 typedef void (*ebpo_box_of_fn)(const void *user, const ebpo_tree_point *p, ebpo_point_box *out);
 
-/* Builds the tree after all points are added. With `box_of` NULL, it is a tree of points and may be
- * rebuilt; otherwise a tree of items with these boxes, built once. Returns false when memory is
- * short. */
+/* Builds the tree after all points are added. If `box_of` is NULL, the tree is a tree of points,
+ * which may be rebuilt. Otherwise it is a tree of items with these boxes, which is built once.
+ * Returns false when memory is short. */
 bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user);
 void ebpo_box_tree_free(ebpo_box_tree *tree);
 

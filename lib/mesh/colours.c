@@ -47,6 +47,7 @@ bool ebpo_colour_columns(const ebpo_attributes *in, const char *element,
     return false;
 }
 
+/* Converts a value to a byte; `full` becomes 255. */
 static uint8_t byte_of(double value, double full)
 {
     double scaled = value / full * 255;
@@ -103,6 +104,7 @@ static ebpo_status make_colours(uint8_t **out, const ebpo_attributes *from, cons
     return EBPO_OK;
 }
 
+/* Returns true if all colours are equal. */
 static bool all_the_same(const uint8_t *rgba, uint64_t count)
 {
     return count < 2 || memcmp(rgba, rgba + CHANNELS, (count - 1) * CHANNELS) == 0;

@@ -1,4 +1,5 @@
-/* Defines the state of the search for the components of a mesh, and of their grouping. */
+/* Defines the state of the search for the components of a mesh, and the grouping of faces and
+ * vertices by component. */
 #ifndef EBPO_MESH_COMPONENT_PARTS_H
 #define EBPO_MESH_COMPONENT_PARTS_H
 
@@ -10,32 +11,33 @@
 /* A component: faces connected by vertices. */
 typedef struct ebpo_found_component {
     uint64_t first; /* least source index of its faces */
-    uint32_t face;  /* that face, in the current mesh */
-    bool open;      /* some edge is not used equally often in both directions */
+    uint32_t face;  /* index of that face in the current mesh */
+    bool open;      /* true: some edge is not used equally often in both directions */
     double volume;  /* signed volume of a closed component, in the unit common to all components
                      * (mesh_parts.h) */
     double min[3], max[3];
-    uint32_t host; /* for a cavity, the component around it; otherwise itself */
+    uint32_t
+        host; /* for a cavity, the component around the cavity; otherwise the component itself */
 } ebpo_found_component;
 
 /* The indices of faces or vertices by group, ascending within each group. */
 typedef struct ebpo_number_groups {
-    uint64_t *begin; /* [groups + 1] into `of` */
-    uint32_t *of;
+    uint64_t *begin;   /* [groups + 1] begin of each group in `members` */
+    uint32_t *members; /* indices of faces or vertices */
 } ebpo_number_groups;
 
 struct ebpo_components {
     const ebpo_mesh *mesh;
-    const ebpo_mesh_groups
-        *named;                 /* NULL: components; otherwise list, number and place are unused */
-    uint64_t count;             /* initially all components, later only those that are not cavities
-                                 * of others */
+    const ebpo_mesh_groups *named; /* the groups, in place of components; list, number and position
+                                      are then unused. NULL: components */
+    uint64_t count; /* initially all components, later only components that are not cavities */
     ebpo_found_component *list; /* [all] */
     ebpo_component *facts;      /* [count] */
     /* [face_count] component of each face, borrowed; NULL: derived from its vertices */
     uint32_t *of_face;
-    uint32_t *number; /* [vertex_count] component; EBPO_NO_INDEX: unused vertex */
-    uint32_t *place;  /* [vertex_count] position within the component's vertices */
+    uint32_t *number;   /* [vertex_count] component; EBPO_NO_INDEX: unused vertex */
+    uint32_t *position; /* [vertex_count] position among the component's vertices; NULL: see
+                           position_of */
     ebpo_number_groups faces, vertices;
 };
 
@@ -50,7 +52,7 @@ EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool f
 /* Finds components with their faces, edges and volumes; cavities are not yet joined to their hosts.
  * Free with ebpo_components_free, also on failure. `closed`: NULL, or the result of
  * ebpo_mesh_find_shells; then each shell is a component, and the other faces are connected by
- * vertices. The array `closed` becomes `of_face`. */
+ * vertices. The array `closed` becomes the field `of_face` of the result. */
 EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed,
                                                unsigned threads, const ebpo_progress *progress,
                                                ebpo_components **out, ebpo_error *error);
@@ -60,21 +62,25 @@ EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *
 EBPO_MUST_USE ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number,
                                                  ebpo_error *error);
 
-/* Measures edges and volumes; needs the groups of faces. */
+/* Finds out which components are closed, and computes their volumes. The groups of faces must
+ * exist. */
 EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
                                                   const ebpo_progress *progress, ebpo_error *error);
 
-/* Sets the host of each component; needs the measurements. */
+/* Sets the host of each component. ebpo_components_measure must have been called. */
 EBPO_MUST_USE ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error);
 
 /* The groups of faces that a file names. */
 
 struct ebpo_mesh_groups {
     ebpo_mesh_group *list; /* [count] groups with faces first, in the order of their faces */
-    uint64_t count, with_faces, face_count;
+    uint64_t count;        /* of groups */
+    uint64_t with_faces;   /* number of groups with faces */
+    uint64_t face_count;   /* of all groups */
     char *names;
-    uint64_t *run_end; /* [run_count] one past its last face, ascending */
-    uint32_t *run_group;
+    /* a run is a range of consecutive faces of one group */
+    uint64_t *run_end;   /* [run_count] one past the last face of each run, ascending */
+    uint32_t *run_group; /* [run_count] group of each run */
     uint64_t run_count;
 };
 

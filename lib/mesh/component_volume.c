@@ -1,4 +1,5 @@
-/* Finds closed components and computes their volumes. */
+/* Finds the closed components of a mesh and computes their volumes. Finds the component around each
+ * cavity (a closed component of negative volume). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -27,6 +28,7 @@ typedef struct measuring {
 
 /* ---- edges ---- */
 
+/* Returns true if an edge is used equally often in both directions. */
 static bool uses_balance(const ebpo_link *links, uint64_t uses)
 {
     uint64_t out = 0;
@@ -40,8 +42,8 @@ static void set_open(ebpo_components *c, uint32_t component)
     __atomic_store_n(&c->list[component].open, true, __ATOMIC_RELAXED);
 }
 
-/* Visits an edge and marks its components as open if it does not balance. Its faces may be in
- * several components. */
+/* Visits an edge with faces in several components. Marks each component as open that does not use
+ * the edge equally often in both directions. Returns false when memory is short. */
 static bool visit_edge(ebpo_components *c, const ebpo_link *links, uint64_t uses,
                        ebpo_edge_faces *e)
 {
@@ -111,7 +113,8 @@ static ebpo_status inspect_edges(measuring *m, unsigned threads, const ebpo_prog
 
 /* ---- volumes ---- */
 
-/* Returns six times the volume of the tetrahedron with apex `base`, in the frame. */
+/* Returns six times the volume of the tetrahedron between a face and the apex `base`, in the frame.
+ * Extends the component's box by the face. */
 static double volume_term(const measuring *m, ebpo_found_component *c, uint64_t face,
                           const double base[3])
 {
@@ -140,21 +143,22 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
     ebpo_components *c = m->components;
     (void)worker, (void)error;
     for (uint64_t n = begin; n < end; n++) {
-        ebpo_found_component *one = &c->list[n];
+        ebpo_found_component *component = &c->list[n];
         ebpo_sum sum = { .adds = 0 };
-        double base[3], most = 0;
-        ebpo_frame_position(&m->frame, c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
+        double base[3], greatest = 0;
+        ebpo_frame_position(&m->frame, c->mesh, c->mesh->faces[3 * (uint64_t)component->face],
+                            base);
         for (int k = 0; k < 3; k++)
-            one->min[k] = INFINITY, one->max[k] = -INFINITY;
+            component->min[k] = INFINITY, component->max[k] = -INFINITY;
         EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1]) {
-            double term = volume_term(m, one, c->faces.of[i], base);
-            most = fmax(most, fabs(term));
+            double term = volume_term(m, component, c->faces.members[i], base);
+            greatest = fmax(greatest, fabs(term));
             ebpo_sum_add(&sum, term);
         }
-        one->volume = one->open ? 0 : ebpo_sum_value(&sum) / 6;
-        if (c->of_face &&
-            ebpo_volume_is_noise(one->volume, c->faces.begin[n + 1] - c->faces.begin[n], most))
-            one->volume = 0;
+        component->volume = component->open ? 0 : ebpo_sum_value(&sum) / 6;
+        if (c->of_face && ebpo_volume_is_noise(component->volume,
+                                               c->faces.begin[n + 1] - c->faces.begin[n], greatest))
+            component->volume = 0;
     }
     return EBPO_OK;
 }
@@ -172,10 +176,11 @@ ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
 
 /* --- the closed component around a cavity --- */
 
-/* A closed component of negative volume, represented by the first vertex of its first face. */
+/* A closed component of negative volume, with the first vertex of its first face. A cavity is in
+ * the host around which this vertex has a winding number other than 0. */
 typedef struct cavity {
     double at[3];
-    int64_t winding; /* around the current host */
+    int64_t winding; /* winding number of `at` around the current host */
     uint32_t component;
     bool placed;
 } cavity;
@@ -205,6 +210,7 @@ static int compare_hosts(const void *x, const void *y, void *list)
     return a < b ? -1 : 1;
 }
 
+/* Lists the cavities and the possible hosts. */
 static void list_both(placing *p)
 {
     const ebpo_components *c = p->components;
@@ -236,7 +242,8 @@ static uint64_t first_from_y(const placing *p, double y)
     return low;
 }
 
-/* Counts crossings of a face with segments from the cavities along x to the host's end. */
+/* Counts the crossings of a face with the segments that lead from the cavities' points along x to
+ * the end of the host. */
 static void cross_face(placing *p, const ebpo_found_component *host, uint64_t face)
 {
     const ebpo_mesh *mesh = p->components->mesh;
@@ -266,6 +273,7 @@ static bool any_within(const placing *p, const ebpo_found_component *host)
     return false;
 }
 
+/* Places the cavities without a host that are inside this closed component. */
 static void fill_host(placing *p, uint32_t number)
 {
     const ebpo_components *c = p->components;
@@ -274,7 +282,7 @@ static void fill_host(placing *p, uint32_t number)
         return;
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[number],
                              c->faces.begin[number + (uint64_t)1])
-        cross_face(p, host, c->faces.of[i]);
+        cross_face(p, host, c->faces.members[i]);
     for (uint64_t i = first_from_y(p, host->min[1]);
          i < p->count && p->cavities[i].at[1] <= host->max[1]; i++) {
         cavity *v = &p->cavities[i];

@@ -1,5 +1,6 @@
 /* Finds the components of a mesh, joins cavities to the components around them, and extracts each
- * component as a separate mesh. */
+ * component as a separate mesh. Also extracts the groups of faces that a file names (OBJ groups).
+ */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -39,20 +40,21 @@ ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Computes each vertex's root, the lowest vertex of its component. */
-static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_t *above)
+/* Computes for each vertex its root, the lowest vertex of its component (core/disjoint_sets.h).
+ * Ignores faces of closed shells. */
+static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_t *parent)
 {
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
-        above[v] = (uint32_t)v;
+        parent[v] = (uint32_t)v;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
         const uint32_t *corner = mesh->faces + 3 * f;
         if (closed && closed[f] != EBPO_NO_INDEX)
             continue;
-        ebpo_set_join(above, corner[0], corner[1]);
-        ebpo_set_join(above, corner[0], corner[2]);
+        ebpo_set_join(parent, corner[0], corner[1]);
+        ebpo_set_join(parent, corner[0], corner[2]);
     }
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
-        above[v] = above[above[v]]; /* lower vertices have their final root */
+        parent[v] = parent[parent[v]]; /* lower vertices have their final root */
 }
 
 static int compare_first(const void *x, const void *y)
@@ -78,17 +80,17 @@ static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, ui
     return EBPO_OK;
 }
 
-/* Returns the address at which the face's component index is kept: that of the lowest face of its
- * shell, or of the root of its vertices. */
-static uint32_t *component_address(const ebpo_components *c, const uint32_t *above,
+/* Returns the address of the component's index for face f: in of_shell, at the lowest face of its
+ * shell, or in c->number, at the root of its vertices. */
+static uint32_t *component_address(const ebpo_components *c, const uint32_t *parent,
                                    uint32_t *of_shell, uint64_t f)
 {
     return of_shell && c->of_face[f] != EBPO_NO_INDEX ? &of_shell[c->of_face[f]]
-                                                      : &c->number[above[c->mesh->faces[3 * f]]];
+                                                      : &c->number[parent[c->mesh->faces[3 * f]]];
 }
 
 /* Numbers components by their first faces in the source. */
-static ebpo_status list_components(ebpo_components *c, const uint32_t *above, uint32_t *of_shell,
+static ebpo_status list_components(ebpo_components *c, const uint32_t *parent, uint32_t *of_shell,
                                    ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
@@ -96,18 +98,18 @@ static ebpo_status list_components(ebpo_components *c, const uint32_t *above, ui
     ebpo_status status = EBPO_OK;
     ebpo_array_fill(mesh->workspace, c->number, 0xff, mesh->vertex_count * sizeof *c->number);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
-        status = add_face(c, f, component_address(c, above, of_shell, f), &capacity, error);
+        status = add_face(c, f, component_address(c, parent, of_shell, f), &capacity, error);
         if (status != EBPO_OK)
             return status;
     }
     qsort(c->list, c->count, sizeof *c->list, compare_first);
     for (uint64_t i = 0; i < c->count; i++)
-        *component_address(c, above, of_shell, c->list[i].face) = (uint32_t)i;
+        *component_address(c, parent, of_shell, c->list[i].face) = (uint32_t)i;
     if (of_shell)
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count)
-            c->of_face[f] = *component_address(c, above, of_shell, f);
+            c->of_face[f] = *component_address(c, parent, of_shell, f);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
-        c->number[v] = c->number[above[v]];
+        c->number[v] = c->number[parent[v]];
     return EBPO_OK;
 }
 
@@ -141,7 +143,7 @@ static void fill_groups(const ebpo_components *c, bool faces, ebpo_number_groups
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, 0, items) {
         uint32_t number = component_of(c, faces, i);
         if (number != EBPO_NO_INDEX)
-            g->of[g->begin[number]++] = (uint32_t)i;
+            g->members[g->begin[number]++] = (uint32_t)i;
     }
     memmove(g->begin + 1, g->begin, c->count * sizeof *g->begin);
     g->begin[0] = 0;
@@ -152,51 +154,51 @@ ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, ebpo_num
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count;
     g->begin = ebpo_array_alloc(c->mesh->workspace, c->count + 1, sizeof *g->begin);
-    g->of = ebpo_array_alloc(c->mesh->workspace, items, sizeof *g->of);
-    if (!g->begin || !g->of)
-        return ebpo_workspace_fail(c->mesh->workspace, items * sizeof *g->of, error);
+    g->members = ebpo_array_alloc(c->mesh->workspace, items, sizeof *g->members);
+    if (!g->begin || !g->members)
+        return ebpo_workspace_fail(c->mesh->workspace, items * sizeof *g->members, error);
     fill_groups(c, faces, g);
     return EBPO_OK;
 }
 
 /* ---- joining cavities to hosts ---- */
 
-/* Numbers hosts by their first faces; the first face of a host may belong to its cavity. `moved`:
- * the new index of each component. */
-static void number_hosts(ebpo_components *c, uint32_t *moved)
+/* Numbers hosts by their first faces; the first face of a host may belong to one of its cavities.
+ * new_index: the new index of each component, which for a cavity is the index of its host. */
+static void number_hosts(ebpo_components *c, uint32_t *new_index)
 {
     uint64_t count = 0;
-    memset(moved, 0xff, c->count * sizeof *moved);
+    memset(new_index, 0xff, c->count * sizeof *new_index);
     for (uint64_t i = 0; i < c->count; i++) {
         uint32_t host = c->list[i].host;
-        if (moved[host] == EBPO_NO_INDEX) {
+        if (new_index[host] == EBPO_NO_INDEX) {
             c->facts[count] = (ebpo_component){ .struct_size = sizeof *c->facts,
                                                 .first_face = c->list[i].first,
                                                 .closed = !c->list[host].open };
-            moved[host] = (uint32_t)count++;
+            new_index[host] = (uint32_t)count++;
         }
-        c->facts[moved[host]].cavities += host != i;
+        c->facts[new_index[host]].cavities += host != i;
     }
     for (uint64_t i = 0; i < c->count; i++)
-        moved[i] = moved[c->list[i].host]; /* a host maps to itself */
+        new_index[i] = new_index[c->list[i].host]; /* a host maps to itself */
     c->count = count;
 }
 
 static ebpo_status join_cavities(ebpo_components *c, ebpo_error *error)
 {
     ebpo_workspace *workspace = c->mesh->workspace;
-    uint32_t *moved = ebpo_array_alloc(workspace, c->count, sizeof *moved);
+    uint32_t *new_index = ebpo_array_alloc(workspace, c->count, sizeof *new_index);
     c->facts = ebpo_array_alloc(workspace, c->count, sizeof *c->facts);
-    if (!moved || !c->facts) {
-        ebpo_array_free(workspace, moved);
+    if (!new_index || !c->facts) {
+        ebpo_array_free(workspace, new_index);
         return ebpo_workspace_fail(workspace, c->count * sizeof *c->facts, error);
     }
-    number_hosts(c, moved);
+    number_hosts(c, new_index);
     EBPO_FOR_ITEMS_SCATTERED(workspace, v, 0, c->mesh->vertex_count) {
         if (c->number[v] != EBPO_NO_INDEX)
-            c->number[v] = moved[c->number[v]];
+            c->number[v] = new_index[c->number[v]];
     }
-    ebpo_array_free(workspace, moved);
+    ebpo_array_free(workspace, new_index);
     return EBPO_OK;
 }
 
@@ -206,41 +208,42 @@ static ebpo_status find_components(ebpo_components *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
     uint64_t n = mesh->vertex_count;
-    uint32_t *above = ebpo_array_alloc(mesh->workspace, n, sizeof *above);
+    uint32_t *parent = ebpo_array_alloc(mesh->workspace, n, sizeof *parent);
     c->number = ebpo_array_alloc(mesh->workspace, n, sizeof *c->number);
     uint32_t *of_shell = NULL;
-    bool made = above && c->number;
+    bool made = parent && c->number;
     if (c->of_face) {
         of_shell = ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *of_shell);
         made = made && of_shell;
     }
     ebpo_status status =
-        made ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *above, error);
+        made ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *parent, error);
     if (status == EBPO_OK) {
         if (of_shell)
             ebpo_array_fill(mesh->workspace, of_shell, 0xff, mesh->face_count * sizeof *of_shell);
-        join_vertices(mesh, c->of_face, above);
-        status = list_components(c, above, of_shell, error);
+        join_vertices(mesh, c->of_face, parent);
+        status = list_components(c, parent, of_shell, error);
     }
     ebpo_array_free(mesh->workspace, of_shell);
-    ebpo_array_free(mesh->workspace, above);
+    ebpo_array_free(mesh->workspace, parent);
     return status == EBPO_OK ? ebpo_components_group(c, true, &c->faces, error) : status;
 }
 
-/* Computes each vertex's position within its component. */
+/* Computes the position of each vertex among the vertices of its component. */
 static ebpo_status number_vertices(ebpo_components *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
     ebpo_status status = ebpo_components_group(c, false, &c->vertices, error);
     if (status != EBPO_OK)
         return status;
-    c->place = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *c->place);
-    if (!c->place)
-        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *c->place, error);
+    c->position = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *c->position);
+    if (!c->position)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *c->position,
+                                   error);
     for (uint64_t n = 0; n < c->count; n++) {
         uint64_t begin = c->vertices.begin[n];
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, begin, c->vertices.begin[n + 1])
-            c->place[c->vertices.of[i]] = (uint32_t)(i - begin);
+            c->position[c->vertices.members[i]] = (uint32_t)(i - begin);
         c->facts[n].vertex_count = c->vertices.begin[n + 1] - begin;
         c->facts[n].face_count = c->faces.begin[n + 1] - c->faces.begin[n];
     }
@@ -316,9 +319,9 @@ void ebpo_components_free(ebpo_components *c)
         return;
     ebpo_workspace *workspace = c->mesh->workspace;
     ebpo_array_free(workspace, c->number);
-    ebpo_array_free(workspace, c->place);
-    ebpo_array_free(workspace, c->faces.of);
-    ebpo_array_free(workspace, c->vertices.of);
+    ebpo_array_free(workspace, c->position);
+    ebpo_array_free(workspace, c->faces.members);
+    ebpo_array_free(workspace, c->vertices.members);
     ebpo_array_free(workspace, c->faces.begin);
     ebpo_array_free(workspace, c->vertices.begin);
     ebpo_array_free(workspace, c->list);
@@ -342,12 +345,11 @@ ebpo_status ebpo_components_get(const ebpo_components *c, uint64_t number, ebpo_
                               (unsigned long long)number);
 }
 
-/* Copies a component as a separate mesh that keeps source indices. */
-
+/* --- a component as a separate mesh, which keeps source indices --- */
 static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *out)
 {
     const ebpo_mesh *mesh = c->mesh;
-    const uint32_t *from = c->vertices.of + c->vertices.begin[number];
+    const uint32_t *from = c->vertices.members + c->vertices.begin[number];
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, out->vertex_count) {
         if (mesh->xyz32)
             memcpy(out->xyz32 + 3 * i, mesh->xyz32 + 3 * (uint64_t)from[i], 3 * sizeof(float));
@@ -357,16 +359,16 @@ static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *
     }
 }
 
-/* Returns the position of vertex v within the part. */
+/* Returns the position of vertex v among the vertices of the component. */
 static uint32_t position_of(const ebpo_components *c, uint64_t number, uint32_t v)
 {
-    if (c->place)
-        return c->place[v];
-    const uint32_t *of = c->vertices.of + c->vertices.begin[number];
+    if (c->position)
+        return c->position[v];
+    const uint32_t *members = c->vertices.members + c->vertices.begin[number];
     uint64_t low = 0, high = c->vertices.begin[number + 1] - c->vertices.begin[number];
     while (high - low > 1) {
         uint64_t middle = low + (high - low) / 2;
-        if (of[middle] <= v)
+        if (members[middle] <= v)
             low = middle;
         else
             high = middle;
@@ -377,7 +379,7 @@ static uint32_t position_of(const ebpo_components *c, uint64_t number, uint32_t 
 static void copy_faces(const ebpo_components *c, uint64_t number, ebpo_mesh *out)
 {
     const ebpo_mesh *mesh = c->mesh;
-    const uint32_t *from = c->faces.of + c->faces.begin[number];
+    const uint32_t *from = c->faces.members + c->faces.begin[number];
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, out->face_count) {
         for (uint64_t k = 0; k < 3; k++)
             out->faces[3 * i + k] = position_of(c, number, mesh->faces[3 * (uint64_t)from[i] + k]);
@@ -385,7 +387,8 @@ static void copy_faces(const ebpo_components *c, uint64_t number, ebpo_mesh *out
     }
 }
 
-/* Adds source indices and their totals. The mesh is not arranged for building a file. */
+/* Adds the arrangement, which has the source indices. The mesh is not sorted for building a file.
+ */
 static bool make_arrangement(const ebpo_mesh *whole, ebpo_mesh *out)
 {
     struct ebpo_arrangement *a = ebpo_alloc_zero(1, sizeof *a);
@@ -432,7 +435,8 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
         status = ebpo_workspace_fail(out->workspace,
                                      28 * facts.vertex_count + 16 * facts.face_count, error);
     }
-    if (status == EBPO_OK) /* sorted by source indices, as building selects rows */
+    if (status ==
+        EBPO_OK) /* the rows stay in source order; the builder selects the rows of the component */
         status = ebpo_attributes_borrow(&out->attributes, c->mesh->attributes, error);
     if (status != EBPO_OK) {
         ebpo_mesh_free(out);
@@ -453,13 +457,14 @@ static const char unnamed[] = "default";
 typedef struct naming {
     const ebpo_named_run *runs;
     uint64_t count;
-    uint32_t *order;  /* by name, then in file order */
-    uint32_t *alike;  /* first run of the same name */
-    uint32_t *number; /* for a first run: its group */
+    uint32_t *order;       /* by name, then in file order */
+    uint32_t *first_alike; /* [count] first run of the same name */
+    uint32_t *number;      /* [count] for the first run of a name: the group */
     ebpo_mesh_groups *out;
     uint64_t name_bytes;
 } naming;
 
+/* Returns the run with the name that is reported. */
 static ebpo_named_run shown_name(const ebpo_named_run *run)
 {
     return run->size ? *run : (ebpo_named_run){ unnamed, sizeof unnamed - 1, run->faces };
@@ -491,14 +496,14 @@ static void find_alike(naming *n)
     for (uint64_t i = 0; i < n->count; i++) {
         uint32_t run = n->order[i], before = i ? n->order[i - 1] : run;
         bool same = i && compare_names(&n->runs[run], &n->runs[before]) == 0;
-        n->alike[run] = same ? n->alike[before] : run;
+        n->first_alike[run] = same ? n->first_alike[before] : run;
     }
 }
 
 /* Creates a group for the run's name if it has none. */
 static void name_group(naming *n, uint64_t run, uint64_t first_face)
 {
-    uint32_t *number = &n->number[n->alike[run]];
+    uint32_t *number = &n->number[n->first_alike[run]];
     if (*number != EBPO_NO_INDEX)
         return;
     ebpo_named_run name = shown_name(&n->runs[run]);
@@ -512,7 +517,7 @@ static void name_group(naming *n, uint64_t run, uint64_t first_face)
                                                        .first_face = first_face };
 }
 
-/* Numbers groups with faces first, then the others. */
+/* Numbers groups with faces first, then groups without faces. */
 static void name_groups(naming *n)
 {
     ebpo_mesh_groups *out = n->out;
@@ -521,7 +526,7 @@ static void name_groups(naming *n)
         if (faces == 0)
             continue;
         name_group(n, i, out->face_count);
-        uint32_t number = n->number[n->alike[i]];
+        uint32_t number = n->number[n->first_alike[i]];
         out->list[number].face_count += faces;
         out->face_count += faces;
         out->run_end[out->run_count] = out->face_count;
@@ -538,13 +543,13 @@ static ebpo_status make_groups(naming *n, ebpo_error *error)
     for (uint64_t i = 0; i < n->count; i++)
         bytes += n->runs[i].size;
     n->order = ebpo_alloc(n->count, sizeof *n->order);
-    n->alike = ebpo_alloc(n->count, sizeof *n->alike);
+    n->first_alike = ebpo_alloc(n->count, sizeof *n->first_alike);
     n->number = ebpo_alloc(n->count, sizeof *n->number);
     n->out->list = ebpo_alloc(n->count, sizeof *n->out->list);
     n->out->names = ebpo_alloc(bytes, 1);
     n->out->run_end = ebpo_alloc(n->count, sizeof *n->out->run_end);
     n->out->run_group = ebpo_alloc(n->count, sizeof *n->out->run_group);
-    if (!n->order || !n->alike || !n->number || !n->out->list || !n->out->names ||
+    if (!n->order || !n->first_alike || !n->number || !n->out->list || !n->out->names ||
         !n->out->run_end || !n->out->run_group)
         return ebpo_fail_memory(error, bytes + n->count * sizeof *n->out->list);
     find_alike(n);
@@ -562,7 +567,7 @@ ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count, ebp
     n.out = ebpo_alloc_zero(1, sizeof *n.out);
     ebpo_status status = n.out ? make_groups(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
     free(n.order);
-    free(n.alike);
+    free(n.first_alike);
     free(n.number);
     if (status == EBPO_OK)
         *out = n.out;
@@ -616,8 +621,8 @@ uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face)
 
 /* --- named groups in place of components; a vertex may be in several groups --- */
 
-/* Lists each group's vertices once, in the order of its faces; only counts them if `of` is NULL.
- * `last_group`: [vertex_count] last group that used the vertex. */
+/* Lists each group's vertices once, in the order of its faces; only counts them if `members` is
+ * NULL. `last_group`: [vertex_count] last group that used the vertex. */
 static void list_vertices(ebpo_components *c, uint32_t *last_group)
 {
     const ebpo_mesh *mesh = c->mesh;
@@ -627,12 +632,12 @@ static void list_vertices(ebpo_components *c, uint32_t *last_group)
         c->vertices.begin[n] = count;
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1])
             for (uint64_t k = 0; k < 3; k++) {
-                uint32_t v = mesh->faces[3 * (uint64_t)c->faces.of[i] + k];
+                uint32_t v = mesh->faces[3 * (uint64_t)c->faces.members[i] + k];
                 if (last_group[v] == (uint32_t)n)
                     continue;
                 last_group[v] = (uint32_t)n;
-                if (c->vertices.of)
-                    c->vertices.of[count] = v;
+                if (c->vertices.members)
+                    c->vertices.members[count] = v;
                 count++;
             }
     }
@@ -653,15 +658,16 @@ static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
     v->begin = ebpo_array_alloc(workspace, c->count + 1, sizeof *v->begin);
     if (last_group && v->begin) {
         list_vertices(c, last_group);
-        v->of = ebpo_array_alloc(workspace, v->begin[c->count], sizeof *v->of);
+        v->members = ebpo_array_alloc(workspace, v->begin[c->count], sizeof *v->members);
     }
-    if (v->of)
+    if (v->members)
         list_vertices(c, last_group);
     ebpo_array_free(workspace, last_group);
-    if (!v->of)
-        return ebpo_workspace_fail(workspace, c->mesh->vertex_count * sizeof *v->of, error);
+    if (!v->members)
+        return ebpo_workspace_fail(workspace, c->mesh->vertex_count * sizeof *v->members, error);
     for (uint64_t n = 0; n < c->count; n++)
-        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of, compare_vertices);
+        qsort(v->members + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->members,
+              compare_vertices);
     return EBPO_OK;
 }
 

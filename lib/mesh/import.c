@@ -1,6 +1,6 @@
 /* Reads meshes of all formats. The table `formats` has one row for each format. To add a format:
  * write NAME.c with its reader and its row, declare the row in import_build.h, and add a line to
- * the table. */
+ * the table `formats`. */
 #include "core/strict_fp.h"
 
 #include "mesh/import.h"
@@ -16,7 +16,7 @@
 #include "mesh/import_build.h"
 #include "io/file_source.h"
 
-/* In the order of recognition. Messages list the formats from the last row to the first. */
+/* The formats in the order of recognition. Messages list them in reverse order. */
 static const ebpo_import_format *const formats[] = {
     &ebpo_import_off,
     &ebpo_import_stl,
@@ -47,8 +47,9 @@ static void drop_empty(ebpo_mesh *mesh)
     mesh->attributes = NULL;
 }
 
-/* Reads the file with float or double positions. Sets *again if floats do not keep the text of its
- * coordinates. On failure only the mesh's workspace remains. */
+/* Reads the file with float or double positions. Sets *again to true if the file must be read again
+ * with doubles, because floats do not keep the text of a coordinate. On failure, only the workspace
+ * of the mesh remains. */
 static ebpo_status read_once(ebpo_mesh *mesh, const ebpo_import_format *format,
                              const ebpo_import_job *job, bool doubles, bool *again,
                              ebpo_error *error)
@@ -122,7 +123,7 @@ static bool has_signature(const uint8_t *data, uint64_t size)
 }
 
 /* Checks the ending of the name. `format`: the format of this ending. Rejects the file if it begins
- * like a file of another format that has no signature. */
+ * like a file of another format without a signature. */
 static ebpo_status check_name(const ebpo_import_format *format, const ebpo_import_job *job,
                               ebpo_error *error)
 {

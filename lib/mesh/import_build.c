@@ -160,7 +160,8 @@ static void number_vertices(ebpo_import_build *b)
     }
 }
 
-/* Reserves space. Faces before the first row have no value. */
+/* Reserves space for the corners of `faces` faces in a table. Faces before the first row of the
+ * table have no value. */
 static bool reserve_space_in(ebpo_import_build *b, ebpo_import_table *t, uint64_t faces)
 {
     ebpo_workspace *workspace = b->mesh->workspace;
@@ -178,16 +179,17 @@ static ebpo_status reserve_space(ebpo_import_build *b, uint64_t more)
     uint64_t need = mesh->face_count + more;
     if (more > EBPO_IMPORT_MAX - mesh->face_count)
         return fail_many(b);
-    bool fine = ebpo_array_grow(mesh->workspace, &mesh->faces, &b->face_capacity, need,
-                                3 * sizeof *mesh->faces);
-    for (int i = 0; i < EBPO_IMPORT_SORTS && fine; i++)
-        fine = !b->attributes || !b->table[i].rows || reserve_space_in(b, &b->table[i], need);
-    return fine ? EBPO_OK : fail_memory(b, need * 3 * sizeof *mesh->faces);
+    bool enough = ebpo_array_grow(mesh->workspace, &mesh->faces, &b->face_capacity, need,
+                                  3 * sizeof *mesh->faces);
+    for (int i = 0; i < EBPO_IMPORT_SORTS && enough; i++)
+        enough = !b->attributes || !b->table[i].rows || reserve_space_in(b, &b->table[i], need);
+    return enough ? EBPO_OK : fail_memory(b, need * 3 * sizeof *mesh->faces);
 }
 
-static void put_triangle(ebpo_import_build *b, uint32_t a, uint32_t second, uint32_t third)
+/* Adds a triangle of corners of the current polygon. */
+static void put_triangle(ebpo_import_build *b, uint32_t first, uint32_t second, uint32_t third)
 {
-    const uint32_t corner[3] = { a, second, third };
+    const uint32_t corner[3] = { first, second, third };
     uint64_t at = 3 * b->mesh->face_count++;
     for (uint64_t k = 0; k < 3; k++) {
         const ebpo_import_corner *c = &b->corner[corner[k]];
@@ -221,6 +223,7 @@ static void load_position(const ebpo_import_build *b, uint64_t vertex, double xy
         xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
 }
 
+/* Triangulates the current polygon of n > 3 corners. */
 static ebpo_status cut_polygon(ebpo_import_build *b, uint32_t n)
 {
     ebpo_status status = reserve_scratch(b, n);
@@ -321,7 +324,7 @@ void ebpo_import_word_text(char text[EBPO_IMPORT_WORD_TEXT], const char *s, size
 
 void ebpo_import_runs_free(ebpo_import_runs *runs)
 {
-    free(runs->of);
+    free(runs->run);
     *runs = (ebpo_import_runs){ 0 };
 }
 
@@ -347,6 +350,7 @@ static const struct {
                                { "nx ny nz", "normal" },
                                { "s t", "texcoord" } };
 
+/* A table whose values become an attribute. */
 typedef struct placing {
     const ebpo_import_build *b;
     const ebpo_import_table *table;
@@ -392,7 +396,8 @@ static const void *value_at(const placing *p, uint64_t corner)
                                    : (const char *)p->table->values + row * p->bytes;
 }
 
-/* Sets *fits to true if all corners at each vertex have equal values. */
+/* Adds the values as an attribute of vertices, if all corners at each vertex have equal values.
+ * *fits: true if they do. */
 static ebpo_status place_on_vertices(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
@@ -413,7 +418,8 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
     return EBPO_OK;
 }
 
-/* Sets *fits to true if all corners of each face have equal values. */
+/* Adds the values as an attribute of faces, if all corners of each face have equal values. *fits:
+ * true if they do. */
 static ebpo_status place_on_faces(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
@@ -431,6 +437,7 @@ static ebpo_status place_on_faces(const placing *p, bool *fits)
     return status;
 }
 
+/* Adds the values as an attribute of faces, with the values of the three corners in each row. */
 static ebpo_status place_in_lists(const placing *p)
 {
     ebpo_attribute head = head_of(p, "face"), *a;
@@ -443,8 +450,8 @@ static ebpo_status place_in_lists(const placing *p)
     return status;
 }
 
-/* Converts values to bytes in place: they are written below the values that are still to be read.
- */
+/* Converts values to bytes in the same memory. A byte is written before, or at, the next value to
+ * be read. */
 static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;
@@ -500,20 +507,21 @@ static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
            bits_of(xyz + 2 * size, size) == key[2];
 }
 
-/* Callers pass a constant size, for which the compiler specialises this function. */
+/* Moves the first vertex of each position to the front; returns the number of positions. Callers
+ * pass a constant size, for which the compiler specialises this function. */
 static inline uint64_t weld_positions(char *xyz, size_t size, uint64_t count, uint32_t *map,
                                       uint32_t *table, uint64_t slots)
 {
     uint32_t kept = 0;
     for (uint64_t i = 0; i < count; i++) {
-        const char *own = xyz + 3 * size * i;
-        const uint64_t key[3] = { bits_of(own, size), bits_of(own + size, size),
-                                  bits_of(own + 2 * size, size) };
+        const char *position = xyz + 3 * size * i;
+        const uint64_t key[3] = { bits_of(position, size), bits_of(position + size, size),
+                                  bits_of(position + 2 * size, size) };
         uint64_t at; /* slot of an equal vertex, or the free slot for it */
         EBPO_HASH_FIND(at, ebpo_hash_three(key), slots - 1,
                        table[at] == EMPTY || has_key(xyz + 3 * size * table[at], size, key));
         if (table[at] == EMPTY) {
-            memmove(xyz + 3 * size * kept, own, 3 * size);
+            memmove(xyz + 3 * size * kept, position, 3 * size);
             table[at] = kept++;
         }
         map[i] = table[at];

@@ -1,7 +1,7 @@
 /* Builds a mesh from a file with vertices, faces and values of corners.
  *
- * The vertices of the mesh are those that faces use, in the order of first use, one for each
- * position: OBJ and OFF files often, and STL files always, repeat vertices where faces meet. */
+ * The mesh has one vertex for each position that faces use, in the order of first use: OBJ and OFF
+ * files often, and STL files always, repeat the vertices of adjacent faces. */
 #ifndef EBPO_MESH_IMPORT_BUILD_H
 #define EBPO_MESH_IMPORT_BUILD_H
 
@@ -23,14 +23,14 @@ typedef enum ebpo_import_sort {
     EBPO_IMPORT_SORTS
 } ebpo_import_sort;
 
-/* Values that corners refer to. */
+/* Values to which corners refer: colours, normals or texture coordinates. */
 typedef struct ebpo_import_table {
     float *values; /* [rows][columns] */
     uint64_t rows, capacity;
     uint32_t
         *index; /* [faces of the mesh][3] rows; EBPO_IMPORT_NONE: no row; only with attributes */
     uint64_t index_capacity;
-    bool named;   /* a corner refers to a row */
+    bool named;   /* some corner refers to a row */
     bool bytes;   /* values are integers up to 255, stored as bytes */
     bool of_face; /* the file has one value for each face */
 } ebpo_import_table;
@@ -44,27 +44,27 @@ typedef struct ebpo_import_build {
     const char *name;
     ebpo_error *error;
     ebpo_mesh *mesh;
-    bool attributes; /* values are stored */
+    bool attributes; /* attributes are requested: values are stored */
     locale_t c_locale;
 
     bool doubles;         /* positions are doubles, otherwise floats */
     bool loses_digits;    /* floats do not keep the text of a coordinate */
-    uint64_t rounded;     /* number of table values whose text floats do not keep */
+    uint64_t rounded;     /* number of table values that floats round */
     size_t position_size; /* bytes */
-    void *xyz;            /* [vertices][3] of the file */
+    void *xyz;            /* [vertices][3] positions of the file's vertices */
     uint64_t vertices, vertex_capacity;
-    uint32_t *use; /* [vertices] index by first use; EBPO_IMPORT_NONE: not yet used */
+    uint32_t *use; /* [vertices] index in the mesh; EBPO_IMPORT_NONE: no face has used the vertex */
     uint64_t face_capacity;
     ebpo_import_table table[EBPO_IMPORT_SORTS];
 
     ebpo_import_corner *corner; /* corners of the current polygon */
     uint64_t corners, corner_capacity;
-    void *scratch; /* scratch memory for its triangulation */
+    void *scratch; /* scratch memory for the triangulation of the polygon */
     uint64_t scratch_capacity;
 } ebpo_import_build;
 
-/* Begins a mesh with float or double positions. EBPO_E_MEMORY. After a failure there is nothing to
- * free. */
+/* Begins a mesh with float or double positions. EBPO_E_MEMORY. After a failure, the caller frees
+ * nothing. */
 EBPO_MUST_USE ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mesh, const char *name,
                                             bool attributes, bool doubles, ebpo_error *error);
 
@@ -72,8 +72,8 @@ EBPO_MUST_USE ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mes
  * number. */
 bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, size_t n);
 
-/* Parses the number again and divides it by a weight. The result is a float if that equals the
- * quotient. */
+/* Parses the number again and writes the number divided by `weight` to *value. Sets b->loses_digits
+ * if the quotient is no float. */
 void ebpo_import_quotient(ebpo_import_build *b, double *value, const char *s, size_t n,
                           double weight);
 
@@ -91,12 +91,13 @@ EBPO_MUST_USE ebpo_status ebpo_import_vertex(ebpo_import_build *b, const float x
  * ebpo_import_position. */
 EBPO_MUST_USE ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort sort,
                                           const float *values);
+/* Returns the number of columns of a table: 2 for texture coordinates, else 3. */
 unsigned ebpo_import_columns(ebpo_import_sort sort);
 
-/* Ends vertices and rows; faces follow. */
+/* Call this function after the last vertex and row, before the first polygon. */
 EBPO_MUST_USE ebpo_status ebpo_import_faces(ebpo_import_build *b);
 
-/* Returns space for another corner of the current polygon, or NULL without memory. */
+/* Returns space for another corner of the current polygon, or NULL when memory is short. */
 ebpo_import_corner *ebpo_import_add_corner(ebpo_import_build *b);
 
 /* Triangulates the polygon of the corners, or counts it as omitted if it has fewer than three
@@ -110,7 +111,7 @@ EBPO_MUST_USE ebpo_status ebpo_import_end(ebpo_import_build *b);
  * otherwise of faces, as one value for the face or as lists of its three corners. */
 EBPO_MUST_USE ebpo_status ebpo_import_attributes(ebpo_import_build *b);
 
-/* Copies a word for a message: at most 40 characters; unprintable ones become '?'. */
+/* Copies a word for a message: at most 40 characters; '?' replaces unprintable characters. */
 enum { EBPO_IMPORT_WORD_TEXT = 41 };
 void ebpo_import_word_text(char text[EBPO_IMPORT_WORD_TEXT], const char *s, size_t n);
 
@@ -120,7 +121,7 @@ void ebpo_import_free(ebpo_import_build *b);
 /* Moves the first vertex of each position to the front of xyz [count][3] (doubles or floats), in
  * order, and writes the new index of each old vertex to map [count]. Positions are equal if their
  * bits are equal or both coordinates are zero. (STL writers mix -0 and 0 along planes of symmetry;
- * the sign of the first one stays.) count <= 2^32 - 2. *welded: number of remaining vertices.
+ * the first vertex's sign stays.) count <= 2^32 - 2. *welded: number of remaining vertices.
  * EBPO_E_MEMORY only. */
 EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *map,
                                            uint64_t *welded, ebpo_error *error);
@@ -129,7 +130,7 @@ EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t cou
 
 /* Runs of faces, each with a name. */
 typedef struct ebpo_import_runs {
-    ebpo_named_run *of; /* [count] the first run precedes any name; its name is "" */
+    ebpo_named_run *run; /* [count] the first run precedes any name; its name is "" */
     uint64_t count, capacity;
 } ebpo_import_runs;
 
@@ -142,7 +143,7 @@ typedef struct ebpo_import_job {
     const char *name;              /* a path or any other name; messages omit its folders */
     ebpo_workspace *workspace;     /* for arrays; NULL: heap memory */
     bool attributes;               /* keep properties beyond positions and corners */
-    unsigned threads;              /* 0: all cores; the mesh does not depend on it */
+    unsigned threads;              /* 0: all cores; the mesh does not depend on the number */
     const ebpo_progress *progress; /* may be NULL */
     /* NULL, or initially empty: receives the runs of a format with named groups; the names point
      * into `data`. At most one run means that the file has no names. */
@@ -156,11 +157,11 @@ typedef struct ebpo_import_format {
         *ending; /* ending of file names: ".obj"; without the dot, the mesh's source_format */
     /* Returns true if the file begins like files of this format. */
     bool (*recognise)(const uint8_t *data, uint64_t size);
-    /* a file that begins like this format is read as this format, also if its name has the ending
-     * of another format */
+    /* true: a file that begins like this format is read as this format, even if its name has the
+     * ending of another format */
     bool beginning_decides;
-    /* files of other formats may begin in the same way, so the beginning does not identify the
-     * format */
+    /* true: files of other formats may begin in the same way, so the beginning does not identify
+     * the format */
     bool has_no_signature;
     /* Exactly one of `build` and `read` is set. `build` adds the content of the file to a mesh
      * under construction. `read` creates the complete mesh, reports progress, and clears `out` on
@@ -175,15 +176,15 @@ static inline const char *ebpo_import_name(const ebpo_import_format *format)
     return strchr(format->called, ' ') + 1;
 }
 
-/* The reader of a row. Libraries without readers of meshes, such as the npm package, are built with
- * EBPO_NO_MESH_READERS: they recognise files of these formats, for messages. */
+/* The reader function of a format. Libraries without readers of meshes, such as the npm package,
+ * are built with EBPO_NO_MESH_READERS: they recognise files of these formats, for messages. */
 #ifdef EBPO_NO_MESH_READERS
 #define EBPO_IMPORT_READER(reader) (false ? (reader) : NULL)
 #else
 #define EBPO_IMPORT_READER(reader) (reader)
 #endif
 
-/* The rows; each is defined in the file of its reader. */
+/* The formats. Each format is defined in the file of its reader. */
 extern const ebpo_import_format ebpo_import_ply, ebpo_import_obj, ebpo_import_stl, ebpo_import_off;
 
 /* Returns true if the first `known` bytes of a file declare a binary STL model of `size` bytes. */

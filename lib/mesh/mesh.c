@@ -1,5 +1,5 @@
-/* Handles a mesh as a whole: its name in messages, the check of its shape, copying, freeing,
- * and the frame in which coordinates can be multiplied without overflow. */
+/* Handles complete meshes: the name in messages, the check of the shape, copying, freeing, and the
+ * frame in which coordinates can be multiplied without overflow. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -53,7 +53,7 @@ static void *copy_of(ebpo_workspace *workspace, const void *from, uint64_t count
     return to;
 }
 
-/* Copies the order without keys, as the copy will be repaired. */
+/* Copies the arrangement (source indices), but not its keys, because the copy will be repaired. */
 static struct ebpo_arrangement *copy_order(const ebpo_mesh *mesh)
 {
     const struct ebpo_arrangement *from = mesh->arrangement;
@@ -125,37 +125,37 @@ int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
     return ebpo_attributes_hold(mesh->attributes);
 }
 
-static void include_vertex(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
+static void include_vertex(double greatest[3], const ebpo_mesh *mesh, uint64_t vertex)
 {
     double p[3];
     ebpo_mesh_position(mesh, vertex, p);
     for (int k = 0; k < 3; k++)
-        most[k] = fmax(most[k], fabs(p[k]));
+        greatest[k] = fmax(greatest[k], fabs(p[k]));
 }
 
-static ebpo_mesh_frame frame_of(const double most[3])
+static ebpo_mesh_frame frame_of(const double greatest[3])
 {
     ebpo_mesh_frame frame = { .scaled = false };
     for (int k = 0; k < 3; k++) {
-        frexp(most[k], &frame.exponent[k]); /* 0 for 0 */
+        frexp(greatest[k], &frame.exponent[k]); /* 0 for 0 */
         frame.scaled |= ebpo_exponent_is_far(frame.exponent[k]);
     }
     return frame;
 }
 
-/* Examines the corners of faces only if some vertex is far from 1, which is rare; that vertex may
- * be unused. Examining all vertices first is faster. */
+/* Examines all vertices first, which is fast. Only if the coordinates of some vertex are far from
+ * 1, which is rare, examines the corners of faces, because that vertex may be unused. */
 ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh)
 {
-    double most[3] = { 0, 0, 0 }, used[3] = { 0, 0, 0 };
+    double greatest[3] = { 0, 0, 0 }, greatest_used[3] = { 0, 0, 0 };
     if (mesh->xyz32) /* exponents of floats are from -148 to 128 */
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
-        include_vertex(most, mesh, v);
-    if (!frame_of(most).scaled)
+        include_vertex(greatest, mesh, v);
+    if (!frame_of(greatest).scaled)
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count)
         for (uint64_t k = 0; k < 3; k++)
-            include_vertex(used, mesh, mesh->faces[3 * f + k]);
-    return frame_of(used);
+            include_vertex(greatest_used, mesh, mesh->faces[3 * f + k]);
+    return frame_of(greatest_used);
 }

@@ -1,5 +1,5 @@
 /* Checks a mesh. Examines faces, edges, vertices and positions in parallel, and reports whether the
- * mesh is a closed 2-manifold, and the errors with their places. */
+ * mesh is a closed 2-manifold, and the errors with their locations. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"
 
-/* Adds a place to the worker's list. */
+/* Adds a location to the worker's list. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found)
 {
     ebpo_found_list *list = &check->found[worker];
@@ -48,8 +48,8 @@ typedef struct face_pass {
     double centre[3];
 } face_pass;
 
-/* Returns the root of v and halves the path. Any thread may do that at any time, because parents
- * only move towards the root. */
+/* Returns the root of v (core/disjoint_sets.h) and halves the path to the root. Any thread may call
+ * this function at any time, because parents only move towards the root. */
 static uint32_t find_root(uint32_t *parents, uint32_t v)
 {
     for (;;) {
@@ -64,8 +64,8 @@ static uint32_t find_root(uint32_t *parents, uint32_t v)
     }
 }
 
-/* Joins two trees: links the higher root to the lower one, which avoids cycles. The number of roots
- * does not depend on the order. */
+/* Joins two trees: links the higher root to the lower root, which avoids cycles. The number of
+ * roots does not depend on the order of the joins. */
 static void join_trees(uint32_t *parents, uint32_t a, uint32_t b)
 {
     for (;;) {
@@ -85,8 +85,9 @@ static void join_trees(uint32_t *parents, uint32_t a, uint32_t b)
     }
 }
 
-/* Returns true if |ad - bc| is certainly nonzero: it exceeds its error bound (Shewchuk 1997,
- * 3.33e-16), without underflow or overflow. */
+/* Returns true if ad - bc is certainly nonzero: its rounded value exceeds 1e-15 times |ad| + |bc|,
+ * which is more than the error bound (3.33e-16 times that sum, Shewchuk 1997), and nothing
+ * underflows or overflows. */
 static bool surely_nonzero(double a, double b, double c, double d)
 {
     double permanent = fabs(a * d) + fabs(b * c);
@@ -151,7 +152,7 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_check_position(pass->check, v[2], c);
         ebpo_face_cross(a, b, c, cross);
         measure_face(&block, &pass->check->units, pass->centre, a, cross);
-        if (pass->check->units.scaled) { /* the test is exact: it uses unscaled coordinates */
+        if (pass->check->units.scaled) { /* the exact test needs unscaled coordinates */
             ebpo_mesh_position(mesh, v[0], a);
             ebpo_mesh_position(mesh, v[1], b);
             ebpo_mesh_position(mesh, v[2], c);
@@ -197,7 +198,8 @@ typedef struct star_block {
 
 typedef struct scratch {
     ebpo_star star;
-    uint32_t *fans; /* union-find over the star's faces */
+    uint32_t *fans; /* disjoint sets of the star's faces (parents); a fan is a set of faces joined
+                       across edges */
     uint64_t fan_capacity;
     ebpo_same_faces same;
     ebpo_boundary *boundary;
@@ -217,8 +219,8 @@ static uint32_t fan_root(uint32_t *fans, uint32_t i)
     return i;
 }
 
-/* Joins the faces of an edge that is used twice into one fan; returns the number of joins. A fan
- * ends where more faces share an edge. */
+/* Joins the two faces of an edge into one fan; returns the number of joins, 0 or 1. A fan ends at
+ * edges with one face or with more than two faces. */
 static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
 {
     if (uses != 2 || links[0].entry == EBPO_NO_INDEX || links[1].entry == EBPO_NO_INDEX)
@@ -228,13 +230,14 @@ static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
     return a != b;
 }
 
+/* Adds an edge to the findings. Returns false when memory is short. */
 static bool classify_edge(const ebpo_check *check, star_block *block, const scratch *s, uint32_t v,
                           const ebpo_link *links, uint64_t uses)
 {
     const ebpo_mesh *mesh = check->mesh;
     uint64_t out = 0;
     uint32_t neighbour = ebpo_link_neighbour(&links[0]);
-    uint64_t face = UINT64_MAX; /* the lowest */
+    uint64_t face = UINT64_MAX; /* least source index of the edge's faces */
     for (uint64_t i = 0; i < uses; i++) {
         uint64_t source = ebpo_mesh_source_face(mesh, ebpo_link_face(&links[i]));
         out += links[i].out;
@@ -269,6 +272,7 @@ static double edge_length(const ebpo_check *check, uint32_t a, uint32_t b)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
+/* Checks the edges at vertex v. Returns false when memory is short. */
 static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
     const ebpo_star *star = &s->star;
@@ -294,6 +298,7 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
     return true;
 }
 
+/* Finds repeated faces whose lowest vertex is v. Returns false when memory is short. */
 static bool record_repeated_faces(const ebpo_check *check, star_block *block, scratch *s,
                                   uint32_t v)
 {
@@ -458,6 +463,7 @@ static ebpo_status check_vertices(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
+/* Chooses units so that squares and cubes of coordinates stay in the range of doubles. */
 static ebpo_units choose_units(const ebpo_mesh_report *r)
 {
     ebpo_units u = { .scaled = false };
@@ -499,14 +505,15 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
     return status;
 }
 
-/* Vertices sorted along the curve; those at one position are adjacent. */
+/* A range of vertices that are sorted along the Morton curve. Vertices at one position are
+ * adjacent. */
 typedef struct curve_run {
     const ebpo_mesh *mesh;
     uint64_t at, end;
 } curve_run;
 
 /* Compares the next vertices of two runs along the curve, in the order in which the mesh is
- * arranged: less than 0 if that of `a` comes first, 0 for equal positions. */
+ * arranged. Returns less than 0 if the vertex of `a` comes first, 0 for equal positions. */
 static int compare_runs(const curve_run *a, const curve_run *b)
 {
     const uint64_t *key = a->mesh->arrangement->key;
@@ -529,8 +536,8 @@ static void record_repeated(const ebpo_check *check, uint32_t v)
                     ebpo_mesh_source_vertex(check->mesh, v), v, v);
 }
 
-/* Skips the vertices at a run's next position. All but the first of them in the source are
- * repetitions. */
+/* Skips the vertices at a run's next position, and records all of them except the first one in the
+ * source. *lowest: that first vertex; EBPO_NO_INDEX before the first call. */
 static void skip_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
     double first[3], p[3];
@@ -549,8 +556,8 @@ static void skip_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
     } while (r->at < r->end && p[0] == first[0] && p[1] == first[1] && p[2] == first[2]);
 }
 
-/* Compares positions in an arranged mesh. The used vertices are one run and the unused ones
- * another, or all vertices are one run. */
+/* Finds repeated positions in an arranged mesh. Either all vertices form one run, or used and
+ * unused vertices form one run each. */
 static void compare_along_curve(const ebpo_check *check)
 {
     const ebpo_mesh *mesh = check->mesh;
@@ -569,7 +576,7 @@ static void compare_along_curve(const ebpo_check *check)
     }
 }
 
-/* Compares positions in any mesh, with a hash table. */
+/* Finds repeated positions in any mesh, with a hash table. */
 static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = check->mesh;
@@ -579,7 +586,7 @@ static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
         ebpo_positions_build(&positions, mesh, check->threads, &check->progress, error);
     if (status != EBPO_OK)
         return status;
-    /* first vertex of each position */
+    /* least source index at each position, stored at the position's first vertex */
     uint32_t *lowest =
         positions.repeated ? ebpo_array_alloc(mesh->workspace, count, sizeof *lowest) : NULL;
     if (positions.repeated && !lowest)
@@ -609,8 +616,8 @@ ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Completes the report. Source: EBP 2017, section 3.1, for the definition of a closed 2-manifold;
- * Euler's formula for the genus. */
+/* Completes the report: is the mesh a closed 2-manifold (EBP 2017, section 3.1), and what is its
+ * genus (Euler's formula)? */
 static void complete_report(ebpo_check *c)
 {
     ebpo_mesh_report *r = c->report;
@@ -663,7 +670,7 @@ static ebpo_status check_run(ebpo_check *c, ebpo_error *error)
         status = boundary_loops(c, error);
     ebpo_array_free(c->mesh->workspace, c->parents);
     c->parents = NULL;
-    ebpo_stars_free(&c->stars); /* makes memory free for the table of positions */
+    ebpo_stars_free(&c->stars); /* the table of positions needs the memory */
     if (status == EBPO_OK)
         status = ebpo_check_positions(c, error);
     if (status == EBPO_OK)

@@ -1,5 +1,5 @@
-/* The passes of ebpo_mesh_check. Each works on fixed blocks whose results are joined in order, so
- * the report does not depend on the number of threads. */
+/* Declares the passes of ebpo_mesh_check. Each pass works on blocks of fixed size, whose results
+ * are joined in order, so the report does not depend on the number of threads. */
 #ifndef EBPO_MESH_MESH_CHECK_PARTS_H
 #define EBPO_MESH_MESH_CHECK_PARTS_H
 
@@ -14,14 +14,14 @@
 /* The units of measurement. Along axis k, the unit of length is 2^exponent[k]. All exponents are 0
  * unless squares and cubes could leave the range of doubles. */
 typedef struct ebpo_units {
-    bool scaled;
+    bool scaled; /* false: all exponents are 0 */
     int exponent[3];
-    int length, area, volume; /* exponents of the sums */
+    int length, area, volume; /* exponents of the units of lengths, areas and volumes */
 } ebpo_units;
 
-/* A place that was found during the check, with indices in the current mesh: the vertices of an
- * edge, a vertex, or the index of a face. For a repeated face, `b` is the first face with its
- * vertices. */
+/* A location that was found during the check: a and b are indices in the current mesh. They are the
+ * vertices of an edge, or a vertex, or a face. For a repeated face, `b` is the first face with the
+ * same vertices. */
 typedef struct ebpo_found {
     uint32_t kind, location; /* as in ebpo_finding */
     uint32_t a, b;
@@ -32,7 +32,7 @@ static inline bool ebpo_found_is_edge(uint32_t kind) { return kind <= EBPO_FOUND
 typedef struct ebpo_found_list {
     ebpo_found *item;
     uint64_t count, capacity;
-    bool short_of_memory; /* some places are missing */
+    bool short_of_memory; /* some locations are missing */
 } ebpo_found_list;
 
 typedef struct ebpo_check {
@@ -40,15 +40,15 @@ typedef struct ebpo_check {
     unsigned threads; /* number of threads, not 0 */
     ebpo_progress progress;
     ebpo_mesh_report *report;
-    uint32_t *parents; /* [vertex_count] union-find forest over vertices */
+    uint32_t *parents; /* [vertex_count] disjoint sets of vertices (core/disjoint_sets.h) */
     ebpo_stars stars;
     ebpo_boundary boundary; /* all boundary edges, unordered */
     uint64_t referenced;    /* vertices that faces use */
     ebpo_units units;
-    ebpo_found_list *found; /* [threads]; NULL: places are not requested */
+    ebpo_found_list *found; /* [threads]; NULL: locations are not requested */
 } ebpo_check;
 
-/* Returns the position in the units of measurement. */
+/* Writes the position of a vertex in the units of measurement. */
 static inline void ebpo_check_position(const ebpo_check *check, uint64_t vertex, double out[3])
 {
     ebpo_mesh_position(check->mesh, vertex, out);
@@ -70,18 +70,18 @@ static inline double ebpo_scaled_length(const double d[3], const int exponent[3]
     return most * sqrt(sum);
 }
 
-/* Counts `place`, and stores it if it is among the lowest. */
-static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
+/* Counts a location, and stores it if it is among the lowest EBPO_FINDING_LOCATIONS. */
+static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t location)
 {
     int kept =
         finding->count < EBPO_FINDING_LOCATIONS ? (int)finding->count : EBPO_FINDING_LOCATIONS;
     finding->count++;
-    if (kept == EBPO_FINDING_LOCATIONS && finding->locations[kept - 1] <= place)
+    if (kept == EBPO_FINDING_LOCATIONS && finding->locations[kept - 1] <= location)
         return;
     int i = kept < EBPO_FINDING_LOCATIONS ? kept : kept - 1;
-    for (; i > 0 && finding->locations[i - 1] > place; i--)
+    for (; i > 0 && finding->locations[i - 1] > location; i--)
         finding->locations[i] = finding->locations[i - 1];
-    finding->locations[i] = place;
+    finding->locations[i] = location;
 }
 
 static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding *other)
@@ -95,28 +95,31 @@ static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding 
 /* Adds a place to the worker's list. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found);
 
-/* Counts a place, and stores it if all places are requested. */
+/* Counts a location, and adds it to the worker's list if all locations are requested. `location`:
+ * the index in the report. */
 static inline void ebpo_check_note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
-                                   ebpo_finding_kind kind, uint64_t place, uint32_t a, uint32_t b)
+                                   ebpo_finding_kind kind, uint64_t location, uint32_t a,
+                                   uint32_t b)
 {
-    ebpo_finding_add(finding, place);
+    ebpo_finding_add(finding, location);
     if (check->found)
-        ebpo_found_add(check, worker, (ebpo_found){ (uint32_t)kind, (uint32_t)place, a, b });
+        ebpo_found_add(check, worker, (ebpo_found){ (uint32_t)kind, (uint32_t)location, a, b });
 }
 
-/* Fills in the report of a check that has its mesh, threads and report: the body of
+/* Fills in the report of a check whose mesh, threads and report are set. This is the body of
  * ebpo_mesh_check. */
 EBPO_MUST_USE ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error);
 
 /* Checks that every coordinate is finite. */
 EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);
-/* Computes the bounding box, the unit of measurement and unreferenced vertices; needs the stars. */
+/* Computes the bounding box and the units of measurement, and finds unreferenced vertices.
+ * check->stars must exist. */
 EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error);
-/* Computes area, volume (relative to the box's centre), faces of zero area and repeated indices;
- * joins components. Needs the bounding box. */
+/* Computes the area and the volume (relative to the box's centre), finds faces of zero area and
+ * with repeated indices, and joins components. ebpo_check_vertices must have been called. */
 EBPO_MUST_USE ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error);
-/* Computes edges, bow-ties, repeated faces, the mean edge and the number of components; needs the
- * pass over faces. */
+/* Finds edges, bow-ties and repeated faces; computes the mean edge and the number of components.
+ * ebpo_check_faces must have been called. */
 EBPO_MUST_USE ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error);
 /* Finds repeated positions. */
 EBPO_MUST_USE ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error);

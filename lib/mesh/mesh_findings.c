@@ -1,6 +1,6 @@
-/* Finds the places of a mesh's findings. The places are noted during the mesh check and sorted.
- * They are then passed to the caller with the surrounding faces, or written as a PLY with a colour
- * for each kind of finding. */
+/* Finds all locations of a mesh's findings. The mesh check records the locations, which are then
+ * sorted. They are passed to the caller with the surrounding faces, or written as a PLY file with a
+ * colour for each kind of finding. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,11 +20,11 @@
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 
-/* --- the PLY with the places of findings in colour --- */
+/* --- the PLY file that shows the findings in colour (the picture) --- */
 
 typedef struct findings_picture {
     const ebpo_mesh *mesh;
-    uint8_t *face; /* kind of finding shown at each vertex or face, by index in the current mesh */
+    uint8_t *face; /* [face_count] kind of finding shown at each face; NOTHING: none */
     ebpo_publish target;
 } findings_picture;
 
@@ -35,7 +35,7 @@ typedef struct findings_picture {
 
 static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error);
-/* Records a location in the picture. `faces`: indices in the current mesh. */
+/* Shows a finding at these faces (indices in the current mesh). */
 static void record_in_picture(findings_picture *picture, const ebpo_found *found,
                               const uint64_t *faces, uint64_t count);
 /* Writes the picture. `report` is for the legend. */
@@ -82,19 +82,20 @@ typedef struct finding_search {
     ebpo_found_list all;
     uint32_t *component; /* [vertex_count] */
     ebpo_stars stars;
-    uint64_t *faces; /* faces around the current place */
+    uint64_t *faces; /* faces around the current location */
     uint64_t face_count, face_capacity;
     findings_picture picture;
 } finding_search;
 
-/* A place with its sort key: its kind, then the index in the report. */
+/* A location with its sort key: its kind << 32 | the index in the report. */
 typedef struct keyed {
     uint64_t key;
     uint64_t ends; /* source indices of an edge's vertices; otherwise 0 */
     ebpo_found found;
 } keyed;
 
-/* The key has at most 18 bits above this position, as ebpo_sort requires. */
+/* Above this bit, keys are below EBPO_SORT_BINS, as ebpo_sort requires: a kind has at most four
+ * bits. */
 enum { KEY_SHIFT = 18 };
 
 typedef struct sorting {
@@ -155,7 +156,7 @@ static ebpo_status join_lists(const finding_search *p, const ebpo_found_list *li
     return EBPO_OK;
 }
 
-/* Gathers one sorted list, which does not depend on the threads. */
+/* Gathers all locations in one sorted list, which does not depend on the number of threads. */
 static ebpo_status gather_findings(finding_search *p, const ebpo_found_list *lists, unsigned count,
                                    ebpo_error *error)
 {
@@ -197,18 +198,18 @@ static int compare_numbers(const void *x, const void *y)
 }
 
 /* Collects the faces that have all `count` corners, as indices in the current mesh. Searches the
- * faces at the corner that has the fewest, because another corner may be the hub of a large fan. */
+ * faces at the corner with the fewest faces, because another corner may have very many faces. */
 static bool gather_faces(finding_search *p, const uint32_t *corner, int count)
 {
-    uint32_t about = corner[0];
+    uint32_t vertex = corner[0];
     for (int i = 1; i < count; i++)
-        if (ebpo_stars_degree(&p->stars, corner[i]) < ebpo_stars_degree(&p->stars, about))
-            about = corner[i];
+        if (ebpo_stars_degree(&p->stars, corner[i]) < ebpo_stars_degree(&p->stars, vertex))
+            vertex = corner[i];
     p->face_count = 0;
     if (!ebpo_array_grow_late(p->mesh->workspace, &p->faces, &p->face_capacity,
-                              ebpo_stars_degree(&p->stars, about), sizeof *p->faces))
+                              ebpo_stars_degree(&p->stars, vertex), sizeof *p->faces))
         return false;
-    for (uint64_t i = p->stars.first[about]; i < p->stars.first[about + (uint64_t)1]; i++) {
+    for (uint64_t i = p->stars.first[vertex]; i < p->stars.first[vertex + (uint64_t)1]; i++) {
         const uint32_t *face = p->mesh->faces + 3 * (uint64_t)p->stars.face[i];
         bool all = true;
         for (int k = 0; k < count; k++)
@@ -235,7 +236,8 @@ static bool faces_of(finding_search *p, const ebpo_found *f)
     return true;
 }
 
-/* Returns the vertices in the current mesh: two of an edge, one of a vertex, three of a face. */
+/* Writes the vertices of a finding, as indices in the current mesh. Returns their number: two for
+ * an edge, one for a vertex, three for a face. */
 static int vertices_of(const finding_search *p, const ebpo_found *f, uint32_t out[3])
 {
     if (!ebpo_found_is_edge(f->kind) && !is_vertex(f->kind)) {
@@ -268,7 +270,7 @@ static ebpo_mesh_finding make_finding(finding_search *p, const ebpo_found *f)
     return finding;
 }
 
-enum { BETWEEN_STEPS = 1 << 12 };
+enum { BETWEEN_STEPS = 1 << 12 }; /* number of findings between two reports of progress */
 
 static ebpo_status report_all(finding_search *p, ebpo_error *error)
 {
@@ -377,7 +379,7 @@ static void record_in_picture(findings_picture *picture, const ebpo_found *found
             picture->face[faces[i]] = kind;
 }
 
-/* Returns the number of places of each kind. */
+/* Returns the number of findings of a kind. */
 static uint64_t count_of(const ebpo_mesh_report *r, int kind)
 {
     const uint64_t counts[EBPO_FINDING_KINDS] = {
@@ -412,14 +414,14 @@ static void print_header(const findings_picture *p, FILE *f, const ebpo_mesh_rep
             p->mesh->vertex_count, p->mesh->face_count);
 }
 
-/* Sets the colour of a kind; NOTHING has none. */
+/* Writes the colour of a kind; NOTHING is grey. */
 static void put_colour(uint8_t kind, uint8_t rgb[3])
 {
     ebpo_finding_colour(kind == NOTHING ? -1 : kind, rgb);
 }
 
-/* Returns the indices of the mesh in ascending order of their source indices, without dropped
- * faces. NULL when memory is short. */
+/* Returns the indices of vertices or faces, sorted by their source indices. NULL when memory is
+ * short. Source indices of dropped faces are skipped. */
 static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, uint64_t count)
 {
     uint64_t most = count;
@@ -451,7 +453,8 @@ static bool put_vertex(const findings_picture *p, FILE *f, uint64_t v)
     return fwrite(row, 1, sizeof row, f) == sizeof row;
 }
 
-/* Writes a face. `rank`: rank of each vertex in written order; NULL: its index. */
+/* Writes a face. `rank`: position of each vertex in the written order; NULL: the order is
+ * unchanged. */
 static bool put_face(const findings_picture *p, FILE *f, uint64_t face, const uint32_t *rank)
 {
     uint8_t row[FACE_BYTES] = { 3 };
@@ -463,7 +466,8 @@ static bool put_face(const findings_picture *p, FILE *f, uint64_t face, const ui
     return fwrite(row, 1, sizeof row, f) == sizeof row;
 }
 
-/* The order of written vertices and faces, and the ranks of the vertices; NULL: unchanged. */
+/* The order in which vertices and faces are written, and the position of each vertex in this order.
+ * NULL: the order of the mesh. */
 typedef struct written {
     uint32_t *vertices, *faces, *rank;
 } written;

@@ -1,4 +1,5 @@
-/* Internals shared by the parts of the mesh module. Other modules use ebpo_mesh_position. */
+/* Declares what the parts of lib/mesh share: the order of a mesh, repair steps, frames and tables
+ * of positions. Other folders use ebpo_mesh_position. */
 #ifndef EBPO_MESH_MESH_PARTS_H
 #define EBPO_MESH_MESH_PARTS_H
 
@@ -16,19 +17,21 @@
 struct ebpo_arrangement {
     /* the box around the referenced vertices, with exact cell faces down to box.grid_level */
     ebpo_box box;
-    /* referenced vertices come first, along the curve; the others follow, also along the curve */
+    /* number of referenced vertices, which come first, along the curve; unreferenced vertices
+     * follow, also along the curve */
     uint64_t referenced;
-    /* [vertex_count] octcode of the vertex's cell at box.grid_level, ascending among the referenced
-     * and among the other vertices. NULL if the mesh was arranged for repair, or repaired since;
-     * neighbours in space are then still close in memory, but building must arrange the mesh again
-     */
+    /* [vertex_count] octcode (locational code) of the vertex's cell at box.grid_level, ascending
+     * among the referenced and among the unreferenced vertices. NULL if the mesh was arranged for
+     * repair, or was repaired later. Then neighbours in space are still close in memory, but the
+     * builder must arrange the mesh again */
     uint64_t *key;
     int level;                 /* requested level; -1: as deep as useful */
     bool grouped;              /* vertices at one position are adjacent */
     uint32_t *vertex_source;   /* [vertex_count] source indices */
     uint32_t *face_source;     /* [face_count] */
-    ebpo_workspace *workspace; /* the mesh's; owns all arrays */
-    /* for a component: counts of the repaired mesh that it is a part of; otherwise 0 */
+    ebpo_workspace *workspace; /* workspace of the mesh; owns all arrays */
+    /* for a component: numbers of vertices and faces of the mesh that contains the component;
+     * otherwise 0 */
     uint64_t whole_vertices, whole_faces;
     uint64_t
         dropped_faces; /* faces of the source that were dropped later; their indices are unused */
@@ -38,10 +41,10 @@ struct ebpo_arrangement {
  * Cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_copy(const ebpo_mesh *mesh, ebpo_mesh *out, ebpo_error *error);
 
-/* Accepts NULL. */
+/* Frees an arrangement. NULL is allowed. */
 void ebpo_arrangement_free(struct ebpo_arrangement *arrangement);
 
-/* Returns the source index, for messages and reports. */
+/* Returns the source index (position in the source mesh), for messages and reports. */
 static inline uint64_t ebpo_mesh_source_vertex(const ebpo_mesh *mesh, uint64_t v)
 {
     return mesh->arrangement ? mesh->arrangement->vertex_source[v] : v;
@@ -51,7 +54,8 @@ static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f)
     return mesh->arrangement ? mesh->arrangement->face_source[f] : f;
 }
 
-/* Returns the number of source indices; for a component, that of the whole mesh. */
+/* Returns the number of source indices; for a component, the number of the mesh that contains it.
+ */
 static inline uint64_t ebpo_mesh_whole_vertices(const ebpo_mesh *mesh)
 {
     return mesh->arrangement && mesh->arrangement->whole_vertices
@@ -85,11 +89,11 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
     return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
 }
 
-/* Returns true if a sum of `count` rounded volume terms, the largest of which is `most`, may be
- * rounding noise: sheets of two sides have no volume and no outside. */
-static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double most)
+/* Returns true if a sum of `count` rounded volume terms, the largest of which is `greatest`, may be
+ * rounding noise: a closed surface whose two sides coincide has no volume. */
+static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double greatest)
 {
-    return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * most;
+    return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * greatest;
 }
 
 /* Reverses the orientation of the face. */
@@ -100,8 +104,8 @@ static inline void ebpo_face_turn(uint32_t face[3])
     face[2] = v;
 }
 
-/* Repair steps. EARLIER: orientation as in earlier builds, which left consistent components
- * unchanged. */
+/* Repair steps. EARLIER: the orientation of earlier versions of this library, which did not change
+ * consistent components. */
 enum {
     EBPO_REPAIR_WELD = 1,
     EBPO_REPAIR_ORIENT = 2,
@@ -111,9 +115,9 @@ enum {
     EBPO_REPAIR_DROP = 32
 };
 
-/* Performs the requested steps: merges vertices (those within weld_distance if it is above 0),
- * drops faces, orients, flips, fills holes, and orients the components that were closed by filling
- * holes. */
+/* Performs the requested steps: merges vertices (within weld_distance of each other if it is above
+ * 0, else at equal positions), drops faces, orients, flips, fills holes, and orients the components
+ * that filling holes has closed. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                            ebpo_repair_record *record, ebpo_error *error);
 
@@ -122,21 +126,23 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, doub
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                     uint32_t **closed, ebpo_error *error);
 
-/* Turns shells outwards, or inwards if they are within an odd number of others: the second part of
- * ebpo_mesh_orient. `closed`: result of ebpo_mesh_find_shells, which is modified. */
+/* Turns shells outwards, or inwards if they are within an odd number of other shells: the second
+ * part of ebpo_mesh_orient. `closed`: the result of ebpo_mesh_find_shells, which this function
+ * changes. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
                                                 ebpo_repair_record *record, ebpo_error *error);
 
 /* Finds the shell of each face, closed [face_count]: a number unique to the shell, or
- * EBPO_NO_INDEX. A shell is a set of faces that is closed by itself; they are connected by edges
- * with two faces, or around edges with more. The array is owned by the mesh's workspace. */
+ * EBPO_NO_INDEX. A shell is a set of faces that forms a closed surface. Its faces are connected
+ * across edges with two faces, or around edges with more faces. The mesh's workspace owns the
+ * array. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
                                                 uint32_t **closed, ebpo_error *error);
 
 /* Decides which vertices are merged, by the rule of ebpo_mesh_weld_within, in a mesh without
- * repeated positions. map [vertex_count] receives the new index of each vertex, from [vertex_count]
- * the *kept remaining vertices, ascending, and *moved the largest distance by which a vertex moves.
- */
+ * repeated positions. map [vertex_count] receives the new index of each vertex. from [vertex_count]
+ * receives the *kept remaining vertices, ascending. *moved is the largest distance by which a
+ * vertex moves. */
 EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
                                                  uint32_t *map, uint32_t *from, uint64_t *kept,
                                                  double *moved, ebpo_error *error);
@@ -159,7 +165,7 @@ static inline bool ebpo_exponent_is_far(int exponent)
 }
 
 typedef struct ebpo_mesh_frame {
-    bool scaled; /* otherwise coordinates are unchanged */
+    bool scaled; /* false: coordinates are unchanged */
     int exponent[3];
 } ebpo_mesh_frame;
 
@@ -175,14 +181,14 @@ static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_
             out[k] = ldexp(out[k], -frame->exponent[k]);
 }
 
-/* A hash table of all positions; each entry is the lowest vertex index at its position. 5.3 to 10.7
- * bytes a vertex. */
+/* A hash table of all positions; each entry is the lowest vertex index at its position. The table
+ * takes 5.3 to 10.7 bytes for each vertex. */
 typedef struct ebpo_positions {
     const ebpo_mesh *mesh; /* borrowed */
     uint32_t *slots;
     uint64_t mask;
-    ebpo_workspace *workspace; /* the mesh's */
-    uint64_t repeated;         /* vertices that repeat the position of an earlier vertex */
+    ebpo_workspace *workspace; /* workspace of the mesh */
+    uint64_t repeated; /* number of vertices that repeat the position of an earlier vertex */
 } ebpo_positions;
 
 /* Builds the table. -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The

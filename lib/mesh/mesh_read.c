@@ -36,8 +36,8 @@ static void *hash_file(void *argument)
     return NULL;
 }
 
-/* Starts a thread that hashes the file while it is parsed. Both take about the same time and read
- * the same pages. */
+/* Starts a thread that hashes the file while this thread parses the file. Hashing and parsing take
+ * about the same time and read the same pages. */
 static void hash_begin(hashing *h)
 {
     h->threaded = ebpo_thread_start(&h->thread, hash_file, h) == 0;
@@ -67,13 +67,13 @@ static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const
                                   .runs = groups ? &runs : NULL };
     ebpo_status status = ebpo_import_any(out, &job, error);
     if (status == EBPO_OK && runs.count > 1)
-        status = ebpo_mesh_groups_new(runs.of, runs.count, groups, error);
+        status = ebpo_mesh_groups_new(runs.run, runs.count, groups, error);
     ebpo_import_runs_free(&runs);
     return status;
 }
 
-/* If the file was changed while it was read, reports that in place of the format error that the
- * change may have caused. */
+/* If another program has changed the file while it was read, returns this error instead of
+ * `status`, because the change may have caused a format error. */
 static ebpo_status report_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
                                  ebpo_error *error)
 {

@@ -1,5 +1,6 @@
-/* Welds vertices: those at one position, or within a distance of each other (weld_within.c), become
- * the first of them in the source. Attributes follow. */
+/* Welds vertices. A group of vertices at one position, or within a distance of each other
+ * (weld_within.c), becomes one vertex: the first vertex of the group in the source. The attributes
+ * of this vertex stay. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -36,8 +37,8 @@ static inline bool same_key(const key *a, const key *b)
     return a->bits[0] == b->bits[0] && a->bits[1] == b->bits[1] && a->bits[2] == b->bits[2];
 }
 
-/* Returns true if the position was already present. The slot has the lowest index at the end, in
- * any order of insertion. */
+/* Inserts vertex v. Returns true if the position was already present. After all insertions, in any
+ * order, the slot of a position has its lowest vertex. */
 static bool insert_position(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
@@ -112,14 +113,14 @@ enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct welding {
     ebpo_mesh *mesh;
-    double distance; /* 0: merge vertices at equal positions */
-    double moved;
+    double distance;    /* 0: merge vertices at equal positions */
+    double moved;       /* largest distance by which a vertex moves */
     uint64_t collapsed; /* faces that repeat a vertex only after welding */
-    uint64_t kept;
-    uint32_t *map;  /* [vertex_count] new index of each vertex */
-    uint32_t *from; /* [kept] the vertex that stays of each group */
+    uint64_t kept;      /* number of remaining vertices */
+    uint32_t *map;      /* [vertex_count] new index of each vertex */
+    uint32_t *from;     /* [kept] the vertex of each group that stays */
     /* arranged mesh: [blocks of GRAIN vertices + 1] number of groups that begin in the block; later
-     * the number in all blocks before it */
+     * the number in all previous blocks */
     uint64_t *heads;
     uint64_t *stays;  /* arranged mesh: bit s is set if vertex s of the source stays */
     uint64_t *before; /* [words of `stays`] number of bits set before the word */
@@ -229,9 +230,9 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
 /* --- remaining vertices --- */
 
 /* Chooses the vertex of each group that is first in the source. Groups are numbered in the order of
- * their first vertices, so the first vertex of a group is recognised: its new index is the next
- * one. */
-static ebpo_status choose_staying(welding *w, ebpo_error *error)
+ * their first vertices, so the first vertex of a group is the first one whose new index is
+ * group_count. */
+static ebpo_status choose_remaining(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     uint64_t group_count = 0;
@@ -260,7 +261,8 @@ static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Assigns source indices as if the source had been welded. */
+/* Prepares the new source indices: the positions that the remaining vertices would have in a welded
+ * source. */
 static ebpo_status number_sources(welding *w, ebpo_error *error)
 {
     ebpo_workspace *workspace = w->mesh->workspace;
@@ -278,7 +280,8 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     return status;
 }
 
-/* Records how many removed vertices have other attribute values than the remaining one. */
+/* Records the number of removed vertices whose attribute values differ from those of the remaining
+ * vertex. */
 static void record_differences(const welding *w)
 {
     const ebpo_mesh *mesh = w->mesh;
@@ -340,7 +343,7 @@ static void move_attributes(const welding *w)
     ebpo_attributes_keep(attributes, "vertex", w->rows ? w->rows : w->from, w->kept);
 }
 
-/* Moves vertices to their new indices. The new index is at most the least index of the group's
+/* Moves vertices to their new indices. A new index is at most the least index of the group's
  * vertices, so moving in ascending order overwrites no vertex that is still needed. */
 static void move_vertices(welding *w)
 {
@@ -391,7 +394,7 @@ static ebpo_status run_welding(welding *w, ebpo_error *error)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
     if (status == EBPO_OK && !w->from)
-        status = choose_staying(w, error);
+        status = choose_remaining(w, error);
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement)

@@ -22,17 +22,19 @@
 #include "mesh/import_build.h"
 #include "mesh/obj.h"
 
-/* Counts of data in the file that the mesh cannot hold. */
+/* Counts of data in the file that the mesh cannot store. */
 typedef struct obj_losses {
     /* number of vertices divided by w, and of vertices with extra values */
     uint64_t weights, surplus;
-    /* numbers of curve statements and of unknown statements, and the line of the first unknown one
-     */
+    /* numbers of curve statements and of unknown statements, and the line of the first unknown
+     * statement */
     uint64_t curves, unknown, unknown_line;
     uint64_t absent[EBPO_IMPORT_SORTS]; /* number of corners that refer to missing values */
     /* numbers of vertices without colour, of vertices with opacity, and of values that are no
      * numbers */
     uint64_t uncoloured, alpha, no_numbers;
+    /* the file has: a third texture coordinate, smoothing groups, a material library, named groups
+     */
     bool third, smoothing, library, groups;
 } obj_losses;
 
@@ -41,10 +43,10 @@ typedef struct obj_reading {
     const uint8_t *data;
     uint64_t size;
     ebpo_obj_text text;
-    uint64_t next_release;            /* byte offset */
+    uint64_t next_release;            /* offset at which pages are released again */
     uint64_t line;                    /* line where the statement begins */
-    uint64_t rows[EBPO_IMPORT_SORTS]; /* rows of vertices, normals and texture coordinates: totals,
-                                       * or those so far in the second pass */
+    uint64_t rows[EBPO_IMPORT_SORTS]; /* numbers of vertices, normals and texture coordinates: in
+                                         the file, or, in the second pass, read so far */
     ebpo_import_runs *runs;           /* NULL if not requested */
     obj_losses losses;
     ebpo_obj_names names;
@@ -72,7 +74,8 @@ static const char *past_end(const char *at, const char *end)
     return at < end ? at + 1 : at;
 }
 
-/* Returns the end of the line if a backslash joins it to the next, otherwise NULL. */
+/* Returns the end of the line if a backslash at `at` joins it with the next line, otherwise NULL.
+ */
 static const char *joined_end(const char *at, const char *end)
 {
     if (*at != '\\')
@@ -159,9 +162,9 @@ ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run, const c
     if (runs->count == RUNS_MAX)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name,
                               "has more than %d group statements; remove some", RUNS_MAX);
-    if (!ebpo_grow(&runs->of, &runs->capacity, runs->count + 1, sizeof *runs->of))
-        return ebpo_fail_memory(error, (runs->count + 1) * sizeof *runs->of);
-    runs->of[runs->count++] = (ebpo_named_run){ .name = run.s, .size = run.n };
+    if (!ebpo_grow(&runs->run, &runs->capacity, runs->count + 1, sizeof *runs->run))
+        return ebpo_fail_memory(error, (runs->count + 1) * sizeof *runs->run);
+    runs->run[runs->count++] = (ebpo_named_run){ .name = run.s, .size = run.n };
     return EBPO_OK;
 }
 
@@ -180,8 +183,8 @@ static bool same_word(ebpo_obj_word a, ebpo_obj_word b)
     return a.n == b.n && memcmp(a.s, b.s, a.n) == 0;
 }
 
-/* Returns the slot that holds or would hold the name's index. 0 marks a free slot, because index 0
- * has no name. */
+/* Returns the slot of the name's index, or the free slot in which it belongs. 0 marks a free slot,
+ * because index 0 has no name. */
 static uint64_t find_slot(const ebpo_obj_names *names, ebpo_obj_word word)
 {
     uint64_t at;
@@ -440,7 +443,7 @@ static ebpo_status read_face(obj_reading *r, const uint64_t total[EBPO_IMPORT_SO
     if (status == EBPO_OK)
         status = ebpo_import_polygon(b);
     if (r->runs && status == EBPO_OK)
-        r->runs->of[r->runs->count - 1].faces += mesh->face_count - before;
+        r->runs->run[r->runs->count - 1].faces += mesh->face_count - before;
     return status;
 }
 

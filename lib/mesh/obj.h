@@ -21,15 +21,15 @@ typedef struct ebpo_obj_text {
     bool begun;    /* the first statement has been found */
 } ebpo_obj_text;
 
-/* Begins before the first statement, after a byte order mark if there is one. */
+/* Returns the position of the first statement, after a byte order mark if there is one. */
 ebpo_obj_text ebpo_obj_text_begin(const uint8_t *data, uint64_t size);
 
-/* Reads the next word of the statement. Returns false at its end or at a comment. A backslash at
- * the end of a line joins the next one. */
+/* Reads the next word of the statement. Returns false at the end of the statement or at a comment.
+ * A backslash at the end of a line joins the line with the next line. */
 bool ebpo_obj_next_word(ebpo_obj_text *t, ebpo_obj_word *word);
 
 /* Returns the rest of the line as a name, without surrounding blanks. Backslashes are part of the
- * name, since folder names contain them; they do not join lines. */
+ * name, because folder names contain them; they do not join lines. */
 ebpo_obj_word ebpo_obj_name(ebpo_obj_text *t);
 
 /* Moves to the next non-empty statement and reads its first word. Returns false at the end of the
@@ -40,16 +40,18 @@ bool ebpo_obj_word_is(ebpo_obj_word word, const char *text);
 
 /* Names in OBJ files: materials, which are stored as an index for each face, and groups. */
 
-/* Begins a run. EBPO_E_LIMIT, EBPO_E_MEMORY. */
+/* Begins a run of faces with the name `run`. `name`: of the file, for messages. EBPO_E_LIMIT,
+ * EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run,
                                             const char *name, ebpo_error *error);
 
 typedef struct ebpo_obj_names {
-    ebpo_obj_word *material; /* [count] in order of first use; 0 means none */
-    uint32_t *slot;          /* hash table of indices */
+    ebpo_obj_word
+        *material;  /* [count] names in order of first use; index 0: faces without a material */
+    uint32_t *slot; /* hash table of indices */
     uint64_t count, capacity, slots;
-    uint32_t current;
-    uint32_t *of_face; /* [faces] */
+    uint32_t current;  /* material of the next faces */
+    uint32_t *of_face; /* [faces] material of each face */
     uint64_t face_capacity;
     uint64_t faces; /* faces that have a material */
 } ebpo_obj_names;
@@ -58,8 +60,8 @@ typedef struct ebpo_obj_names {
 EBPO_MUST_USE ebpo_status ebpo_obj_use_material(ebpo_obj_names *names, ebpo_obj_word material,
                                                 ebpo_error *error);
 
-/* Sets the current material of all faces of the mesh that have none yet. EBPO_E_MEMORY, EBPO_E_IO.
- */
+/* Gives the current material to all faces of the mesh that have no material yet. EBPO_E_MEMORY,
+ * EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_obj_give_material(ebpo_obj_names *names, const ebpo_mesh *mesh,
                                                  ebpo_error *error);
 

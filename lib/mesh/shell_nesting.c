@@ -127,7 +127,7 @@ static void cross_host(seeker *w)
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[w->host->component],
                              c->faces.begin[w->host->component + (uint64_t)1]) {
         double t[3][3];
-        ebpo_face_corners(c->mesh, c->faces.of[i], t);
+        ebpo_face_corners(c->mesh, c->faces.members[i], t);
         w->face = (const double(*)[3])t;
         (void)ebpo_box_tree_walk(&w->probes, near_face, cross_face, w);
     }
@@ -312,7 +312,7 @@ static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
     uint64_t component = all->n->shells[all->host[host]].component;
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[component],
                              c->faces.begin[component + 1]) {
-        if (!ebpo_face_add(&all->faces, c->mesh, c->faces.of[i], (int32_t)host))
+        if (!ebpo_face_add(&all->faces, c->mesh, c->faces.members[i], (int32_t)host))
             return ebpo_workspace_fail(c->mesh->workspace,
                                        (all->faces.count + 1) * sizeof(ebpo_tree_point), error);
     }
@@ -423,7 +423,8 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
                                  c->faces.begin[one->component + (uint64_t)1]) {
             for (uint64_t k = 0; k < 3; k++) {
                 double at[3];
-                ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.of[i] + k], at);
+                ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.members[i] + k],
+                                   at);
                 for (int d = 0; d < EBPO_SHELL_SAMPLES; d++)
                     if (comes_before(at, one->sample[d], d))
                         memcpy(one->sample[d], at, sizeof at);
@@ -556,7 +557,7 @@ static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
 {
     uint64_t begin = c->faces.begin[component], end = c->faces.begin[component + (uint64_t)1];
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, begin, end)
-        ebpo_face_turn(c->mesh->faces + 3 * (uint64_t)c->faces.of[i]);
+        ebpo_face_turn(c->mesh->faces + 3 * (uint64_t)c->faces.members[i]);
     return end - begin;
 }
 
