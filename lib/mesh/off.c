@@ -42,7 +42,7 @@ static bool begins_comment(const char *word, const char *at, const char *end)
                            at[1] && strchr("IQS", at[1]));
 }
 
-/* Reads the next word of this line. Returns false at its end. */
+/* Reads the next word of the line. Returns false at the end of the line. */
 static bool next_word_here(off_text *t, off_word *word)
 {
     while (t->at < t->end && is_blank(*t->at))
@@ -104,7 +104,7 @@ typedef struct off_reading {
     off_text text;
     uint64_t next_release; /* byte offset */
     uint64_t size, vertices, faces;
-    bool normals, colours, texture, weights; /* what the vertices have */
+    bool normals, colours, texture, weights; /* the values of each vertex */
     rows_in rows;
     off_word rest[MAX_REST]; /* extra words of the row */
     int rest_count;
@@ -130,8 +130,9 @@ static ebpo_status fail_line(const off_reading *r, const char *format, ...)
 
 /* --- head --- */
 
-/* Reads ST, C, N, 4 and n in this order, then OFF. Returns the length of letters and word, or 0
- * when OFF is missing. In ModelNet's files the first count follows without a blank: OFF8. */
+/* Reads the letters ST, C, N, 4 and n in this order, then the word OFF. Returns the length of the
+ * letters and the word, or 0 if the word is missing. In ModelNet's files the first count follows
+ * without a blank: OFF8. */
 static size_t read_kind(off_word word, off_reading *r, bool *dimension)
 {
     const char *s = word.s, *end = s + word.n;
@@ -187,8 +188,8 @@ static ebpo_status fail_counts(const off_reading *r)
                      "file");
 }
 
-/* Reads the edge count: on the line of the faces, or alone on the next one. Some programs omit it.
- */
+/* Reads the edge count, which is on the line of the face count, or alone on the next line. Some
+ * programs omit the edge count. */
 static void read_edges(off_reading *r)
 {
     off_text ahead = r->text;

@@ -20,9 +20,11 @@ enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };
 
 /* Flags of faces, collected at the root of their patch.
  * - OPEN: edges with more than two faces do not balance within the patch.
+ * - INCONSISTENT: two adjacent faces have opposite orientations.
+ * - TWISTED: no orientation of the faces is consistent.
  * - BOUNDARY: the patch has an edge with one face.
  *
- * The others are for patches that were joined around edges with more than two faces.
+ * The other flags are for patches that were joined around edges with more than two faces.
  * - ROOT: the face was the root of a patch before.
  * - CONTRADICTED: the faces around the patch's edges cannot alternate.
  * - SEPARATE: becomes a separate patch again. */
@@ -46,8 +48,8 @@ typedef struct patch {
     bool seed_turned;       /* the seed runs against the root */
     bool turn_others;       /* turn the faces that run as the seed does */
     uint64_t count, turned; /* number of faces, and of faces that run against the root */
-    ebpo_sum volume;        /* six times the volume, with all faces oriented like the root */
-    double most;            /* largest of its terms */
+    ebpo_sum volume;        /* six times the volume, with all faces oriented as the root is */
+    double most;            /* largest absolute term of this sum */
 } patch;
 
 typedef struct orienting orienting;
@@ -57,7 +59,7 @@ typedef ebpo_status (*edge_fn)(orienting *o, const ebpo_link *links, uint64_t us
 struct orienting {
     const ebpo_mesh *mesh; /* the mesh whose faces are turned */
     unsigned threads;
-    edge_fn visit; /* called at every edge, or only at those with more than two faces */
+    edge_fn visit; /* called at every edge, or only at edges with more than two faces */
     bool crowded_only;
     ebpo_mesh_frame frame; /* frame for volumes, of which only the signs are used */
     ebpo_stars stars;
@@ -76,8 +78,8 @@ struct orienting {
 
 /* --- joining faces to patches --- */
 
-/* Returns the root of f << 1, plus 1 when f runs against the root. Halves the path; any thread may
- * do so. */
+/* Returns the root of f << 1, plus 1 when f runs against the root. Halves the path to the root; any
+ * thread may do so at any time. */
 static uint64_t find_root(uint64_t *above, uint32_t f)
 {
     for (uint64_t turned = 0;;) {
@@ -93,8 +95,8 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
     }
 }
 
-/* Links the higher root to the lower one, so the roots do not depend on the order. Returns false if
- * the faces are already in one patch with the opposite orientation. */
+/* Links the higher root to the lower root, so the roots do not depend on the order of calls.
+ * Returns false if the faces are already in one patch with the opposite orientation. */
 static bool join_patches(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
@@ -201,7 +203,7 @@ static void free_stars(orienting *o)
     ebpo_stars_free(&o->stars);
 }
 
-/* Links each face directly to its root, which collects the flags. Roots precede their faces. */
+/* Links each face directly to its root. Roots collect the flags, and precede their faces. */
 static void gather_flags(orienting *o)
 {
     EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
@@ -326,8 +328,9 @@ static void separate_patches(orienting *o)
     }
 }
 
-/* Joins patches around edges with more than two faces if that closes them. A patch that is closed
- * by itself, such as a cube that shares an edge with another one, stays separate. */
+/* Joins patches around edges with more than two faces if the joined patches are then closed. A
+ * patch that is closed by itself, such as a cube that shares an edge with another cube, stays
+ * separate. */
 static ebpo_status join_crowded(orienting *o, ebpo_error *error)
 {
     EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count)
@@ -354,7 +357,7 @@ static ebpo_status join_crowded(orienting *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- deciding --- */
+/* --- the faces to turn --- */
 
 static bool list_patches(orienting *o)
 {

@@ -1,6 +1,6 @@
 /* Reads the body of an ascii PLY file. White space separates values, so a long list may span
- * several lines. A row ends with its line. Extra values on a line, as MeshLab has written, are
- * counted and skipped; otherwise they would shift all following rows. */
+ * several lines. A row ends with its line. Extra values on a line, such as MeshLab has written, are
+ * counted and skipped; otherwise all following rows would be read wrongly. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -14,7 +14,7 @@ typedef struct rows {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
     uint64_t row;
-    uint64_t to; /* row of the attributes; for a face, the row of its first triangle */
+    uint64_t to; /* row in the attribute arrays; for a face, the row of its first triangle */
     bool store;
     /* false in the first pass over elements that precede the vertices, which are read twice, so
      * that nothing is counted twice */
@@ -56,8 +56,9 @@ static ebpo_status next_integer(rows *r, int64_t *value)
     return EBPO_OK;
 }
 
-/* Reads a coordinate that the header declares as float. If the float differs from the text, notes
- * the rounding error; points (`strict`), which have no notes, get the double. */
+/* Reads a coordinate that the header declares as float. If the float differs from the text, records
+ * the rounding error. Point files (`strict`) have no such record, so their points keep the double.
+ */
 static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
 {
     float narrow;
@@ -254,7 +255,7 @@ ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *e
                .once = store,
                .store = store && (element->kind != EBPO_PLY_KIND_OTHER || p->lost) };
     ebpo_status status = EBPO_OK;
-    if (!element->properties) /* rows without values take no text */
+    if (!element->properties) /* rows without values have no text */
         return EBPO_OK;
     for (; r.row < element->count && status == EBPO_OK; r.row++) {
         status = read_row(&r);

@@ -65,10 +65,11 @@ static unsigned find_together(const ebpo_ply_property *property, uint64_t left)
 static void lose_property(const ebpo_ply_parser *p, const ebpo_ply_element *element,
                           const ebpo_ply_property *property, const char *why)
 {
-    char of[EBPO_IMPORT_WORD_TEXT], name[EBPO_IMPORT_WORD_TEXT];
-    ebpo_import_word_text(of, element->name.s, element->name.n);
+    char element_name[EBPO_IMPORT_WORD_TEXT], name[EBPO_IMPORT_WORD_TEXT];
+    ebpo_import_word_text(element_name, element->name.s, element->name.n);
     ebpo_import_word_text(name, property->name.s, property->name.n);
-    ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, of, why);
+    ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, element_name,
+                         why);
 }
 
 /* Returns true if an earlier element of the same name has another number of rows. Such elements

@@ -1,5 +1,5 @@
 /* Reads the body of a binary PLY file, of either byte order. All cores read rows of equal size.
- * Other rows are read one by one, which also locates errors. Positions go to the mesh, faces are
+ * Other rows are read one by one; this also locates errors. Positions go to the mesh, faces are
  * triangulated, and other properties go to the attributes.
  *
  * Source: Greg Turk, "The PLY Polygon File Format", 1994. */
@@ -85,7 +85,7 @@ typedef struct rows {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
     uint64_t row;
-    uint64_t to; /* row of the attributes; for a face, the row of its first triangle */
+    uint64_t to; /* row in the attribute arrays; for a face, the row of its first triangle */
     bool swap;   /* the file's byte order differs from the machine's */
     bool store;
 } rows;
@@ -152,7 +152,7 @@ static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
     return status;
 }
 
-/* Sets the row's attribute index and reserves space for it. */
+/* Sets the row in the attribute arrays, and reserves space for this row. */
 static ebpo_status begin_row(rows *r)
 {
     bool face = r->element->kind == EBPO_PLY_KIND_FACE;
@@ -238,8 +238,8 @@ typedef struct plain {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
     const ebpo_ply_property *corners; /* for faces */
-    uint64_t row_bytes, corners_at;   /* of a row */
-    uint64_t first;                   /* mesh face for row 0 */
+    uint64_t row_bytes, corners_at;   /* size of a row; offset of its corner list */
+    uint64_t first;                   /* index in the mesh of the face in row 0 */
     uint64_t deviates;                /* first row that is not a triangle of existing vertices */
     ebpo_progress progress;
     bool swap;
@@ -301,8 +301,8 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
     }
 }
 
-/* Reads faces. After a row that deviates, offsets are wrong; the row-by-row reader reads those rows
- * again. */
+/* Reads faces. Behind a row that deviates, the offsets are wrong; the row-by-row reader reads the
+ * deviating row and all rows behind it again. */
 static ebpo_status read_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -362,9 +362,9 @@ static ebpo_status run_on_rows(plain *t, ebpo_task_fn task)
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-/* Read rows from p->at while all have one size, and set *done to their number: all vertices or
- * none, and the faces before the first one that is not a triangle or has an invalid vertex index.
- * The row-by-row reader reads the others and reports their errors. */
+/* Read the rows from p->at on that have one size, and set *done to their number: all vertices or
+ * none, and the faces before the first face that is not a triangle or has an invalid vertex index.
+ * The row-by-row reader reads the other rows and reports their errors. */
 static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
                                        bool swap, uint64_t *done)
 {

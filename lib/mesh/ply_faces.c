@@ -160,15 +160,16 @@ ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row)
 }
 
 /* Removes vertices that no face uses and whose coordinates are not finite. Scanners write such
- * vertices for points that they did not see. The OBJ and OFF readers omit all unused vertices. */
+ * vertices for directions without a measured point. The OBJ and OFF readers omit all unused
+ * vertices. */
 
 enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct vertex_removal {
     ebpo_ply_parser *p;
     bool found; /* a coordinate is not finite */
-    /* a face uses such a vertex: nothing is removed, and the mesh check will report it with the
-     * file's indices */
+    /* a face uses a vertex that is not finite: nothing is removed, and the mesh check will report
+     * it with the file's indices */
     bool refused;
     uint64_t *used; /* bit v: a face uses vertex v */
     uint32_t *from; /* [kept] old indices of the kept vertices */
@@ -237,8 +238,8 @@ static void move_vertices(const vertex_removal *l)
     }
 }
 
-/* Drops elements of other names, because they may refer to vertices by indices that have changed.
- */
+/* Drops elements other than vertices and faces, because they may refer to vertices by indices that
+ * have changed. */
 static void move_attributes(const vertex_removal *l)
 {
     ebpo_attributes *attributes = l->p->mesh->attributes;
@@ -254,13 +255,13 @@ static void move_attributes(const vertex_removal *l)
                                          "vertex indices that have changed");
 }
 
-static ebpo_status record_removed(const vertex_removal *l, uint64_t left)
+static ebpo_status record_removed(const vertex_removal *l, uint64_t count)
 {
     ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
         ebpo_attributes_count_unread(l->p->mesh->attributes,
                                      "vertices with non-finite coordinates that no face uses",
-                                     left);
+                                     count);
     return status;
 }
 

@@ -1,5 +1,5 @@
-/* Parses the header of a PLY file. This file also has the messages and the progress reports that
- * the parts of the PLY reader share. */
+/* Parses the header of a PLY file. Also has the messages and the progress reports that the parts of
+ * the PLY reader share. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -16,7 +16,7 @@
 #include "mesh/ply_parts.h"
 
 enum {
-    /* no statement has more than five words; a sixth one shows that there are too many */
+    /* no statement has more than five words; a sixth word shows that the statement is invalid */
     MAX_WORDS = 6
 };
 

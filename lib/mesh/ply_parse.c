@@ -30,7 +30,7 @@ static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *elemen
 {
     uint64_t row = element->row_bytes;
     if (p->header.encoding == EBPO_PLY_ASCII &&
-        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank for each */
+        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank for each value */
         return false;
     return ebpo_mul_ok(element->count, row, bytes);
 }
@@ -84,9 +84,9 @@ static ebpo_status check_counts(const ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-/* Returns true if the mesh stores coordinates as floats: all three are floats in the file. Other
- * types are stored as doubles, which represent them exactly. For a list of query points (p->strict)
- * the coordinates are always stored as doubles. */
+/* Returns true if the mesh stores coordinates as floats: all three are floats in the file.
+ * Coordinates of other types are stored as doubles, which represent them exactly. Query points
+ * (p->strict) are always stored as doubles. */
 static bool all_float(const ebpo_ply_parser *p)
 {
     const ebpo_ply_header *h = &p->header;
@@ -287,7 +287,7 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     ebpo_ply_parser p = {
         .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
     };
-    p.strict = true; /* points cannot carry notes about omitted values */
+    p.strict = true; /* query points have no record of omitted values, so these are errors */
     *xyz = NULL;
     *count = 0;
     ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);

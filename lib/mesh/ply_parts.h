@@ -1,6 +1,6 @@
-/* The parts of the PLY reader: the header with its elements and properties, the state of the
- * reader, attributes, and the two kinds of body. Source: Greg Turk, "The PLY Polygon File Format",
- * 1994. */
+/* Declares the parts of the PLY reader: the header with its elements and properties, the state of
+ * the reader, attributes, and the two kinds of body. Source: Greg Turk, "The PLY Polygon File
+ * Format", 1994. */
 #ifndef EBPO_MESH_PLY_PARTS_H
 #define EBPO_MESH_PLY_PARTS_H
 
@@ -60,7 +60,7 @@ typedef struct ebpo_ply_element {
     uint64_t count;
     uint64_t line;              /* line in the header, from 1 */
     uint64_t first, properties; /* range in ebpo_ply_header.property */
-    uint64_t row_bytes; /* binary: least size of a row; the exact size when there is no list */
+    uint64_t row_bytes; /* binary: least size of a row; its exact size if the element has no list */
     bool has_list;
 } ebpo_ply_element;
 
@@ -99,7 +99,7 @@ unsigned ebpo_ply_type_bytes(ebpo_ply_type type);
 typedef struct ebpo_ply_parser {
     const uint8_t *data;
     uint64_t size, at; /* size in bytes, and the offset of the next byte to read */
-    uint64_t line;     /* ascii: line number of that byte, from 1 */
+    uint64_t line;     /* ascii: line number of the byte at `at`, from 1 */
     const char *name;
     ebpo_ply_header header;
     ebpo_mesh *mesh;
@@ -136,7 +136,7 @@ ebpo_status ebpo_ply_fail_end(const ebpo_ply_parser *p, const ebpo_ply_element *
 /* Returns "vertex", "face", "strip" or "element", for messages. */
 const char *ebpo_ply_row_name(const ebpo_ply_element *element);
 
-/* Returns true if a progress report is due. Cheap: call it for each row. */
+/* Returns true if a progress report is due. Fast enough for a call for each row. */
 static inline bool ebpo_ply_report_due(const ebpo_ply_parser *p) { return p->at >= p->next_report; }
 ebpo_status ebpo_ply_report(ebpo_ply_parser *p);
 /* Returns EBPO_E_CANCELLED. */
@@ -144,8 +144,8 @@ ebpo_status ebpo_ply_fail_stopped(const ebpo_ply_parser *p);
 
 /* --- attributes: properties other than positions and corners --- */
 
-/* Creates arrays for the header's properties, with space for the declared rows. This function and
- * those below do nothing when attributes are not read (ebpo_ply_parser.lost is NULL). */
+/* Creates arrays for the header's properties, with space for the declared rows. The functions of
+ * this section do nothing if attributes are not read (ebpo_ply_parser.lost is NULL). */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_plan(ebpo_ply_parser *p);
 /* Moves the values into the mesh after the last row. Keeps the header when it has information that
  * the mesh lacks. */
@@ -159,8 +159,8 @@ static inline bool ebpo_ply_is_attribute(const ebpo_ply_property *property)
     return property->attribute >= 0;
 }
 
-/* Stores the low bytes of `bits` as the value of a row. Any thread may call it for different rows.
- */
+/* Stores the low bytes of `bits` as the value of a row. Threads may call this function at the same
+ * time for different rows. */
 void ebpo_ply_put_value(const ebpo_ply_parser *p, const ebpo_ply_property *property, uint64_t row,
                         uint64_t bits);
 
@@ -168,7 +168,8 @@ void ebpo_ply_put_value(const ebpo_ply_parser *p, const ebpo_ply_property *prope
 EBPO_MUST_USE ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *property,
                                             uint64_t row, uint64_t count, uint8_t **items);
 
-/* Converts text to the bits of a value. If it does not fit the type, the property is omitted. */
+/* Converts text to the bits of a value. If the value does not fit the type, the property is
+ * omitted. */
 uint64_t ebpo_ply_text_bits(ebpo_ply_parser *p, const ebpo_ply_property *property,
                             ebpo_ply_word token, uint64_t row);
 /* Stores bits at address `at`. */
@@ -177,14 +178,14 @@ void ebpo_ply_store_bits(uint8_t *at, unsigned bytes, uint64_t bits);
 /* Copies the values of face `row`, which came from a polygon, to all later faces. */
 EBPO_MUST_USE ebpo_status ebpo_ply_repeat_face(ebpo_ply_parser *p, uint64_t row);
 
-/* Sets zeros and empty lists for the faces from `first` on, because they have no row in the face
- * element. Space must have been reserved. */
+/* Sets zeros and empty lists for the faces from `first` on, which come from strips and have no row
+ * in the face element. Space must have been reserved. */
 void ebpo_ply_blank_faces(ebpo_ply_parser *p, uint64_t first);
 
 /* --- the body of an ascii file --- */
 
-/* Reads all rows of an element, from p->at to the byte after its last row. Only skips them if
- * `store` is false. */
+/* Reads all rows of an element, from p->at to the byte after its last row. If `store` is false, the
+ * rows are only skipped. */
 ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *element, bool store);
 
 /* Skips blanks after the last row. Returns true if more text follows. */
@@ -211,8 +212,8 @@ ebpo_status ebpo_ply_fail_index(const ebpo_ply_parser *p, const ebpo_ply_element
 ebpo_status ebpo_ply_add_polygon(ebpo_ply_parser *p, uint64_t row);
 ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row);
 
-/* Removes vertices that no face uses and whose coordinates are not finite, and notes their number.
- * Call it after all rows are read. EBPO_E_MEMORY, EBPO_E_IO. */
+/* Removes vertices that no face uses and whose coordinates are not finite, and records the number
+ * of removed vertices. Call this function after all rows are read. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_ply_remove_unused(ebpo_ply_parser *p);
 
 #endif

@@ -1,5 +1,6 @@
-/* Writes a mesh and its attributes as PLY. Uses the header of the source where it fits, otherwise a
- * new one. Properties keep the types of the source where these hold every value. */
+/* Writes a mesh and its attributes as PLY. Uses the header of the source if the mesh has one,
+ * otherwise a new header. Properties keep the types of the source if these types hold every value.
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,7 +25,7 @@
  * attributes, in the order of the source header if there is one. */
 
 typedef struct ply_out_property {
-    /* role of positions and corners; for an attribute, the members below count */
+    /* role of positions and corners; NONE: the next two members identify an attribute */
     ebpo_ply_role role;
     uint32_t attribute; /* index of the array */
     uint32_t column;
@@ -113,7 +114,7 @@ static bool type_holds(ebpo_ply_type type, double v)
     return bits == back;
 }
 
-/* Returns the wanted type if it holds all coordinates of the axis. */
+/* Returns the wanted type if this type holds all coordinates of the axis, otherwise double. */
 static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_type wanted)
 {
     const ebpo_mesh *mesh = m->mesh;
@@ -126,7 +127,7 @@ static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_typ
     return wanted;
 }
 
-/* Copies a line of the source header unchanged, because a type may have several names. */
+/* Copies a line of the source header unchanged, because types have several names. */
 static void put_line(making *m, ebpo_ply_word line)
 {
     fprintf(m->text, "%.*s\n", (int)line.n, line.s);
@@ -166,7 +167,7 @@ static bool is_word(const char *s, size_t n, ebpo_ply_word word)
     return n == word.n && memcmp(s, word.s, n) == 0;
 }
 
-/* Returns the column of that name, or -1. */
+/* Returns the column with this name that is not in the header yet, or -1. */
 static int find_column(const ebpo_attribute *a, const bool *taken, ebpo_ply_word name)
 {
     const char *s = a->names;
@@ -190,7 +191,7 @@ static void add_column(making *m, uint64_t array, uint32_t column)
                                         .count_type = (ebpo_ply_type)a->list });
 }
 
-/* Adds the column that a header property was read into. Returns false when there is none. */
+/* Adds the column with the values of a header property. Returns false when there is none. */
 static bool add_named(making *m, ebpo_ply_word element, const ebpo_ply_property *property)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
@@ -208,7 +209,7 @@ static bool add_named(making *m, ebpo_ply_word element, const ebpo_ply_property 
     return false;
 }
 
-/* Adds the columns of an element that are not in the header, in their order. */
+/* Adds the columns of an element that are not in the header yet, in the order of the arrays. */
 static void add_rest(making *m, const char *element)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
@@ -281,8 +282,8 @@ typedef struct following {
     ebpo_ply_header header;
     uint64_t element, property; /* number of statements so far */
     ebpo_ply_kind kind;         /* kind of the current element, as written */
-    uint64_t rows;              /* rows of that element */
-    bool skipped;               /* the element is omitted */
+    uint64_t rows;              /* rows of the current element */
+    bool skipped;               /* the current element is omitted */
 } following;
 
 static void close_element(following *f)
@@ -313,7 +314,7 @@ static void follow_element(following *f)
     add_element(m, f->kind, f->rows);
 }
 
-/* Adds a property. Elements without rows keep their properties. */
+/* Adds a property. Elements without rows keep all properties. */
 static void follow_property(following *f, ebpo_ply_word line)
 {
     making *m = f->m;

@@ -25,9 +25,10 @@ typedef struct dropping {
     ebpo_stars stars;
     ebpo_same_faces *scratch; /* one for each worker */
     unsigned threads;
-    uint64_t *gone;    /* bit f is set if face f is to be removed */
-    uint64_t count;    /* faces to be removed */
-    uint64_t opposite; /* of these: faces with the opposite orientation of the kept face */
+    uint64_t *gone; /* bit f is set if face f is to be removed */
+    uint64_t count; /* faces to be removed */
+    uint64_t
+        opposite; /* faces to be removed whose orientation is opposite to that of the kept face */
 } dropping;
 
 static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
@@ -51,9 +52,9 @@ static void mark_repeated(dropping *d, const ebpo_same_faces *same)
             first = i;
             continue;
         }
-        uint64_t f = same->item[i].face, stays = same->item[first].face;
+        uint64_t f = same->item[i].face, kept = same->item[first].face;
         __atomic_fetch_or(&d->gone[f / WORD], UINT64_C(1) << f % WORD, __ATOMIC_RELAXED);
-        opposite += runs_up(faces + 3 * f) != runs_up(faces + 3 * stays);
+        opposite += runs_up(faces + 3 * f) != runs_up(faces + 3 * kept);
         count++;
     }
     if (count) {
@@ -75,7 +76,7 @@ static ebpo_status find_repeated(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* Adds source indices to a mesh that is in the source's order. */
+/* Adds source indices to a mesh that is in the order of the source. */
 static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->arrangement)
@@ -100,7 +101,8 @@ static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Removes the marked faces in place: sorted faces stay sorted, and every vertex keeps a face. */
+/* Removes the marked faces in place. Sorted faces stay sorted, and every vertex that had a face
+ * keeps one. */
 static void remove_marked(const dropping *d)
 {
     ebpo_mesh *mesh = d->mesh;

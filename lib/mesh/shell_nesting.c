@@ -1,8 +1,8 @@
-/* Computes the nesting of closed shells and turns each outwards, or inwards if it bounds a cavity.
- * A tree of boxes holds sample points of all shells. The samples within a host are found by a pass
- * over its faces, each with the samples near it (probes); in crowded hosts, by rays from the
- * samples. Decisions are exact (geometry/predicates.h), so the result does not depend on threads.
- */
+/* Computes the nesting of closed shells and turns each shell outwards, or inwards if it bounds a
+ * cavity. A tree of boxes holds sample points of all shells. The samples within a host are found by
+ * a pass over the host's faces, which tests each face against the samples near this face (probes).
+ * In crowded hosts the samples are found by rays from the samples. Decisions are exact
+ * (geometry/predicates.h), so the result does not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -180,7 +180,8 @@ static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* Tests each face against the samples near it, and adds the results to the depths. */
+/* Tests each face of the hosts that are not crowded against the samples near the face, and adds the
+ * results to the depths. */
 static ebpo_status probe_shells(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
@@ -198,7 +199,7 @@ static ebpo_status probe_shells(ebpo_nesting *n, ebpo_error *error)
 }
 
 /* Casts rays along x from the samples of all shells through one tree of the crowded hosts' faces.
- * The signed crossings of a host are its winding number at the sample. */
+ * The sum of a host's signed crossings is the host's winding number at the sample. */
 
 enum { SHELL_RAYS_GRAIN = 16 };
 
@@ -212,7 +213,8 @@ typedef struct casting {
     ebpo_nesting *n;
     uint32_t *host; /* indices of the crowded shells */
     uint64_t host_count;
-    /* faces of the crowded shells; number: the face; value: index of its shell in `host` */
+    /* faces of the crowded shells; number: index of the face; value: index of the face's shell in
+     * `host` */
     ebpo_box_tree faces;
     struct caster *caster;
 } casting;
@@ -220,7 +222,7 @@ typedef struct casting {
 /* State of one thread. */
 typedef struct caster {
     const casting *all;
-    tally *of;        /* [host_count] */
+    tally *tallies;   /* [host_count] */
     int32_t *crossed; /* [host_count] hosts that the shell's rays cross */
     uint64_t crossed_count;
     uint32_t shell;
@@ -239,7 +241,7 @@ static bool on_ray(void *user, const ebpo_box_node *node)
 
 static tally *tally_of(caster *w, int32_t host)
 {
-    tally *t = &w->of[host];
+    tally *t = &w->tallies[host];
     if (t->shell != w->shell + 1) {
         *t = (tally){ .shell = w->shell + 1 };
         w->crossed[w->crossed_count++] = host;
@@ -273,15 +275,16 @@ static uint32_t count_hosts(const caster *w, int32_t *around)
     for (uint64_t i = 0; i < w->crossed_count; i++) {
         bool within = true;
         for (int d = 0; d <= w->sample; d++)
-            within &= w->of[w->crossed[i]].winding[d] != 0;
+            within &= w->tallies[w->crossed[i]].winding[d] != 0;
         count += within;
-        *around += within ? w->of[w->crossed[i]].winding[0] : 0;
+        *around += within ? w->tallies[w->crossed[i]].winding[0] : 0;
     }
     return count;
 }
 
-/* Tests all samples. The samples are the extreme points of the shell, so if a host contains them
- * all, the shell's box is within the host's box. */
+/* Tests the samples of each shell until no host contains all samples so far. The samples are the
+ * extreme points of the shell, so if a host contains them all, the shell's box is within the host's
+ * box. */
 static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -340,11 +343,11 @@ static ebpo_status make_casters(casting *all, ebpo_error *error)
     for (unsigned t = 0; t < all->n->threads; t++) {
         caster *w = &all->caster[t];
         w->all = all;
-        w->of = ebpo_array_alloc(workspace, all->host_count, sizeof *w->of);
+        w->tallies = ebpo_array_alloc(workspace, all->host_count, sizeof *w->tallies);
         w->crossed = ebpo_array_alloc(workspace, all->host_count, sizeof *w->crossed);
-        if (!w->of || !w->crossed)
-            return ebpo_workspace_fail(workspace, all->host_count * sizeof *w->of, error);
-        memset(w->of, 0, all->host_count * sizeof *w->of);
+        if (!w->tallies || !w->crossed)
+            return ebpo_workspace_fail(workspace, all->host_count * sizeof *w->tallies, error);
+        memset(w->tallies, 0, all->host_count * sizeof *w->tallies);
     }
     return EBPO_OK;
 }
@@ -353,7 +356,7 @@ static void free_casting(casting *all)
 {
     ebpo_workspace *workspace = all->n->components->mesh->workspace;
     for (unsigned t = 0; all->caster && t < all->n->threads; t++) {
-        ebpo_array_free(workspace, all->caster[t].of);
+        ebpo_array_free(workspace, all->caster[t].tallies);
         ebpo_array_free(workspace, all->caster[t].crossed);
     }
     free(all->caster);
@@ -361,8 +364,8 @@ static void free_casting(casting *all)
     ebpo_array_free(workspace, all->host);
 }
 
-/* Casts a ray from each sample through a tree of the faces of all crowded hosts; adds to the
- * depths. */
+/* Casts a ray from each sample through the tree of the crowded hosts' faces, and adds the results
+ * to the depths. */
 static ebpo_status cast_all_rays(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
@@ -386,7 +389,7 @@ static ebpo_status cast_all_rays(ebpo_nesting *n, ebpo_error *error)
     return status;
 }
 
-/* --- closed components, and the number of hosts that contain each --- */
+/* --- closed components, and the number of hosts that contain each component --- */
 
 /* A host is crowded if it has more than this number of samples for each of its faces. */
 enum { CROWD = 8, SHELL_NESTING_GRAIN = 64 };

@@ -15,17 +15,19 @@ typedef struct ebpo_shell {
     double sample[EBPO_SHELL_SAMPLES][3];
     double min[3], max[3];
     uint32_t component;
-    uint32_t depth; /* number of closed components that contain it */
+    uint32_t depth; /* number of closed components that contain this component */
     int32_t around; /* sum of the winding numbers of these components at the samples */
-    /* too many samples are within its box for its number of faces, so rays are used */
+    /* this shell's box contains too many samples for the number of the shell's faces, so rays are
+     * used */
     bool crowded;
 } ebpo_shell;
 
 typedef struct ebpo_nesting {
     ebpo_components *components;
-    ebpo_shell *shells; /* closed, with a volume */
+    ebpo_shell *shells; /* the components that are closed and whose volume is not 0 */
     uint64_t count;
-    ebpo_box_tree tree; /* tree over the boxes of the shells; the point of each is its sample[0] */
+    ebpo_box_tree
+        tree; /* tree over the boxes of the shells; the point of a shell is its sample[0] */
     unsigned threads;
 } ebpo_nesting;
 
@@ -76,7 +78,8 @@ static inline bool ebpo_shell_box_within(const ebpo_shell *inner, const ebpo_she
     return true;
 }
 
-/* Returns true if shells of the node may be within the host: their first samples are near it. */
+/* Returns false only if no shell of the node is within the host, because the box of their first
+ * samples is outside the host's box. */
 static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_node *node)
 {
     for (int k = 0; k < 3; k++)
@@ -86,8 +89,8 @@ static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_no
 }
 
 /* Finds the nesting: the number of closed components that contain each component. Initialise `n`
- * with zeros, and free it also on failure. `closed`: result of ebpo_mesh_find_shells, which is
- * modified and borrowed until `n` is freed. */
+ * with zeros, and free it also on failure. `closed`: result of ebpo_mesh_find_shells; it is
+ * modified, and used until `n` is freed. */
 EBPO_MUST_USE ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh,
                                             uint32_t *closed, unsigned threads,
                                             const ebpo_progress *progress, ebpo_error *error);

@@ -39,7 +39,7 @@ static uint64_t stated_size(const uint8_t *head)
     return STL_BINARY_HEAD + RECORD * stated_faces(head);
 }
 
-/* Returns the number of concatenated models that fill the file exactly, or 0 if they do not. */
+/* Returns the number of concatenated models if they fill the file exactly, otherwise 0. */
 static uint64_t count_models(const uint8_t *data, uint64_t size)
 {
     uint64_t models = 0, bytes;
@@ -52,7 +52,7 @@ static uint64_t count_models(const uint8_t *data, uint64_t size)
 }
 
 /* Returns the end of the last facet if each facet is followed by the bytes that its last two bytes
- * declare. Returns UINT64_MAX when that end is beyond the file. */
+ * declare. Returns UINT64_MAX if the facets do not fit into the file. */
 static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data, uint64_t size)
 {
     uint64_t at = STL_BINARY_HEAD;
@@ -90,8 +90,8 @@ static ebpo_status fail_ambiguous(const ebpo_import_build *b, const uint8_t *dat
                           stated_faces(data), stated_size(data), size);
 }
 
-/* Determines the meaning of the bytes beyond the declared facets. Returns EBPO_E_FORMAT when it is
- * ambiguous. */
+/* Determines the meaning of the bytes beyond the declared facets. Returns EBPO_E_FORMAT when the
+ * meaning is ambiguous. */
 static ebpo_status explain_bytes(const ebpo_import_build *b, const uint8_t *data, uint64_t size,
                                  stl_bytes *is)
 {
@@ -188,8 +188,9 @@ static ebpo_status fail_head(const ebpo_import_build *b, const uint8_t *data, ui
                           word);
 }
 
-/* Reads the facets as vertices, three each, and notes unread bytes. Sets *plain to the size of the
- * single model whose facets have attribute bytes, or to 0 for other files. */
+/* Reads the facets as vertices, three for each, and records unread bytes. If the file has one
+ * model, whose facets may have attribute bytes, sets *plain to the size of this model, otherwise to
+ * 0. */
 static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64_t size,
                                uint64_t *plain)
 {
@@ -223,7 +224,8 @@ enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 }
 typedef struct stl_colours {
     const uint8_t *data;
     uint64_t faces;
-    /* words: some attribute bytes are not 0; coloured: some face has a colour */
+    /* magics: the header has COLOR=; words: some attribute bytes are not 0; coloured: some face has
+     * a colour */
     bool magics, words, coloured;
     uint8_t others[3]; /* colour of faces without one */
 } stl_colours;
@@ -307,10 +309,10 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
 }
 
 /* Adds the face attributes `attribute` (unchanged) and `red green blue` (five bits each) unless all
- * are empty. Files with COLOR= in the first 80 bytes (Magics): red first, valid where bit 15 is 0,
- * otherwise the face has the colour stated there. Other files (VisCAM): blue first, valid where bit
- * 15 is 1, otherwise white. Text files have none. The mesh's faces are those of the file.
- * EBPO_E_MEMORY, EBPO_E_IO. */
+ * their values are empty. Files with COLOR= in the first 80 bytes (Magics): red first, valid where
+ * bit 15 is 0, otherwise the face has the colour stated behind COLOR=. Other files (VisCAM): blue
+ * first, valid where bit 15 is 1, otherwise white. Text files have no colours. The faces of the
+ * mesh must be those of the file. EBPO_E_MEMORY, EBPO_E_IO. */
 static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
                                     ebpo_error *error)
 {
@@ -356,7 +358,7 @@ typedef struct stl_text {
     uint64_t next_release;   /* byte offset */
     uint64_t solids;         /* solids that have facets */
     bool begun;              /* a solid has begun and has no facets so far */
-    /* number of unexpected words after a statement's words, and the line of the first one */
+    /* number of unexpected words, and the line of the first one */
     uint64_t odd, odd_line;
 } stl_text;
 
@@ -414,7 +416,7 @@ static ebpo_status read_vertex(stl_text *t)
 
 static void record_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }
 
-/* Skips and counts extra words. */
+/* Skips and counts unexpected words up to the end of the line or the next statement. */
 static void pass_odd(stl_text *t)
 {
     static const char *const words[] = {
@@ -467,8 +469,8 @@ static ebpo_status read_loop(stl_text *t)
     return status;
 }
 
-/* Returns true if a facet, up to its first coordinate, follows `t`, and cannot be part of a name.
- */
+/* Returns true if the words of a facet, up to its first coordinate, follow `t`. They cannot be part
+ * of a name. */
 static bool holds_facet(const stl_text *t)
 {
     stl_text ahead = *t;
@@ -565,7 +567,7 @@ static bool is_text(const uint8_t *data, uint64_t size)
 }
 
 /* Builds the mesh. A file named .stl is text if it begins with the word solid and contains the word
- * facet. Normals are not read: they follow from the corners. */
+ * facet. Normals are not read, because they follow from the corners. */
 static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 {
     const uint8_t *data = job->data;

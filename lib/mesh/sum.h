@@ -11,16 +11,18 @@
 
 #include "core/wide.h"
 
-/* Size of the number: it has the bits from 2^-1074 to 2^1024, and space for 2^62 terms. */
+/* LIMBS: size of the number, which has the bits from 2^-1074 to 2^1024, and space for 2^62 terms.
+ * CARRY: number of additions after which carries are propagated. */
 enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };
 
 typedef struct ebpo_sum {
     int64_t limb[EBPO_SUM_LIMBS]; /* [i] counts 2^(32 i - 1074) */
-    uint32_t adds;                /* additions since carries were propagated */
+    uint32_t adds;                /* number of additions since carries were propagated */
     double beyond;                /* sum of infinite or NaN terms */
 } ebpo_sum;
 
-/* Propagates carries, so that all limbs are 0 .. 2^32 - 1 except the last, which has the sign. */
+/* Propagates carries, so that all limbs except the last are 0 .. 2^32 - 1. The last limb has the
+ * sign. */
 static inline void ebpo_sum_carry(ebpo_sum *s)
 {
     for (int i = 0; i + 1 < EBPO_SUM_LIMBS; i++) {
@@ -41,9 +43,10 @@ static inline void ebpo_sum_add(ebpo_sum *s, double x)
         return;
     }
     uint64_t mantissa = (bits & ((UINT64_C(1) << 52) - 1)) | (uint64_t)(exponent > 0) << 52;
-    unsigned place = exponent ? exponent - 1 : 0; /* position of the lowest bit, above 2^-1074 */
-    int64_t *limb = s->limb + place / 32, sign = bits >> 63 ? -1 : 1;
-    uint64_t low = mantissa << place % 32, high = place % 32 ? mantissa >> (64 - place % 32) : 0;
+    unsigned position = exponent ? exponent - 1 : 0; /* position of the lowest bit, above 2^-1074 */
+    int64_t *limb = s->limb + position / 32, sign = bits >> 63 ? -1 : 1;
+    uint64_t low = mantissa << position % 32,
+             high = position % 32 ? mantissa >> (64 - position % 32) : 0;
     limb[0] += sign * (int64_t)(low & 0xffffffff);
     limb[1] += sign * (int64_t)(low >> 32);
     limb[2] += sign * (int64_t)high;
@@ -90,7 +93,7 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
     if (unit + drop < -1074)
         drop = -1074 - unit; /* a denormal result */
     if (drop > 0) {
-        /* dropped bits, the first at the top: half of a unit */
+        /* the dropped bits, of which the first, half a unit, is the top bit of `below` */
         ebpo_wide below = ebpo_wide_left(head, 128 - drop), half = { UINT64_C(1) << 63, 0 };
         head = ebpo_wide_right(head, drop);
         unit += drop;

@@ -1,5 +1,5 @@
-/* Finds image files that a source names and stores them: a row of the element `ebpo:texture` for
- * each, with its name and bytes (format-spec/attributes.md). Names come from comments of
+/* Finds image files that a source names and stores them. Each image becomes a row of the element
+ * `ebpo:texture`, with its name and bytes (format-spec/attributes.md). Names come from comments of
  * a PLY file and from the material libraries of an OBJ file. Files are searched only in the
  * source's folder and below. Files that are missing, too large or not images are reported and
  * omitted. */
@@ -125,7 +125,8 @@ typedef struct words {
 
 /* Names that face attributes refer to by index, in the order of the header's comments. */
 typedef struct numbered {
-    const ebpo_attribute *of_faces; /* NULL: faces have no such attribute */
+    const ebpo_attribute
+        *of_faces; /* attribute of the faces that refers to the names; NULL: none */
     words *name;
     bool *used;
     uint64_t count, capacity;
@@ -253,7 +254,7 @@ static bool has_name(const numbered *n, words name)
     return n->count && bsearch(&name, n->name, n->count, sizeof *n->name, compare_words);
 }
 
-/* Parses one line of an image's uses. */
+/* Parses one line of an image's uses. Returns true if the kept faces use the image in this way. */
 static bool is_named(const naming *n, words file, words use)
 {
     words word = first_word(&use);
@@ -274,7 +275,7 @@ static bool keeps_bytes(const naming *n, uint64_t row)
     return named;
 }
 
-/* Rebuilds the array with the kept lists; all others become empty. */
+/* Rebuilds the array with the lists of kept rows; all other lists become empty. */
 static ebpo_status cut_array(naming *n, ebpo_attribute *a, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
@@ -426,22 +427,23 @@ static ebpo_texture_name *find_or_add_name(ebpo_texture_names *names, span name)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, hash_of(name), EBPO_TEXTURE_SLOTS - 1,
-                   !names->slot[at] || span_is(name, names->of[names->slot[at] - 1].name));
+                   !names->slot[at] || span_is(name, names->name[names->slot[at] - 1].name));
     if (names->slot[at])
-        return &names->of[names->slot[at] - 1];
+        return &names->name[names->slot[at] - 1];
     if (!is_name(name) || names->count == EBPO_TEXTURES) {
         names->omitted++;
         return NULL;
     }
     char *copy = strndup(name.s, name.n);
-    if (!copy || !ebpo_grow(&names->of, &names->capacity, names->count + 1, sizeof *names->of)) {
+    if (!copy ||
+        !ebpo_grow(&names->name, &names->capacity, names->count + 1, sizeof *names->name)) {
         free(copy);
         names->no_memory = true;
         return NULL;
     }
-    names->of[names->count] = (ebpo_texture_name){ .name = copy };
+    names->name[names->count] = (ebpo_texture_name){ .name = copy };
     names->slot[at] = (uint16_t)(names->count + 1);
-    return &names->of[names->count++];
+    return &names->name[names->count++];
 }
 
 /* Appends text. Control characters become question marks, since line feeds separate lines. */
@@ -477,11 +479,11 @@ static void add_use(ebpo_texture_names *names, span name, span word, span owner)
 void ebpo_texture_names_free(ebpo_texture_names *names)
 {
     for (uint64_t i = 0; i < names->count; i++) {
-        free(names->of[i].name);
-        free(names->of[i].use);
+        free(names->name[i].name);
+        free(names->name[i].use);
     }
-    free(names->of);
-    *names = (ebpo_texture_names){ .of = NULL };
+    free(names->name);
+    *names = (ebpo_texture_names){ .name = NULL };
 }
 
 /* --- PLY --- */
@@ -520,7 +522,7 @@ static bool is_number(span word)
     return digits;
 }
 
-/* Skips a map's options; the file's name follows to the end of the line. */
+/* Skips the options of a map. The rest of the line is the name of the file. */
 static span skip_options(span rest)
 {
     while (rest.n > 1 && rest.s[0] == '-') {
@@ -575,11 +577,11 @@ enum {
 typedef struct finding {
     const char *path; /* path of the source */
     ebpo_texture_names names;
-    /* numbers of files that are not found, outside the folder, too large */
+    /* number of files that are not found, that are outside the folder, and that are too large */
     uint64_t absent, outside, large;
-    /* number of library names that were tried, and of libraries that could not be read */
+    /* number of library names that were tried, and number of libraries that could not be read */
     uint64_t tried, libraries;
-    uint64_t library_bytes; /* bytes read */
+    uint64_t library_bytes; /* bytes that were read of libraries */
     bool keep, no_memory;
     ebpo_error *error;
 } finding;
@@ -612,7 +614,7 @@ static char *path_of(const char *name)
     return path;
 }
 
-/* Opens a file that the source names. */
+/* Opens a file that the source names, in the source's folder or below. */
 static found open_next_to_source(const char *source, const char *name, ebpo_whole_file *out)
 {
     size_t length = (size_t)(ebpo_path_name(source) - source);
@@ -648,7 +650,8 @@ static bool read_library(finding *f, const char *name)
     return good;
 }
 
-/* Reads a library whose name has spaces, or several libraries. */
+/* Reads the library whose name is the whole text, which may have spaces; otherwise one library for
+ * each word. */
 static void read_libraries(void *context, const char *rest, size_t size)
 {
     finding *f = context;
@@ -676,8 +679,8 @@ static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, u
 
 /* --- images --- */
 
-/* Computes the digest of a file in pieces, so that bytes that are not kept need not fit in memory.
- */
+/* Computes the digest of a file in pieces, so that files whose bytes are not kept need not fit in
+ * memory. */
 static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
                                uint8_t digest[TEXTURE_FILES_DIGEST], ebpo_error *error)
 {
@@ -700,7 +703,7 @@ static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
     return status;
 }
 
-/* Reads the bytes to keep, and their digest. */
+/* Reads the bytes if they are kept, and computes the digest. */
 static ebpo_status read_image(const finding *f, ebpo_whole_file *file, const char *name,
                               uint8_t digest[TEXTURE_FILES_DIGEST])
 {
@@ -766,7 +769,7 @@ static void record_losses(const finding *f, ebpo_attributes *to)
                "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
 }
 
-/* Removes an element with the reserved name ebpo:texture that comes from a PLY. */
+/* Removes an element of a PLY file that has the reserved name ebpo:texture. */
 static void drop_own(ebpo_attributes *from)
 {
     bool any = false;
@@ -783,14 +786,14 @@ static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
 {
     ebpo_status status = EBPO_OK;
     if (f->no_memory)
-        return ebpo_fail_memory(f->error, sizeof *f->names.of);
+        return ebpo_fail_memory(f->error, sizeof *f->names.name);
     if (!f->names.count && !f->names.omitted && !f->libraries)
         return EBPO_OK;
     status = ebpo_mesh_need_attributes(mesh, f->error);
     if (status != EBPO_OK)
         return status;
     for (uint64_t i = 0; i < f->names.count && status == EBPO_OK; i++)
-        status = add_image(f, mesh->attributes, &f->names.of[i]);
+        status = add_image(f, mesh->attributes, &f->names.name[i]);
     record_losses(f, mesh->attributes);
     return status;
 }

@@ -1,5 +1,5 @@
-/* Image files that a source names. Each is a row of the element `ebpo:texture`, with lists of
- * bytes. Source: format-spec/attributes.md. For use by one thread. */
+/* Declares the image files that a source names. Each image is a row of the element `ebpo:texture`,
+ * with lists of bytes. Source: format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_TEXTURES_H
 #define EBPO_MESH_TEXTURES_H
 
@@ -9,10 +9,11 @@
 #include "mesh/attributes.h"
 
 enum {
-    EBPO_TEXTURES = 1000,           /* maximum for a mesh */
-    EBPO_TEXTURE_NAME_BYTES = 1023, /* maximum */
+    EBPO_TEXTURES = 1000,           /* maximum number of images of a mesh */
+    EBPO_TEXTURE_NAME_BYTES = 1023, /* maximum length of a name */
     EBPO_TEXTURE_USE_BYTES = 8192,
-    EBPO_TEXTURE_TEXTS = 1 << 24 /* total for names, uses or digests */
+    EBPO_TEXTURE_TEXTS =
+        1 << 24 /* maximum total length of the names, of the uses, and of the digests */
 };
 
 /* The arrays of the element. */
@@ -37,7 +38,7 @@ const ebpo_attribute *ebpo_textures_array(const ebpo_attributes *all, ebpo_textu
 /* Returns the list of a row. */
 ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row);
 
-/* Adds a row to the mesh's textures. The first call creates the arrays, with BYTES if `keep`.
+/* Adds a row to the mesh's textures. The first call creates the arrays, with bytes if `keep`.
  * EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
                                             const ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS],
@@ -47,15 +48,16 @@ EBPO_MUST_USE ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
 bool ebpo_textures_good(const ebpo_attributes *all);
 
 /* Keeps all rows with names, uses and digests, but only the bytes of images that these faces
- * (source indices) use: by the name of their `material`, or as index `texnumber` into a PLY's
- * TextureFile comments. Images whose faces are unknown keep their bytes. EBPO_E_MEMORY, EBPO_E_IO.
- */
+ * (source indices) use: by the name of the attribute `material`, or by the attribute `texnumber`,
+ * which is an index into the TextureFile comments of a PLY file. Images that cannot be assigned to
+ * faces keep their bytes. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
                                                    uint64_t count, ebpo_error *error);
 
-/* Adds the textures of a mesh that was read from `data`, the file `path`, to its attributes; with
- * bytes if `keep`. Files are searched only in the source's folder and below; links that leave it
- * are not followed. Missing and omitted files are noted. EBPO_E_MEMORY, EBPO_E_IO. */
+/* Adds the textures of a mesh to its attributes; with bytes if `keep`. The mesh was read from
+ * `data`, the content of the file `path`. Files are searched only in the source's folder and below;
+ * links that leave this folder are not followed. Missing and omitted files are recorded in the
+ * attributes. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_textures_find(ebpo_mesh *mesh, const char *path, const uint8_t *data,
                                              uint64_t size, bool keep, ebpo_error *error);
 
@@ -70,7 +72,7 @@ typedef struct ebpo_texture_name {
 enum { EBPO_TEXTURE_SLOTS = 4096 }; /* exceeds the number of names */
 
 typedef struct ebpo_texture_names {
-    ebpo_texture_name *of;
+    ebpo_texture_name *name;
     uint64_t count, capacity;
     uint16_t slot[EBPO_TEXTURE_SLOTS]; /* hash table of indices from 1; 0: free */
     uint64_t omitted;                  /* names that are too long, too many, or with control
@@ -84,7 +86,8 @@ void ebpo_texture_names_of_ply(ebpo_texture_names *names, const char *header, ui
 /* Adds the maps of all materials of a library. */
 void ebpo_texture_names_of_mtl(ebpo_texture_names *names, const uint8_t *text, uint64_t bytes);
 
-/* Calls `take` with the text after `mtllib` in each such line of an OBJ file. */
+/* Calls `take` with the text after `mtllib` for each line of an OBJ file that begins with this
+ * word. */
 void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
                         void (*take)(void *context, const char *rest, size_t size), void *context);
 

@@ -1,4 +1,4 @@
-/* Decides which vertices within a distance of each other are joined. */
+/* Decides which vertices that are within a distance of each other are joined. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,12 +15,12 @@
 enum { GRAIN = 1 << 12, KEY_SHIFT = 20 };
 
 /* The edge of a grid cell is twice the distance. Indices of cells are below 2^49, so that rounding
- * moves a vertex by at most an eighth of a cell. So vertices within the distance of each other are
- * within REACH cells along each axis. */
+ * moves a vertex by at most an eighth of a cell. Hence vertices within the distance of each other
+ * are within REACH cells of each other along each axis. */
 static const double REACH = 0.75, MAX_CELLS = 0x1p49, LEAST_DISTANCE = 0x1p-1000;
 
-/* A squared distance is decided by rounded arithmetic if the relative difference exceeds this
- * value. */
+/* Two squared distances are compared by rounded arithmetic if their relative difference exceeds
+ * this value, otherwise by exact arithmetic. */
 static const double DOUBT = 1e-14;
 
 typedef struct grouping {
@@ -29,10 +29,11 @@ typedef struct grouping {
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
     uint32_t *map;   /* [vertex_count] vertex that replaces each vertex */
-    uint32_t *slots; /* [mask + 1] the last remaining vertex of each cell, by the cell's hash */
-    uint32_t *chain; /* [vertex_count] previous remaining vertex in the slot */
+    uint32_t *slots; /* [mask + 1] last remaining vertex of the cells with each hash */
+    uint32_t *chain; /* [vertex_count] previous remaining vertex in the same slot */
     uint64_t mask;
-    double *moved; /* [threads] largest squared distance */
+    double
+        *moved; /* [threads] largest squared distance of a vertex from the one that replaces it */
 } grouping;
 
 /* ---- positions, ascending ---- */
@@ -68,12 +69,12 @@ static int compare_positions(const void *x, const void *y)
     return a->vertex < b->vertex ? -1 : a->vertex > b->vertex;
 }
 
-static void store_positions(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_positions(void *context, uint64_t first, const void *records, uint64_t count)
 {
     grouping *g = context;
     const position *p = records;
     for (uint64_t i = 0; i < count; i++)
-        g->order[place + i] = p[i].vertex;
+        g->order[first + i] = p[i].vertex;
 }
 
 static ebpo_status sort_positions(grouping *g, ebpo_error *error)
@@ -140,7 +141,8 @@ static bool is_nearer(const double p[3], const double a[3], const double b[3])
     int n = put_distance(factor, 1, p, a);
     n += put_distance(factor + n, -1, p, b);
     int sign = ebpo_sign_of_products(factor[0], n);
-    for (int k = 0; k < 3 && sign == 0; k++) /* of two at equal distance, take the first */
+    for (int k = 0; k < 3 && sign == 0;
+         k++) /* of two vertices at equal distances, take the first */
         sign = a[k] < b[k] ? -1 : a[k] > b[k];
     return sign < 0;
 }
@@ -169,7 +171,8 @@ static void keep_vertex(grouping *g, uint32_t v, const double p[3])
     g->slots[slot] = v;
 }
 
-/* Returns a remaining vertex within the distance from p: the nearest one, or any. */
+/* Returns a remaining vertex within the distance from p: the nearest one, or any if `nearest` is
+ * false. */
 static uint32_t find_staying(const grouping *g, const double p[3], bool nearest)
 {
     int64_t low[3], high[3], c[3];
@@ -248,7 +251,8 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Numbers the remaining vertices in ascending order. */
+/* Numbers the remaining vertices in ascending order, and maps each vertex to the number of the one
+ * that replaces it. */
 static uint64_t number_staying(grouping *g, uint32_t *from)
 {
     ebpo_workspace *workspace = g->mesh->workspace;
