@@ -27,7 +27,7 @@ ebpo_big ebpo_big_of(double x)
     return out;
 }
 
-/* Shifts the highest bit to the top. */
+/* Shifts the mantissa to the left until its top bit is set, and adapts the exponent. */
 static ebpo_big normalise_limbs(ebpo_big a)
 {
     int top = LIMBS - 1, bits = 0;
@@ -46,7 +46,7 @@ static ebpo_big normalise_limbs(ebpo_big a)
     return a;
 }
 
-/* Shifts right by `by`, in 0 .. EBPO_BIG_BITS - 1, and drops the bits below. */
+/* Shifts right by `by`, in 0 .. EBPO_BIG_BITS - 1, and drops the bits that are shifted out. */
 static void shift_right(mp_limb_t *limb, unsigned by)
 {
     unsigned limbs = by / LIMB_BITS, bits = by % LIMB_BITS;

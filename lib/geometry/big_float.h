@@ -1,5 +1,5 @@
-/* Floating-point numbers of 512 bits with an error of at most one unit in the last place for each
- * operation, on GMP's functions for arrays of limbs; nothing is allocated. */
+/* Floating-point numbers of 512 bits. Each operation has an error of at most one unit in the last
+ * place. Uses GMP's functions for arrays of limbs, and allocates no memory. */
 #ifndef EBPO_GEOMETRY_BIG_FLOAT_H
 #define EBPO_GEOMETRY_BIG_FLOAT_H
 
@@ -8,7 +8,8 @@
 
 enum { EBPO_BIG_BITS = 512, EBPO_BIG_LIMBS = EBPO_BIG_BITS / GMP_NUMB_BITS };
 
-/* sign * 2^exponent * m, where m in [1/2, 1) has the bits of `limb`, the last one highest. */
+/* The value is sign * 2^exponent * m, where m in [1/2, 1) has the bits of `limb`. The last limb has
+ * the highest bits. */
 typedef struct ebpo_big {
     int sign; /* 0: the value is 0, and the other members are unused */
     int64_t exponent;
@@ -17,8 +18,8 @@ typedef struct ebpo_big {
 
 /* Converts a finite double, exactly. */
 ebpo_big ebpo_big_of(double x);
-/* Return the truncated result. The relative error is at most 2^-510, except for the sum of numbers
- * of opposite sign: there the error is at most 2^-510 of the larger operand. */
+/* Return the truncated result. The relative error is at most 2^-510, except for sums of numbers of
+ * opposite signs, whose error is at most 2^-510 of the larger operand. */
 ebpo_big ebpo_big_add(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_subtract(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_multiply(const ebpo_big *a, const ebpo_big *b);
@@ -34,7 +35,7 @@ typedef struct ebpo_big_complex {
     ebpo_big real, imaginary;
 } ebpo_big_complex;
 
-/* Returns the product; its error is at most 2^-506 of its absolute value. */
+/* Returns the product, with an error of at most 2^-506 of its absolute value. */
 ebpo_big_complex ebpo_big_complex_multiply(const ebpo_big_complex *a, const ebpo_big_complex *b);
 
 #endif

@@ -17,13 +17,14 @@
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
 /* Margins on each side of the model: a fraction of the extent along the axis, and at least a
- * fraction of the largest extent, so that flat models do not get cells too thin to compute with. */
+ * fraction of the largest extent, so that the cells of flat models are not too thin for arithmetic.
+ */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
 static bool extents_usable(const double min[3], const double max[3])
 {
     for (int k = 0; k < 3; k++)
-        /* Written so that NaN fails. */
+        /* the negation makes the test fail for NaN */
         if (!(min[k] <= max[k] && min[k] >= -ldexp(1, LARGEST_EXPONENT) &&
               max[k] <= ldexp(1, LARGEST_EXPONENT)))
             return false;
@@ -79,7 +80,8 @@ bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int 
         if (magnitude > 0)
             frexp(magnitude, &e);
         e = e - MANTISSA_BITS < LEAST_EXPONENT ? LEAST_EXPONENT : e - MANTISSA_BITS;
-        /* The finest unit may be too fine for the margins; the next coarser ones are not. */
+        /* The finest unit may be too fine for the margins. Then one of the next coarser units is
+         * used. */
         while (!axis_with_unit(&box, k, min[k], max[k], low, high, e))
             e++;
     }

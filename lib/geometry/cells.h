@@ -1,5 +1,5 @@
-/* Node cells: the root box on a dyadic grid, and the cells below it, all of whose corners are exact
- * doubles. */
+/* Cells of nodes: the root box on a dyadic grid, and the cells that result from halving. All
+ * corners are exact doubles. */
 #ifndef EBPO_GEOMETRY_CELLS_H
 #define EBPO_GEOMETRY_CELLS_H
 
@@ -11,9 +11,9 @@
 
 enum { EBPO_MAX_LEVEL = 20 };
 
-/* The root cell: [origin, origin + size] on each axis. origin is an integer multiple of a power of
- * two u (separate for each axis), and size an integer multiple of u * 2^grid_level, with every
- * corner at levels 0 .. grid_level exactly representable. size > 0 on every axis. */
+/* The root cell: [origin, origin + size] on each axis. Each axis has a power of two u. The origin
+ * is an integer multiple of u, and the size an integer multiple of u * 2^grid_level. Every corner
+ * at levels 0 .. grid_level is an exact double. size > 0 on every axis. */
 typedef struct ebpo_box {
     double origin[3];
     double size[3];
@@ -26,8 +26,8 @@ typedef struct ebpo_cell {
     uint32_t at[3];
 } ebpo_cell;
 
-/* Returns 2^-n, 0 <= n <= 1000. Multiplying by it rounds like dividing by 2^n, and is much faster.
- */
+/* Returns 2^-n, 0 <= n <= 1000. A multiplication by this number rounds as a division by 2^n does,
+ * and is much faster. */
 static inline double ebpo_half_power(int n)
 {
     uint64_t bits = (uint64_t)(1023 - n) << 52;
@@ -87,22 +87,22 @@ static inline bool ebpo_cell_equal(ebpo_cell a, ebpo_cell b)
     return a.level == b.level && a.at[0] == b.at[0] && a.at[1] == b.at[1] && a.at[2] == b.at[2];
 }
 
-/* Returns the octant, in its parent, of the cell that is `up` levels above the cell at position
- * `at`. */
+/* Returns the octant (position in the parent cell) of the ancestor `up` levels above the cell at
+ * position `at`. */
 static inline unsigned ebpo_octant_at(const uint32_t at[3], int up)
 {
     return (at[0] >> up & 1) | (at[1] >> up & 1) << 1 | (at[2] >> up & 1) << 2;
 }
 
-/* Returns the octant, in its parent, of the cell's ancestor at level + 1, where `level` is coarser
- * than the cell's. */
+/* Returns the octant (position in the parent cell) of the cell's ancestor at level + 1. `level`
+ * must be less than the cell's level. */
 static inline unsigned ebpo_cell_octant(ebpo_cell cell, int level)
 {
     return ebpo_octant_at(cell.at, cell.level - level - 1);
 }
 
-/* Gets the cell of the same level that is one step of -1, 0 or 1 away on each axis: across a face,
- * an edge or a corner. Returns false outside the root cell. */
+/* Computes the cell of the same level that is -1, 0 or 1 steps away on each axis: across a face, an
+ * edge or a corner. Returns false if this cell is outside the root cell. */
 static inline bool ebpo_cell_neighbour(ebpo_cell cell, const int step[3], ebpo_cell *out)
 {
     *out = cell;
@@ -157,8 +157,8 @@ static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int a
     return i;
 }
 
-/* Finds the cell of the given level that contains p (cell faces belong to the upper cell); false
- * outside the root cell. Exact: level <= grid_level. */
+/* Finds the cell of the given level that contains p (cell faces belong to the upper cell). Returns
+ * false outside the root cell. Exact: level <= grid_level. */
 static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -177,10 +177,10 @@ typedef struct ebpo_locator {
     double scale[3], half; /* cells per unit of length; half of the number of cells along an axis */
 } ebpo_locator;
 
-/* A point's position in the grid of that level. */
+/* A point's position in the grid of a locator's level. */
 typedef struct ebpo_position {
-    uint32_t at[3];  /* its cell */
-    double cells[3]; /* its coordinates in cells, accurate to 2^-30 */
+    uint32_t at[3];  /* the cell that contains the point */
+    double cells[3]; /* the point's coordinates in cells, accurate to 2^-30 */
 } ebpo_position;
 
 static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
@@ -209,9 +209,9 @@ static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], e
     return __builtin_expect(sure, 1) || ebpo_locator_decide(l, p, out);
 }
 
-/* Converts a coordinate within the cell to the model's. A point on a cell face (`sides`: see
- * ebpo_polytope_sides) gets exactly the coordinate of that face, so that neighbouring cells agree
- * to the last bit. */
+/* Converts a coordinate within the cell (0 .. 1) to a coordinate of the model. A point on a cell
+ * face (`sides`: see ebpo_polytope_sides) gets exactly the coordinate of that face, so that
+ * neighbouring cells have equal points. */
 static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
                                           unsigned sides)
 {
@@ -247,8 +247,8 @@ static inline ebpo_octcode ebpo_octcode_child(ebpo_octcode code, unsigned octant
     return code << 3 | octant;
 }
 
-/* Returns the first octcode of a node's descendants at `level`: they are [first, first + 8^(level -
- * the node's level)). */
+/* Returns the first octcode of a node's descendants at `level`. The octcodes of these descendants
+ * are first .. first + 8^(level - the node's level) - 1. */
 static inline ebpo_octcode ebpo_octcode_first_descendant(ebpo_octcode code, int level)
 {
     return code << 3 * (level - ebpo_octcode_level(code));

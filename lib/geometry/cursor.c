@@ -1,9 +1,9 @@
 /* Moves a position in an octree from node to node, for any holder of nodes.
  *
- * The cursor keeps the nodes from the root down to the current one, each with its children once
- * they have been read. Moving up therefore reads nothing, and a step to a cell nearby reads only
- * nodes below the common ancestor. Nodes come from an ebpo_node_source: levels in memory, a file,
- * or the tables of a decoded tree. */
+ * The cursor keeps the nodes from the root down to the current node, each with its children once
+ * they have been read. Therefore a move to a parent reads nothing, and a move to a nearby cell
+ * reads only nodes below the common ancestor. Nodes come from an ebpo_node_source: levels in
+ * memory, a file, or the tables of a decoded tree. */
 #include "core/strict_fp.h"
 
 #include "geometry/cursor.h"

@@ -1,6 +1,6 @@
-/* A position in an octree: moves to children and back up, to a cell or to a point, for any holder
- * of nodes. It keeps the path from the root, so that moving up costs nothing and nodes are not read
- * again.
+/* A position in an octree, which moves to children and parents, to a cell or to a point. Works for
+ * any holder of nodes. The cursor stores the path from the root, so that moves to a parent take no
+ * time and nodes are not read again.
  *
  *     ebpo_cursor c;
  *     const ebpo_node *child;
@@ -9,8 +9,9 @@
  *     if (status == EBPO_OK && child && child[5].type == EBPO_GRAY)
  *         ebpo_cursor_down(&c, 5);
  *
- * For one thread; any number of cursors may use a holder that several threads may read. For queues
- * of nodes in another order, use the source itself: nodes are values. */
+ * A cursor is for one thread; several cursors may use one holder if its nodes may be read by
+ * several threads. For a traversal in another order, use a queue of nodes and the source itself:
+ * nodes are values. */
 #ifndef EBPO_GEOMETRY_CURSOR_H
 #define EBPO_GEOMETRY_CURSOR_H
 
@@ -32,12 +33,12 @@ typedef struct ebpo_cursor {
 } ebpo_cursor;
 
 /* Begins at `root`, which is the root of a tree or of any part of a tree. The cursor never moves
- * above it. */
+ * above this node. */
 void ebpo_cursor_begin(ebpo_cursor *cursor, const ebpo_node_source *source, void *holder,
                        ebpo_node root);
 
-/* Returns the current node. `pruned` of a gray node is set only after its children were requested.
- */
+/* Returns the current node. The member `pruned` of a gray node is valid only after the children
+ * were requested. */
 static inline const ebpo_node *ebpo_cursor_node(const ebpo_cursor *cursor)
 {
     return &cursor->at[cursor->depth].node;
@@ -48,8 +49,8 @@ static inline ebpo_octcode ebpo_cursor_octcode(const ebpo_cursor *cursor)
     return ebpo_octcode_of_cell(ebpo_cursor_node(cursor)->cell);
 }
 
-/* Returns the eight children of the current node, valid until the cursor leaves its subtree; NULL
- * when it has none: it is white, black, a leaf or pruned. */
+/* Returns the eight children of the current node, valid until the cursor leaves the node's subtree.
+ * Returns NULL when the node has no children: it is white, black, a leaf or pruned. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_children(ebpo_cursor *cursor, const ebpo_node **child,
                                                ebpo_error *error);
 
@@ -66,12 +67,12 @@ EBPO_MUST_USE ebpo_status ebpo_cursor_next(ebpo_cursor *cursor, bool over, bool 
                                            ebpo_error *error);
 
 /* Moves to the node of `cell`, which must be within the root's cell, or, where the tree is less
- * deep, to the deepest node around it. Moves up no further than necessary. */
+ * deep, to the deepest node that contains this cell. Moves up no further than necessary. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_to_cell(ebpo_cursor *cursor, ebpo_cell cell,
                                               ebpo_error *error);
 
-/* Moves to the deepest node around p, at level `level` or above. When p is outside the root's cell,
- * *within is false and the cursor does not move. */
+/* Moves to the deepest node that contains p, at level `level` or above. When p is outside the
+ * root's cell, *within is false and the cursor does not move. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_to_point(ebpo_cursor *cursor, const ebpo_box *box,
                                                const double p[3], int level, bool *within,
                                                ebpo_error *error);
@@ -86,15 +87,15 @@ EBPO_MUST_USE ebpo_status ebpo_cursor_planes(ebpo_cursor *cursor, uint32_t codes
 EBPO_MUST_USE ebpo_status ebpo_cursor_winding(ebpo_cursor *cursor, int32_t *winding,
                                               ebpo_error *error);
 
-/* Returns the half-spaces that bound the node's envelope within its cell: those of its ancestors
- * from the root down and, if `own` is true, its own planes. */
+/* Returns the half-spaces that bound the node's envelope within its cell: the planes of its
+ * ancestors from the root down and, if `own` is true, its own planes. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_half_spaces(ebpo_cursor *cursor, bool own,
                                                   ebpo_half_spaces *out, ebpo_error *error);
 
-/* Returns the envelope as a polytope in coordinates of the node's cell, with its own planes; for a
- * black node the cell. The polytope is valid while `stack`, which serves only this cursor, holds
- * it. This function and ebpo_cursor_half_spaces need a cursor that began at the root of the whole
- * tree. */
+/* Returns the envelope, which is bounded by the planes of the ancestors and the node's own planes,
+ * as a polytope in coordinates of the node's cell. For a black node it is the cell. The polytope is
+ * valid until the next call with `stack`, which must be used only with this cursor. This function
+ * and ebpo_cursor_half_spaces need a cursor that began at the root of the whole tree. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_envelope(ebpo_cursor *cursor, ebpo_envelope_stack *stack,
                                                const ebpo_polytope **out, ebpo_error *error);
 

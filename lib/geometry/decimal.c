@@ -1,5 +1,5 @@
-/* Converts decimal text to the nearest float or double. There are three methods, each exact where
- * it applies, tried in order of cost:
+/* Converts decimal text to the nearest float or double. There are three methods. Each is exact
+ * where it applies, and the fastest is tried first:
  * 1. Digits below 2^53, multiplied or divided by a power of ten up to 10^22. Both numbers are
  *   doubles, so one operation rounds once (Clinger, "How to read floating point numbers
  *   accurately", 1990). That double also decides the float, unless it is exactly between two
@@ -21,7 +21,7 @@ typedef struct decimal {
     uint64_t digits;
     int32_t exponent; /* value = digits * 10^exponent */
     bool negative;
-    bool short_form; /* at most 19 digits, so none was dropped */
+    bool short_form; /* at most 19 digits; false: `digits` lacks the digits after the 19th */
 } decimal;
 
 static const double tens[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
@@ -76,7 +76,7 @@ static bool scan_number(decimal *d, const char *s, const char *end)
         return false;
     if (s == end || *s == 'e' || *s == 'E')
         return s == end || scan_exponent(d, s + 1, end);
-    /* 3.1+e2, as some programs write 3.1e+2 */
+    /* some programs write 3.1+e2 instead of 3.1e+2 */
     return end - s > 2 && is_sign(*s) && (s[1] == 'e' || s[1] == 'E') && is_digit(s[2]) &&
            scan_exponent_of(d, *s == '-', s + 2, end);
 }
@@ -166,9 +166,9 @@ static bool long_quotient(double *out, const decimal *d, int bits)
 }
 
 /* Decides exactly whether `value`, the float nearest to digits / 10^e, gives the digits when it is
- * rounded to the last digit (ties to even). It does if value * 10^e is less than a half away from
- * the digits. The value is from 1e-27 to 1e20, where floats are normal. Sets *keeps when it returns
- * true. */
+ * rounded to the last digit (ties to even). That is so if value * 10^e differs from the digits by
+ * less than a half. The value is from 1e-27 to 1e20, where floats are normal. Sets *keeps when it
+ * returns true. */
 static bool compare_scaled(bool *keeps, float value, const decimal *d)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -234,8 +234,8 @@ static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c
     return strtof_l(buffer, NULL, c_locale);
 }
 
-/* Prints the value with `count` digits and compares the digits, and the power of ten of the first.
- */
+/* Prints the value with `count` digits. Returns true if the digits and the power of ten of the
+ * first digit are equal to these. */
 static bool prints_digits(float value, const char *digits, size_t count, int32_t first)
 {
     char printed[EBPO_NUMBER_LONGEST + 16];
@@ -266,9 +266,9 @@ static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 }
 
 /* Returns true if arithmetic in doubles shows that the float nearest to digits * 10^exponent keeps
- * the digits: it is less than half of 10^exponent away. That is so for digits below 2^23, because a
- * unit of the last digit is greater than the distance between floats. For digits below 2^40 the
- * double is accurate to 2^-12 of the half. */
+ * the digits: the float differs from the number by less than half of 10^exponent. That is so for
+ * digits below 2^23, because a unit of the last digit is greater than the distance between floats.
+ * For digits below 2^40 the double is accurate to 2^-12 of that half. */
 static inline bool surely_keeps(double nearest, float value, const decimal *d)
 {
     return d->digits < UINT64_C(1) << 23 ||

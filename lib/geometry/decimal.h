@@ -6,18 +6,18 @@
 #include <locale.h>
 
 /* Converts s[0 .. n), which must be exactly one number: [+-] digits [. digits] [e [+-] digits], or
- * nan, inf, infinity in any case. Also accepts 3.1+e2 and, from Microsoft's C library, 1.#INF,
- * 1.#IND, 1.#QNAN, 1.#SNAN with zeros after them, nan(ind) and nan(snan). Hexadecimal is rejected.
- * The result is the nearest float (double), ties to even; beyond the range it is infinite. Returns
- * false for other text, or text longer than EBPO_NUMBER_LONGEST. `c_locale`: from
- * newlocale(LC_ALL_MASK, "C", 0); used for the few numbers that the fast exact methods do not
- * decide. */
+ * nan, inf, infinity in any case. Also accepts 3.1+e2 and, from Microsoft's C
+ * library, 1.#INF, 1.#IND, 1.#QNAN, 1.#SNAN, each with any number of zeros after it, and nan(ind)
+ * and nan(snan). Hexadecimal is rejected. The result is the nearest double, ties to even; beyond
+ * the range of doubles it is infinite. Returns false for other text, or text longer than
+ * EBPO_NUMBER_LONGEST. `c_locale`: from newlocale(LC_ALL_MASK, "C", 0); used for the few numbers
+ * that the fast exact methods cannot convert. */
 bool ebpo_number_double(double *out, const char *s, size_t n, locale_t c_locale);
 enum { EBPO_NUMBER_LONGEST = 1200 };
 
 /* Same as ebpo_number_double for a float. *kept is true if the float, rounded to the text's last
- * digit (ties to even), gives the text, or if the text has no digits or is infinite even as a
- * double. */
+ * digit (ties to even), gives the text. It is also true for nan and inf, and for numbers beyond the
+ * range of doubles. */
 bool ebpo_number_float_kept(float *out, bool *kept, const char *s, size_t n, locale_t c_locale);
 
 static inline bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale)

@@ -1,6 +1,6 @@
-/* Distance of a point to a triangle: fast bounds, exact values and exact comparisons, for every
- * finite double, also for triangles without area. Pure functions, any thread; the results are the
- * same with every compiler and its flags. */
+/* Computes the distance of a point from a triangle: fast bounds, exact values and exact
+ * comparisons, for all finite doubles, also for triangles without area. All functions are pure and
+ * may be called by any thread. Results do not depend on the compiler and its flags. */
 #ifndef EBPO_GEOMETRY_DISTANCE_H
 #define EBPO_GEOMETRY_DISTANCE_H
 
@@ -14,14 +14,14 @@ typedef enum ebpo_feature {
     EBPO_NEAR_CORNER2,
     EBPO_NEAR_EDGE0,
     EBPO_NEAR_EDGE1,
-    EBPO_NEAR_EDGE2, /* corner k to k + 1 */
+    EBPO_NEAR_EDGE2, /* edge k is from corner k to corner k + 1 */
     EBPO_NEAR_INTERIOR,
     EBPO_NEAR_UNKNOWN /* not certain, because of rounding */
 } ebpo_feature;
 
-/* Guaranteed bounds: lo <= distance <= hi. Their gap is usually some 1e-15 of the greater of the
- * distance and the largest |p - corner|. `feature` is certain unless UNKNOWN. Overflow and
- * underflow give wide bounds (lo = 0, hi = INFINITY), never wrong ones. */
+/* Guaranteed bounds: lo <= distance <= hi. The difference of the bounds is usually some 1e-15 of
+ * the distance or of the largest |p - corner|, whichever is greater. `feature` is certain unless
+ * UNKNOWN. Overflow and underflow give wide bounds (lo = 0, hi = INFINITY), never wrong bounds. */
 typedef struct ebpo_distance_bounds {
     double lo, hi;
     ebpo_feature feature;
@@ -30,18 +30,18 @@ void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3
                                    ebpo_distance_bounds *out);
 
 typedef struct ebpo_triangle_nearest {
-    /* the double nearest to the exact distance (ties to even); INFINITY when that overflows */
+    /* the double nearest to the exact distance (ties to even); INFINITY if this double overflows */
     double distance;
     /* nearest point, each coordinate within 8 ulp of the largest coordinate involved */
     double point[3];
-    /* certain, never UNKNOWN; the lowest-dimensional one that contains the nearest point */
+    /* certain, never UNKNOWN; the lowest-dimensional feature that contains the nearest point */
     ebpo_feature feature;
 } ebpo_triangle_nearest;
 /* Computes the nearest point by double-double arithmetic with an error bound, or by integers of any
- * size (GMP) when that does not decide the rounding. `bounds`: result of
+ * size (GMP) if the error bound does not decide the rounding. `bounds`: result of
  * ebpo_triangle_distance_bounds for the same input, or NULL. `normal`: receives the result of
- * ebpo_triangle_unit_normal, which takes little extra time where the nearest point is in the
- * interior; or NULL. */
+ * ebpo_triangle_unit_normal, or NULL. The normal takes little extra time if the nearest point is in
+ * the interior. */
 void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
                                  const ebpo_distance_bounds *bounds, double *normal,
                                  ebpo_triangle_nearest *out);

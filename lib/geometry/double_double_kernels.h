@@ -1,6 +1,6 @@
 /* Double-double arithmetic for distances and rays, compiled once for each instruction set. With FMA
- * one instruction gives a product's rounding error. The error bounds hold in each build, so
- * decisions and results are the same. Pure functions. */
+ * one instruction computes a product's rounding error. The error bounds hold in each build, so all
+ * builds give the same decisions and results. All functions are pure. */
 #ifndef EBPO_GEOMETRY_DOUBLE_DOUBLE_KERNELS_H
 #define EBPO_GEOMETRY_DOUBLE_DOUBLE_KERNELS_H
 
@@ -9,8 +9,8 @@
 #include "geometry/expansion.h"
 #include "geometry/ray.h"
 
-/* A distance (head + tail, which may overlap by some bits) with a bound of its relative error, and
- * the nearest point. */
+/* A distance (head + tail, whose bits may overlap) with a bound of its relative error, and the
+ * nearest point. */
 typedef struct ebpo_measured {
     ebpo_pair distance;
     double error;
@@ -54,7 +54,9 @@ typedef struct ebpo_ray_pairs {
 
 EBPO_KERNELS(ebpo_ray_pairs, ebpo_ray_pairs)
 
-/* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
+/* Added to error bounds, to cover underflow. This number is much larger than the sum of all
+ * underflow errors (2^-1075 each), and it is a normal number, because arithmetic on denormals is
+ * slow. */
 #define EBPO_RAY_SLACK 0x1p-960
 
 #endif

@@ -1,8 +1,8 @@
-/* Exact arithmetic on doubles: a value is an unevaluated sum of doubles that do not overlap, the
- * smallest first, without zeros. Results are exact as long as nothing overflows or underflows;
- * callers keep exponents in range (see predicates.c). An array of n = 0 components is 0. Include
- * strict_fp.h first. Source: Shewchuk 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT,
- * FAST-EXPANSION-SUM and SCALE-EXPANSION. */
+/* Exact arithmetic on doubles: a value is an unevaluated sum of doubles (an expansion). The
+ * components do not overlap, are sorted from the smallest to the largest, and are not 0. Results
+ * are exact as long as nothing overflows or underflows; callers keep exponents in range (see
+ * predicates.c). An expansion of n = 0 components is 0. Include strict_fp.h first. Source: Shewchuk
+ * 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT, FAST-EXPANSION-SUM and SCALE-EXPANSION. */
 #ifndef EBPO_GEOMETRY_EXPANSION_H
 #define EBPO_GEOMETRY_EXPANSION_H
 
@@ -55,7 +55,7 @@ static inline int ebpo_expansion_of_pair(double *out, ebpo_pair pair)
     return ebpo_expansion_push(out, ebpo_expansion_push(out, 0, pair.tail), pair.head);
 }
 
-/* Computes out = e + f; `out` has capacity n + m and is neither of them. Returns the number of
+/* Computes out = e + f; `out` has capacity n + m and is neither e nor f. Returns the number of
  * components. */
 static inline int ebpo_expansion_sum(double *out, const double *e, int n, const double *f, int m)
 {
@@ -97,8 +97,8 @@ static inline int ebpo_expansion_sign(const double *e, int n)
     return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
 }
 
-/* Reduces the number of components, in place: each becomes the rounded sum of itself and all
- * smaller ones. Shewchuk's COMPRESS. */
+/* Reduces the number of components, in place: each component becomes the rounded sum of itself and
+ * all smaller components. This is Shewchuk's COMPRESS. */
 static inline int ebpo_expansion_compress(double *e, int n)
 {
     if (n == 0)
@@ -182,8 +182,8 @@ static inline ebpo_pair ebpo_pair_subtract(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(a, (ebpo_pair){ -b.head, -b.tail });
 }
 
-/* Returns the product; head and tail may overlap by some bits, which is suitable for further
- * additions and products. */
+/* Returns the product. The bits of head and tail may overlap; that is allowed in further additions
+ * and products. */
 static inline ebpo_pair ebpo_pair_multiply(ebpo_pair a, ebpo_pair b)
 {
     ebpo_pair product = ebpo_two_product(a.head, b.head);
@@ -201,7 +201,7 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
 
 /* Computes two doubles, equal or adjacent, one of which is the exact a / b rounded to nearest. They
  * are equal if the rounding is certain. `error`: relative error of a and b together. Returns false
- * where the quotient is too large or too small for this. */
+ * if the quotient is too large or too small. */
 static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])
 {
     double q = a.head / b.head;

@@ -1,6 +1,7 @@
-/* Converts doubles to integers in a common power of two, and back with one rounding. Used where
- * filters and expansions do not decide. Quotients and roots are computed with some 70 bits, and the
- * lowest bit is set when the remainder is not 0, so that rounding to a double is always correct. */
+/* Converts doubles to multiples of a common power of two, and results back to doubles with one
+ * rounding. Used for cases that filters and expansions do not decide. Quotients and roots are
+ * computed with some 70 bits, and the lowest bit is set when the remainder is not 0, so that
+ * rounding to a double is always correct. */
 #include "core/strict_fp.h"
 
 #include "geometry/integer_vectors.h"

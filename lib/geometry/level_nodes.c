@@ -1,11 +1,12 @@
 /* Reads the nodes of an octree in memory: as levels, and as a table of children.
  *
  * Levels store node types in groups of eight siblings, 16 bits each. A node is found by its rank:
- * the number of nodes of its type before it in its level. Ranks are prefix sums of the counts in
- * the groups, made once for each level; contradictory counts are rejected.
+ * the number of preceding nodes of its type in its level. Ranks are prefix sums of the counts in
+ * the groups, and are computed once for each level. Contradictory counts are rejected.
  *
  * The table of children stores four bytes for each node. A grid over its top levels replaces the
- * first steps from the root. The grid has at most about twice as many cells as there are groups. */
+ * first steps from the root. The grid has at most about twice as many cells as the table has
+ * groups. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,7 +31,7 @@ static inline uint64_t sum_of_bytes(uint64_t x)
     return ((x & BYTES) + (x >> 8 & BYTES)) * UINT64_C(0x0001000100010001) >> 48;
 }
 
-/* Counts types of up to 128 groups, four in a word. Bytes of the sums stay below 256. */
+/* Counts types of up to 128 groups, four in a word. Every byte of the sums stays below 256. */
 static void count_words(const uint8_t *types, unsigned words, uint64_t counts[4])
 {
     uint64_t low = 0, high = 0, both = 0;
@@ -75,7 +76,7 @@ void ebpo_level_ranks_free(ebpo_level_ranks *ranks)
     memset(ranks, 0, sizeof *ranks);
 }
 
-/* Counts, for each group, the nodes of a type in the groups before it, and checks their total. */
+/* Computes for each group the number of nodes of a type in the preceding groups. */
 static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_node_type type,
                                 uint64_t *count, ebpo_error *error)
 {
@@ -120,7 +121,8 @@ static ebpo_status fail_counts(int number, const char *what, ebpo_error *error)
                      "level %d: the counts of its %s do not add up; run ebpo verify", number, what);
 }
 
-/* Computes for each count the sum of the counts before it. `bytes`: size of a count, 1 or 4. */
+/* Computes for each count the sum of the preceding counts, and checks the total. `bytes`: size of a
+ * count, 1 or 4. */
 static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, uint64_t count,
                               uint64_t total, int number, const char *what, ebpo_error *error)
 {
@@ -157,7 +159,7 @@ ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level
 
 /* --- nodes of levels --- */
 
-/* Returns the node of an octant in a group; the cell has the group's level. */
+/* Returns the node of an octant in a group. `cell`: the node's cell, at the group's level. */
 static ebpo_node node_of(const ebpo_level_nodes *n, uint64_t group, unsigned octant, ebpo_cell cell)
 {
     uint16_t types = n->level[cell.level].types[group];

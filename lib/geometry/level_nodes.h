@@ -1,5 +1,5 @@
-/* Node types in groups of eight siblings: a 16-bit word each, two bits for each octant, octant 0
- * lowest. Level 0 has one group, of which only octant 0 exists. */
+/* Node types in groups of eight siblings. A group is a 16-bit word with two bits for each octant;
+ * octant 0 has the lowest bits. Level 0 has one group, of which only octant 0 exists. */
 #ifndef EBPO_GEOMETRY_LEVEL_NODES_H
 #define EBPO_GEOMETRY_LEVEL_NODES_H
 
@@ -26,11 +26,12 @@ static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node
     return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
 }
 
-/* Returns a word whose bit 2i is set when octant i is a leaf or gray: then faces touch it. */
+/* Returns a word whose bit 2i is set when octant i is a leaf or gray, that is, when faces touch
+ * this octant. */
 static inline unsigned ebpo_group_filled(uint16_t types) { return types >> 1 & 0x5555u; }
 
-/* Returns the number of octants below `octants` (at most 8) of this type: if `octants` is an
- * octant's own number, that is its rank among its siblings of this type. */
+/* Returns how many octants less than `octants` (at most 8) have this type. If `octants` is the
+ * number of an octant, the result is this octant's rank among its siblings of this type. */
 static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, unsigned octants)
 {
     unsigned differs = types ^ 0x5555u * (unsigned)type;
@@ -40,7 +41,7 @@ static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, uns
     return (bits + (bits >> 8)) & 0xf;
 }
 
-/* Counts nodes of each type in groups of eight, 16 bits each, little-endian, at any address. */
+/* Counts nodes of each type in groups, which are little-endian words at any address. */
 void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4]);
 
 /* Returns true if one of the eight nodes is gray or a leaf, which have bit 1 of their type set. */
@@ -58,14 +59,14 @@ static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64
 }
 
 /* A node of an octree, identified by its position; shared by all holders of nodes (levels in
- * memory, a file, the tables of a decoded tree). It is a value and may be copied, kept and queued.
- */
+ * memory, a file, the tables of a decoded tree). A node is a value and may be copied, kept and
+ * queued. */
 
 typedef struct ebpo_node {
     ebpo_cell cell;
     ebpo_node_type type;
-    bool pruned; /* gray, and known to have no children in its holder */
-    /* Key by which its holder finds it. */
+    bool pruned; /* a gray node without children in its holder, as far as known */
+    /* key by which the holder finds the node */
     union {
         uint64_t rank;  /* in levels and files: rank among the nodes of its type in its level */
         uint32_t entry; /* in tables: see ebpo_node_table */
@@ -74,15 +75,15 @@ typedef struct ebpo_node {
     const struct ebpo_accel *subtree;
 } ebpo_node;
 
-/* Returns true for a white or black node: no face touches it, and all of it is inside or all
- * outside. */
+/* Returns true for a white or black node: no face touches the node, which is completely inside or
+ * completely outside. */
 static inline bool ebpo_node_is_uniform(const ebpo_node *node)
 {
     return node->type == EBPO_WHITE || node->type == EBPO_BLACK;
 }
 
-/* Returns a gray node's child, from the types in the group of its children, and the rank of the
- * group's first node of each type in the next level. */
+/* Returns a gray node's child. `types`: types in the group of the children. `ranks`: for each type,
+ * the rank in the next level of the group's first node of this type. */
 static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, uint16_t types,
                                         const uint64_t ranks[4])
 {
@@ -109,11 +110,11 @@ static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
 enum { EBPO_NODE_PLANES = 255 }; /* counts of planes are bytes */
 
 typedef struct ebpo_node_source {
-    /* Returns the eight children of a gray node. If this holder has none, marks the node as pruned
-     * instead. Also stores what it has found out in the node, so that it is not computed again. */
+    /* Returns the eight children of a gray node. If the holder has none, marks the node as pruned
+     * instead. May also store other results in the node, so that they are not computed again. */
     ebpo_status (*children)(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error);
     /* Returns the codes of the planes that a gray node adds to its parent's envelope; other nodes
-     * have none, except leaves where levels store theirs. */
+     * have none, except leaves if the levels store the planes of leaves. */
     ebpo_status (*planes)(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
                           unsigned *count, ebpo_error *error);
     /* Returns the winding number in a white or black node of a solid. */
@@ -121,25 +122,26 @@ typedef struct ebpo_node_source {
                            ebpo_error *error);
 } ebpo_node_source;
 
-/* Ranks in one level of a tree in memory: the beginnings of a group's nodes, a node's planes and a
- * leaf's references. They are prefix sums, so that nodes can be visited in any order. */
+/* Ranks in one level of a tree in memory: the index of a group's first node of each type, of a
+ * node's first plane, and of a leaf's first reference. Ranks are prefix sums, so that nodes can be
+ * visited in any order. */
 
 typedef struct ebpo_level_ranks {
-    /* [group_count] by type: number of such nodes in the groups before; NULL for white and black
-     * nodes if the level has no winding numbers for them */
+    /* [group_count] by type: number of nodes of this type in the preceding groups; NULL for white
+     * and black nodes if the level has no winding numbers for them */
     uint64_t *before[4];
     uint64_t *plane_first;      /* [gray_count] */
     uint64_t *leaf_plane_first; /* [leaf_count], NULL without stored leaf planes */
     uint64_t *ref_first;        /* [leaf_count], NULL without face lists */
 } ebpo_level_ranks;
 
-/* Makes ranks. EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is
- * left to free. `number` is for messages. */
+/* Makes ranks. EBPO_E_FORMAT when the level's counts contradict each other. On failure all memory
+ * is freed. `number` is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level,
                                                 int number, ebpo_error *error);
 void ebpo_level_ranks_free(ebpo_level_ranks *ranks);
 
-/* The nodes of levels in memory, from the root down to some level. The pointers are borrowed. Gray
+/* The nodes of levels in memory, from the root down to some level. The caller owns the arrays. Gray
  * nodes without children in these levels are pruned, and so are all gray nodes of the last level.
  */
 typedef struct ebpo_level_nodes {
@@ -150,23 +152,24 @@ typedef struct ebpo_level_nodes {
 
 ebpo_node ebpo_level_root(const ebpo_level_nodes *nodes);
 
-/* Returns a child of a gray node that is not pruned. The rank of white and black nodes is known
- * only where their winding numbers are stored. */
+/* Returns a child of a gray node that is not pruned. The rank of a white or black child is valid
+ * only if the level has winding numbers for this type. */
 ebpo_node ebpo_level_child(const ebpo_level_nodes *nodes, const ebpo_node *gray, unsigned octant);
 
 /* Returns the codes of the planes that a gray node adds, or that are stored for a leaf. */
 const uint32_t *ebpo_level_planes(const ebpo_level_nodes *nodes, const ebpo_node *node,
                                   unsigned *count);
 
-/* Returns the winding number of a white or black node; for a leaf, that at its lowest corner.
- * Solids only. */
+/* Returns the winding number of a white or black node, or the winding number at the lowest corner
+ * of a leaf. Solids only. */
 int32_t ebpo_level_winding(const ebpo_level_nodes *nodes, const ebpo_node *node);
 
 /* For cursors; the holder is an ebpo_level_nodes. */
 extern const ebpo_node_source ebpo_level_source;
 
-/* A decoded tree as a table of children: four bytes a node, found by following indices. It is used
- * for many successive queries: finding a point's node is a loop of one line. */
+/* A decoded tree as a table of children: four bytes for each node, which refer to the node's
+ * children by index. It is used for many successive queries, because the search for a point's node
+ * is a loop of one line. */
 
 /* An entry has two bits for its kind and 30 bits for its value. */
 typedef enum ebpo_entry_kind {
@@ -221,22 +224,22 @@ static inline ebpo_node ebpo_entry_node(uint32_t entry, ebpo_cell cell, ebpo_rul
 
 typedef struct ebpo_node_table {
     int root_level;       /* level of the node that `root` describes */
-    uint32_t root;        /* its entry */
+    uint32_t root;        /* entry of the root */
     uint32_t (*group)[8]; /* entries of the children, octant by octant */
     uint32_t group_count;
     /* the grid over the cells of level root_level + grid_bits; 0: no grid */
     int grid_bits;
     uint32_t *grid;      /* [z][y][x] entry of the node that is or contains the cell */
-    uint8_t *grid_depth; /* [z][y][x] depth of that node below the root */
+    uint8_t *grid_depth; /* [z][y][x] depth below the root of the node in `grid` */
     /* entries of parts of uniform nodes, octant by octant, for results of points: query/holes.h */
     uint32_t (*split)[8];
     uint32_t split_count;
 } ebpo_node_table;
 
-/* Returns the bits of the grid of a table of this many groups; 0: none. */
+/* Returns the bits of the grid for a table with this number of groups; 0: no grid. */
 int ebpo_node_grid_bits(uint64_t groups);
 /* Makes the grid, of at most about twice as many cells as there are groups. The grid is optional:
- * there is none when memory is short. */
+ * when memory is short, the table has none. */
 void ebpo_node_table_make_grid(ebpo_node_table *table);
 void ebpo_node_table_free(ebpo_node_table *table);
 
@@ -263,7 +266,7 @@ static inline uint64_t ebpo_grid_cell(const ebpo_node_table *table, int fine_lev
     return (z << table->grid_bits | y) << table->grid_bits | x;
 }
 
-/* Begins at the root, or directly at the node in the grid. */
+/* Begins at the node in the grid, or at the root if there is no grid. */
 static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int fine_level,
                                               const uint32_t at[3])
 {
@@ -271,8 +274,8 @@ static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int 
         return (ebpo_descent){ table->root, table->root_level };
     uint64_t cell = ebpo_grid_cell(table, fine_level, at);
     uint32_t entry = table->grid[cell];
-    /* most gray nodes in the grid are of its own level, so grid_depth, another cache line, need not
-     * be read */
+    /* most gray nodes in the grid are at the level of its cells; for these, grid_depth, which is in
+     * another cache line, is not read */
     bool deep = ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY;
     int depth = deep ? table->grid_bits : table->grid_depth[cell];
     return (ebpo_descent){ entry, table->root_level + depth };

@@ -1,12 +1,12 @@
-/* Cuts polygons in space and closed chains into triangles over their own corners.
+/* Cuts polygons in space and closed chains into triangles between their own corners.
  *
- * A polygon is projected along the axis on which its normal is largest. A convex one becomes a fan;
- * any other is cut ear by ear, with exact tests. A corner is tested again only when its own
- * neighbours have changed, or when the corner that blocked its ear is gone. Blocking corners are
- * searched for in a tree of boxes. So outlines of 100,000 corners and more are cut in about n log n
- * steps. Outlines that cross themselves get the triangles of least area in space, as closed chains
- * do. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in the
- * boundary of a polyhedron", 1995. */
+ * A polygon is projected along the axis on which its normal is largest. A convex polygon becomes a
+ * fan; every other polygon is cut ear by ear, with exact tests. A corner is tested again only when
+ * its own neighbours have changed, or when the corner that blocked its ear was cut off. Blocking
+ * corners are searched for in a tree of boxes. So outlines of 100,000 corners and more are cut in
+ * about n log n steps. Outlines that cross themselves get the triangles of least area in space, as
+ * closed chains of holes do. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir,
+ * "Filling gaps in the boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -98,7 +98,8 @@ static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
 typedef struct chain_ear {
     double area;
     uint32_t tip;
-    /* version of the tip when the ear was computed; the ear is stale if the tip has a newer one */
+    /* version of the tip when the ear was computed; the ear is outdated if the tip has a newer
+     * version */
     uint32_t version;
     bool reflex;
 } chain_ear;
@@ -107,7 +108,7 @@ typedef struct cutting {
     const ebpo_chain *chain;
     uint32_t *before, *after, *version;
     double normal[3]; /* area vector of the chain */
-    chain_ear *heap;  /* least first */
+    chain_ear *heap;  /* the least ear first */
     uint64_t count;
 } cutting;
 
@@ -212,12 +213,12 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 /* The corners that block an ear. */
 typedef enum ear_rule {
-    /* Any corner in the closed triangle, unless it is at the position of one of the triangle's. */
+    /* A corner in the closed triangle that is not at the position of a corner of the triangle. */
     EBPO_EARS_CLOSED,
 
     /* For outlines that touch themselves (slits, bridges to holes, pinched corners): a corner
-     * within the triangle or on its new side; and one elsewhere on its border if the outline goes
-     * into the triangle from there. Where no ear is left, spikes without area are cut off. */
+     * within the triangle or on its new side; also a corner on another side from which the outline
+     * goes into the triangle. If no ear is left, spikes without area are cut off. */
     EBPO_EARS_TOUCHING
 } ear_rule;
 
@@ -241,10 +242,10 @@ typedef struct box {
 typedef struct outline {
     const double (*at)[2];
     bool touching;
-    uint32_t n, left; /* number of corners, and of corners not yet cut off */
+    uint32_t n, left; /* number of corners, and number of corners that are not cut off */
     uint64_t work;
 
-    uint32_t *next, *previous; /* next: NONE once cut off */
+    uint32_t *next, *previous; /* next is NONE for a corner that is cut off */
 
     /* [LEVELS][words] level 0: a bit for each corner whose ear is to be tested; each other level: a
      * bit for each word of the level below that is not 0 */
@@ -255,19 +256,19 @@ typedef struct outline {
     /* for each ear the corner that blocks it; for each corner the list of ears that it blocks */
     uint32_t *blocker, *first_blocked, *next_blocked, *previous_blocked;
 
-    /* [2 * leaves] boxes around runs of corners, from index 1, and the number of corners left in
-     * each */
+    /* [2 * leaves] boxes around runs of corners, from index 1, and the number of corners in each
+     * box that are not cut off */
     box *boxes;
     uint32_t *corners;
     uint32_t leaves; /* a power of two; 0: no tree */
 } outline;
 
-/* The tested triangle, and the state at its corner b. */
+/* The tested triangle a b c, and the state at its corner b. */
 typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
-    bool along_a, along_c; /* other edges run from b's position towards a, towards c */
+    bool along_a, along_c; /* another edge runs from b's position towards a; towards c */
 } tested_ear;
 
 static int turn_of_corners(const outline *o, uint32_t a, uint32_t b, uint32_t c)
@@ -379,7 +380,7 @@ static void build_tree(outline *o)
     }
 }
 
-/* Returns false where no corner of the box can block the ear. */
+/* Returns false if no corner in the box can block the ear. */
 static bool may_block(const outline *o, const tested_ear *e, const box *b)
 {
     for (int k = 0; k < 2; k++)
@@ -509,7 +510,7 @@ static tested_ear ear_at(const outline *o, uint32_t b)
 
 /* ---- the side of the outline that an ear is on ---- */
 
-/* Finds a point within the ear; returns false if there is none after rounding. */
+/* Computes a point within the ear. Returns false if the rounded point is not within the ear. */
 static bool point_within(const tested_ear *e, double out[2])
 {
     for (int k = 0; k < 2; k++)
@@ -520,7 +521,7 @@ static bool point_within(const tested_ear *e, double out[2])
     return true;
 }
 
-/* Returns the winding number of the remaining outline around q, which is not on it. */
+/* Returns the winding number of the remaining outline around q, which is not on the outline. */
 static int64_t winding_around(outline *o, uint32_t start, const double q[2])
 {
     int64_t winding = 0;
@@ -537,8 +538,8 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
     return winding;
 }
 
-/* Returns true if the ear is not inside the outline: it is a bend of a passage without width, whose
- * other side runs along it. */
+/* Returns true if the ear is not inside the outline. Such an ear is a bend of a passage without
+ * width, whose two sides run along each other. */
 static bool is_outside(outline *o, const tested_ear *e)
 {
     double q[2];
@@ -583,7 +584,7 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
     set_bit(o, a);
     set_bit(o, c);
     test_blocked_again(o, b);
-    if (o->touching) { /* the neighbours have other edges now */
+    if (o->touching) { /* the edges at the neighbours have changed */
         test_blocked_again(o, a);
         test_blocked_again(o, c);
     }
@@ -591,8 +592,8 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
         o->corners[node]--;
 }
 
-/* Returns true if the ear at b may be cut. If not, the ear is tested again when that may have
- * changed. */
+/* Returns true if the ear at b may be cut. If not, the ear will be tested again when its result may
+ * have changed. */
 static bool is_ear(outline *o, uint32_t b)
 {
     tested_ear e = ear_at(o, b);
@@ -606,8 +607,8 @@ static bool is_ear(outline *o, uint32_t b)
     return x == NONE && !is_outside(o, &e);
 }
 
-/* Walks around the outline and cuts every ear, skipping one corner after each cut so that fans of
- * slivers stay short. */
+/* Walks around the outline and cuts every ear, skipping one corner after each cut, so that no long
+ * fans of thin triangles result. */
 static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 {
     uint32_t done = 0, b = 0;
@@ -635,11 +636,11 @@ static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 
 /* ---- scratch ---- */
 
-/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does
- * not fit 64 bits. */
+/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when the number
+ * does not fit into 64 bits. */
 static uint64_t ears_scratch_bytes(uint64_t n)
 {
-    /* a corner has six numbers, and at most 4 / BLOCK boxes and counts; bits take less than one
+    /* each corner has six numbers, at most 4 / BLOCK boxes and counts, and bits in less than one
      * byte */
     const uint64_t each = 6 * sizeof(uint32_t) + 4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
     uint64_t bytes;
@@ -675,7 +676,7 @@ static void place_arrays(outline *o, void *scratch)
 
 /* Writes n - 2 triangles of corner indices for the outline at[n], n >= 4, that runs
  * counter-clockwise; the output is valid only with EBPO_EARS_CUT. The result depends only on the
- * corners. Pure, any thread. */
+ * corners. Pure; may be called by any thread. */
 static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], uint32_t n,
                                ear_rule rule, uint64_t limit, void *scratch)
 {
@@ -696,9 +697,9 @@ static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], u
 
 /* ==== polygons in space ==== */
 
-/* Limit of steps of cutting an outline that touches itself; beyond it, the outline is treated as
- * one that crosses itself. The limit matters where thousands of corners are at one position,
- * because all these are compared with each other. */
+/* Maximum number of steps for an outline that touches itself. If more are needed, the outline is
+ * treated as one that crosses itself. This happens if thousands of corners are at one position,
+ * because all these corners are compared with each other. */
 #define TOUCHING_WORK (UINT64_C(1) << 28)
 
 /* A polygon and its projection. */
@@ -729,8 +730,8 @@ static void make_fan(uint32_t (*triangle)[3], uint32_t n)
     }
 }
 
-/* Returns half of the difference between the first corner and another one, which cannot overflow.
- */
+/* Returns half of the difference between a corner and the first corner, multiplied by the scale.
+ * The half cannot overflow. */
 static double from_first(const polygon *p, uint32_t i, int k)
 {
     return p->scale * (0.5 * p->corner[i][k] - 0.5 * p->corner[0][k]);
@@ -756,7 +757,7 @@ static bool find_scale(polygon *p)
 }
 
 /* Computes the normal by Newell's sum: half of the projected areas. Coordinates are relative to the
- * first corner, which keeps digits. */
+ * first corner, so that fewer digits are lost. */
 static void newell_normal(const polygon *p, double normal[3])
 {
     normal[0] = normal[1] = normal[2] = 0;
@@ -806,8 +807,8 @@ static bool is_ascending(const double a[2], const double b[2])
     return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
 }
 
-/* Classifies the polygon. Left turns alone do not make it convex (a pentagram has only left turns):
- * its direction must also change only twice. */
+/* Classifies the polygon. A polygon with only left turns need not be convex (for example, a
+ * pentagram is not): also its direction along x must change only twice. */
 static ebpo_polygon_kind classify_polygon(const polygon *p)
 {
     bool straight = false;
@@ -832,8 +833,8 @@ static bool has_area(const polygon *p, const uint32_t t[3])
     return !ebpo_zero_area(p->corner[t[0]], p->corner[t[1]], p->corner[t[2]]);
 }
 
-/* Classifies the polygon by its triangles of least area: they may cover the outline after all, or
- * have no area. */
+/* Classifies the polygon by its triangles of least area: all may turn counter-clockwise, so that
+ * the outline does not cross itself, or all may have no area. */
 static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3])
 {
     bool turned = !p->projected, empty = true;

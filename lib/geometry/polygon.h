@@ -1,5 +1,5 @@
-/* Triangulates closed chains in space, which closes holes, and polygons in space. No vertices are
- * added. */
+/* Triangulates polygons and closed chains in space. Chains are the boundaries of holes. No vertices
+ * are added. */
 #ifndef EBPO_GEOMETRY_POLYGON_H
 #define EBPO_GEOMETRY_POLYGON_H
 
@@ -23,45 +23,46 @@ static inline void ebpo_face_cross(const double a[3], const double b[3], const d
 /* A chain of n >= 3 points in order. */
 typedef struct ebpo_chain {
     uint32_t n;
-    /* up to this length, the triangulation of least area is found in O(n^3); longer chains are cut
-     * ear by ear in O(n log n) */
+    /* maximum length for the triangulation of least area, which takes O(n^3) steps; longer chains
+     * are cut ear by ear in O(n log n) steps */
     uint32_t optimal;
     const double (*point)[3];
-    /* NULL, or [n][n]: 1 where the mesh has an edge between two points already (a triangle there
-     * would make the edge non-manifold). Such edges are avoided where possible. Used only for n <=
-     * optimal */
+    /* NULL, or [n][n]: 1 if the mesh already has an edge between the two points, because a new
+     * triangle could make this edge non-manifold. Such edges are avoided where possible. Used only
+     * for n <= optimal */
     const uint8_t *taken;
     ebpo_workspace *workspace; /* for long chains, or NULL */
 } ebpo_chain;
 
-/* Writes n - 2 triangles, as indices of points, that run along the chain (point i to i + 1). The
- * result depends only on the points. Returns false when memory is short. Source for the chain of
- * least area: Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
+/* Writes n - 2 triangles, as indices of points. The triangles have the direction of the chain (from
+ * point i to i + 1). The result depends only on the points. Returns false when memory is short.
+ * Source for the chain of least area: Barequet and Sharir, "Filling gaps in the boundary of a
+ * polyhedron", 1995. */
 bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
 
-/* Cuts polygons in space into triangles over their own corners.
+/* Cuts polygons in space into triangles between their own corners.
  *
- * The polygon is projected along the axis on which its normal (Newell's sum) is largest. There a
- * convex polygon becomes a fan from its first corner; any other is cut ear by ear, every turn and
- * every point-in-ear test by the exact ebpo_orient2d: first as if the outline did not touch itself,
- * then, where that fails, with the rule for outlines that do. All triangles then turn the polygon's
- * way or have no area, so each point is covered as often as the outline winds around it: once in a
- * polygon with slits, with bridges to holes, or pinched at corners.
+ * The polygon is projected along the axis on which its normal (Newell's sum) is largest. A convex
+ * polygon becomes a fan from its first corner. Every other polygon is cut ear by ear. Turns and
+ * point-in-ear tests use the exact ebpo_orient2d. Ears are first cut by the rule for outlines that
+ * do not touch themselves and, if that fails, by the rule for outlines that do. Then all triangles
+ * turn as the polygon does or have no area, so each point is covered as often as the outline winds
+ * around it: once in a polygon with slits, with bridges to holes, or pinched at corners.
  *
- * Outlines whose projection crosses itself (including folded quads) have no such triangles. They
- * get triangles that are a guess, which callers count: up to EBPO_POLYGON_OPTIMAL corners the
+ * Outlines whose projection crosses itself (including folded quads) have no such triangles. Their
+ * triangles are a guess, and callers count such polygons: up to EBPO_POLYGON_OPTIMAL corners the
  * triangles of least area in space, with more corners the triangles that result from cutting the
  * smallest ears first. The result depends only on the corners. Sources: Meisters, "Polygons have
- * ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995, for the
- * least area. */
+ * ears", 1975; for the least area: Barequet and Sharir, "Filling gaps in the boundary of a
+ * polyhedron", 1995. */
 
 typedef enum ebpo_polygon_kind {
-    EBPO_POLYGON_CONVEX, /* a fan; also every triangle */
-    /* no reflex corner, but straight ones: cut by ears, so that no triangle is on a straight side
-     */
+    EBPO_POLYGON_CONVEX, /* a fan; all triangles are of this kind */
+    /* no reflex corners, but straight ones: cut ear by ear, so that no triangle is on a straight
+     * side */
     EBPO_POLYGON_FLAT,
-    EBPO_POLYGON_CONCAVE, /* cut by ears; also where the outline touches itself */
-    EBPO_POLYGON_GUESSED, /* it crosses itself: triangles of least area */
+    EBPO_POLYGON_CONCAVE, /* cut ear by ear; the outline may touch itself */
+    EBPO_POLYGON_GUESSED, /* the outline crosses itself: triangles of least area */
     /* a fan, because all corners are on a line or a coordinate is not finite */
     EBPO_POLYGON_DEGENERATE,
     /* more than EBPO_POLYGON_WORK steps were not enough; `triangle` is not usable */
@@ -69,18 +70,19 @@ typedef enum ebpo_polygon_kind {
     EBPO_POLYGON_NO_MEMORY
 } ebpo_polygon_kind;
 
-/* Limit of steps for one polygon, each a few tests of coordinates. Outlines of 100,000 corners stay
- * well below it, unless tens of thousands of them are on one line or at one position. */
+/* Maximum number of steps for one polygon, each of a few tests of coordinates. Outlines of 100,000
+ * corners need far fewer steps, unless tens of thousands of corners are on one line or at one
+ * position. */
 #define EBPO_POLYGON_WORK (UINT64_C(1) << 31)
 
 enum { EBPO_POLYGON_OPTIMAL = 64 };
 
-/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does
- * not fit 64 bits. */
+/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when the number
+ * does not fit into 64 bits. */
 uint64_t ebpo_polygon_scratch_bytes(uint64_t n);
 
 /* Writes n - 2 triangles of corner indices (0 .. n - 1) with the polygon's orientation. n >= 3.
- * Pure, any thread. */
+ * Pure; may be called by any thread. */
 ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3],
                                            uint32_t n, void *scratch);
 

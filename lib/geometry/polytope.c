@@ -1,11 +1,11 @@
 /* Cuts convex polytopes in the coordinates of a cell from the unit cube by half-spaces.
  *
  * Half-spaces are stored as plane codes of 32 bits, which decode to integers, so that no reader
- * rounds. Polytopes have rounded vertices: they serve volumes, drawing and the choice of planes.
- * Containment never depends on them. Clipping works on the vertex loops of the faces (BP 2008,
- * section 3.4.3) and refuses a cut that rounding would spoil. So a polytope may be too large, but
- * is never too small. An envelope is the cell of a node, cut by the planes of its ancestors and its
- * own. */
+ * rounds. Polytopes have rounded vertices: they are used for volumes, for drawing and for the
+ * choice of planes. Containment never depends on polytopes. Clipping works on the vertex loops of
+ * the faces (BP 2008, section 3.4.3) and refuses a cut if rounding would make the loops invalid. So
+ * a polytope may be too large, but is never too small. An envelope is the cell of a node, cut by
+ * the planes of its ancestors and by its own planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -61,8 +61,8 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
     double least = 0;
     for (int i = 0; i < 3; i++)
         least += n[i] < 0 ? n[i] : 0;
-    /* The values are below 2^21 and have relative errors of a few 2^-53; 1e-8 steps is far above
-     * that. */
+    /* The values are below 2^21 and have relative errors of a few 2^-53, so 1e-8 steps exceed the
+     * error. */
     double q = ceil((support - least) * ((double)EBPO_OFFSET_STEPS / EBPO_NORMAL_NORM) + 1e-8) - 1;
     if (!(q < EBPO_OFFSET_STEPS - 1))
         return -1;
@@ -127,9 +127,9 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
     return volume * (1 - left * left * left);
 }
 
-/* The part beyond a plane, seen from its farthest vertex: faces with this vertex add nothing, and
- * each other face adds a fan. The cut is a polygon whose area is computed from its edges in any
- * order. */
+/* The part of a polytope beyond a plane, as pyramids from the farthest vertex: faces with this
+ * vertex have a pyramid of no volume, and each other face is a fan of triangles. The cut is a
+ * polygon whose area is computed from its edges in any order. */
 typedef struct beyond {
     const ebpo_polytope *p;
     /* area: twice the area of the cut, as a vector; origin: a point of the plane */
@@ -140,7 +140,7 @@ typedef struct beyond {
 
 static void point_between(const beyond *c, int out, int in, double x[3])
 {
-    /* always from the outer end, so that both faces at the edge get the same point */
+    /* always interpolates from the outer end, so that both faces at the edge get the same point */
     interpolate_crossing(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
 }
 
@@ -150,7 +150,7 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
     if (!c->started) {
         c->started = true;
         memcpy(c->origin, from, sizeof c->origin);
-        return; /* its triangle with this end has no area */
+        return; /* the triangle of the origin and this edge has no area */
     }
     double u[3], v[3], n[3];
     ebpo_vec3_subtract(from, c->origin, u);
@@ -234,19 +234,19 @@ typedef struct cut {
     ebpo_polytope *out;
     double dist[EBPO_POLYTOPE_VERTICES];
     uint16_t number[EBPO_POLYTOPE_VERTICES]; /* indices of kept vertices in `out` */
-    bool on[EBPO_POLYTOPE_VERTICES];         /* the vertex of `out` is on the cutting plane */
-    /* cut edges and their new vertices */
+    bool on[EBPO_POLYTOPE_VERTICES]; /* true if the vertex of `out` is on the cutting plane */
+    /* cut edges: their vertices in `in`, and the new vertex in `out` */
     struct {
         uint16_t in, out, number;
     } edge[EBPO_POLYTOPE_FACES];
     int edges;
-    /* edges of kept loops on the plane */
+    /* edges of kept loops that are on the plane */
     struct {
         uint16_t from, to;
     } rim[EBPO_POLYTOPE_CORNERS];
     int rims;
     bool full;
-    /* old vertices are on the plane, so rim edges may have kept faces on both sides */
+    /* vertices of `in` are on the plane, so rim edges may have kept faces on both sides */
     bool touched;
 } cut;
 
@@ -265,7 +265,7 @@ static uint16_t add_vertex(cut *c, const double x[3], bool on)
 static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
 {
     if (c->dist[in] >= -tolerance)
-        return c->number[in]; /* the inner end itself is on the plane */
+        return c->number[in]; /* the inner end is on the plane */
     for (int i = 0; i < c->edges; i++)
         if (c->edge[i].in == in && c->edge[i].out == out)
             return c->edge[i].number;
@@ -340,8 +340,8 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Closes the cap. A rim edge that is used in both directions is between two kept faces. The other
- * rim edges, reversed, bound the cap. */
+/* Closes the cap. A rim edge that is used in both directions is between two kept faces. The cap is
+ * bounded by the other rim edges in reverse direction. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];
@@ -427,7 +427,7 @@ void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
 
 /* --- halves and children --- */
 
-/* Keeps one half, as ebpo_polytope_half does. */
+/* Same as ebpo_polytope_half, in place. */
 static bool halve_in_place(ebpo_polytope *p, int axis, int side)
 {
     double n[3] = { 0, 0, 0 };

@@ -1,5 +1,5 @@
-/* Plane codes: a half-space in the coordinates of its node's cell, in 32 bits, decoded to integers
- * so that no reader rounds.
+/* A plane code is a half-space in the coordinates of a node's cell, in 32 bits. It is decoded to
+ * integers, so that no reader rounds.
  *
  *   bits 0-9    u
  *   bits 10-19  v
@@ -7,13 +7,13 @@
  *
  * With U = u - 511, V = v - 511 in [-511, 511]: the normal is the point (U, V) of the octahedral
  * map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014)
- * kept as integers of 1-norm 511. With m the sum of the normal's negative components (the least
+ * stored as integers of 1-norm 511. With m the sum of the normal's negative components (the least
  * value of n . xi over the cell), the half-space is
  *
  *   4096 * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094
  *
- * So q counts 4096ths of the cell's width in direction n. q = 4095 would keep the whole cell and
- * means no plane. */
+ * So q counts 4096ths of the cell's width in direction n. A half-space with q = 4095 would keep the
+ * whole cell; this value means no plane. */
 #ifndef EBPO_GEOMETRY_POLYTOPE_H
 #define EBPO_GEOMETRY_POLYTOPE_H
 
@@ -26,16 +26,16 @@
 
 enum { EBPO_NORMAL_NORM = 511, EBPO_OFFSET_STEPS = 4096 };
 
-/* Same as the public ebpo_plane_decode (file.h), for the lower layers. */
+/* Same as the public ebpo_plane_decode (file.h), for layers that must not include file.h. */
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
 
 /* Computes the normal part (bits 0-19) of the code nearest to a direction in cell coordinates, of
- * any length; returns false for (0, 0, 0) or not finite. Cell coordinates scale each axis, so this
- * direction is a face's world normal multiplied by the cell's size, axis by axis. */
+ * any length; returns false for (0, 0, 0) and for non-finite directions. In cell coordinates, the
+ * direction of a face's normal is the normal multiplied by the cell's size, axis by axis. */
 bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal);
 
-/* Returns the least q whose half-space keeps every point with n . xi <= support, or -1 when no q
- * does. `support` is in units of n . xi; rounding is to the safe side. */
+/* Returns the least q whose half-space keeps every point with n . xi <= support, or -1 if there is
+ * no such q. `support` is in units of n . xi. Rounding never makes the half-space smaller. */
 int ebpo_plane_code_offset(const int32_t n[3], double support);
 
 static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
@@ -44,7 +44,8 @@ static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
 }
 
 /* Returns the d of the half-space 4096 * (n . xi) <= d in the coordinates of the child `octant`,
- * where xi_parent = (xi_child + octant) / 2. Exact; d grows by less than one bit a level. */
+ * where xi_parent = (xi_child + octant) / 2. The result is exact; d grows by less than one bit for
+ * each level. */
 static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigned octant)
 {
     int64_t shift = 0;
@@ -54,17 +55,18 @@ static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigne
     return 2 * d - (int64_t)EBPO_OFFSET_STEPS * shift;
 }
 
-/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: they serve volumes,
- * drawing and the choice of planes. Their vertices are rounded. Containment never depends on them,
- * only on the decoded half-spaces. Source: BP 2008, section 3.4.3 (clipping of the box), here on
- * vertex loops. */
+/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces. They are used for
+ * volumes, for drawing and for the choice of planes. Their vertices are rounded. Containment never
+ * depends on polytopes, only on the decoded half-spaces. Source: BP 2008, section 3.4.3 (clipping
+ * of the box), here applied to vertex loops. */
 
-/* Capacity for the 255 planes that a node may have, on a cube, where no more than three intersect
- * in a point. */
+/* Capacity for a cube cut by the 255 planes that a node may have, of which no more than three
+ * intersect in a point. */
 enum { EBPO_POLYTOPE_VERTICES = 528, EBPO_POLYTOPE_FACES = 264, EBPO_POLYTOPE_CORNERS = 1584 };
 
-/* Face loops run counter-clockwise seen from outside. A face's tag names its half-space: -1 - (2 *
- * axis + side) for the faces of the first cube, else the tag given to ebpo_polytope_clip. */
+/* Face loops run counter-clockwise seen from outside. The tag of a face identifies its half-space:
+ * -1 - (2 * axis + side) for the faces of the first cube, else the tag given to ebpo_polytope_clip.
+ */
 typedef struct ebpo_polytope {
     int vertex_count, face_count, corner_count;
     double vertex[EBPO_POLYTOPE_VERTICES][3];
@@ -76,8 +78,8 @@ typedef struct ebpo_polytope {
 typedef enum ebpo_clip {
     EBPO_CLIP_NONE, /* nothing was removed */
     EBPO_CLIP_CUT,
-    /* next to nothing would remain, or the capacity is exceeded, or rounding would spoil the loops:
-     * the polytope is unchanged (too large, never too small) */
+    /* almost nothing would remain, or the capacity is exceeded, or rounding would make the loops
+       invalid: the polytope is unchanged (too large, never too small) */
     EBPO_CLIP_REFUSED
 } ebpo_clip;
 
@@ -87,32 +89,32 @@ void ebpo_polytope_cube(ebpo_polytope *p);
 /* Keeps n . x <= d. |n| should be about 1 (tolerance 1e-10 in cell units). */
 ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag);
 
-/* Cuts out the octant and scales it to the unit cube. Returns false when the octant's part is
- * (numerically) empty; *out is then a box around it. `out` may not be `p`. Faces between siblings
- * get the tags of the cube. */
+/* Sets *out to the part of p in the octant, scaled to the unit cube. Returns false when this part
+ * is (numerically) empty; then *out is a box that contains it. `out` may not be `p`. Faces between
+ * siblings get the tags of the cube. */
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out);
 
-/* Cuts out one half along `axis` (side 0: lower, 1: upper), and scales it to the unit cube.
- * ebpo_polytope_child halves along z, then y, then x. When the half is (numerically) empty, returns
- * false and the whole cube. */
+/* Sets *out to the part of p in one half along `axis` (side 0: lower, 1: upper), scaled to the unit
+ * cube. ebpo_polytope_child halves along z, then y, then x. When the part is (numerically) empty,
+ * returns false and the whole cube. */
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out);
 
 /* Copies only the used part of the struct. */
 void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
-/* Sets, for each vertex and each face of the cube that it is on, the bit 2 * axis + side. Rounding
- * of the vertices does not matter. */
+/* Sets the bit 2 * axis + side for each vertex on that face of the cube. The result does not depend
+ * on the rounding of vertices. */
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES]);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);
 
-/* Returns the volume that clipping by n . x <= d would remove; 0 when that is certainly below
- * `least`. `volume` is the polytope's volume. */
+/* Returns the volume that clipping by n . x <= d would remove; 0 when this volume is certainly
+ * below `least`. `volume` is the polytope's volume. */
 double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume,
                              double least);
 
-/* Returns an upper bound of the volume beyond a plane, for a convex body of the given volume and
- * width along the plane's normal, and its height beyond the plane. Among convex bodies of volume V
+/* Returns an upper bound of the volume beyond a plane, for a convex body with this volume, this
+ * width along the plane's normal and this height beyond the plane. Among convex bodies of volume V
  * and width H the cap of height h is largest for the cone with its base on the far side, V (1 - (1
  * - h/H)^3). */
 double ebpo_polytope_cap_bound(double volume, double width, double height);
@@ -138,9 +140,9 @@ typedef struct ebpo_half_space {
 
 enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* plane counts are bytes */
 
-/* The half-spaces that bound a node's envelope within its cell: those of its ancestors and its own,
- * as exact integers in the coordinates of its cell. Half-spaces that keep the whole cell are
- * omitted. */
+/* The half-spaces that bound a node's envelope within its cell: the planes of its ancestors and its
+ * own planes, as exact integers in the coordinates of its cell. Half-spaces that keep the whole
+ * cell are omitted. */
 typedef struct ebpo_half_spaces {
     int count;
     ebpo_half_space at[EBPO_HALF_SPACES_MAX];
@@ -149,15 +151,15 @@ typedef struct ebpo_half_spaces {
 /* Adds planes of the current cell. */
 void ebpo_half_spaces_add(ebpo_half_spaces *spaces, const uint32_t *codes, uint64_t count);
 
-/* Moves from the cell to its child. */
+/* Converts the half-spaces from the coordinates of the cell to those of its child. */
 void ebpo_half_spaces_to_child(ebpo_half_spaces *spaces, unsigned octant);
 
-/* Cuts the cell by the half-spaces, each moved outwards by `slack` (in units of n / 511, which are
- * about one cell). */
+/* Cuts the cell by the half-spaces, each moved outwards by `slack` (in units of n . xi / 511: 1 is
+ * about the width of a cell). */
 void ebpo_half_spaces_cut(const ebpo_half_spaces *spaces, double slack, ebpo_polytope *out);
 
-/* The envelopes of the nodes on a path down the tree, as polytopes. Neighbouring nodes share those
- * of their common ancestors. About 170 KB; initialise it with zeros. */
+/* The envelopes of the nodes on a path down the tree, as polytopes. Neighbouring nodes share the
+ * envelopes of their common ancestors. The stack takes about 170 KB; initialise it with zeros. */
 typedef struct ebpo_envelope_stack {
     ebpo_octcode octcode[EBPO_LEVELS_MAX]; /* node of each envelope; 0: none */
     ebpo_polytope at[EBPO_LEVELS_MAX];
@@ -171,9 +173,9 @@ static inline const ebpo_polytope *ebpo_envelope_held(const ebpo_envelope_stack 
     return stack->octcode[level] == octcode ? &stack->at[level] : NULL;
 }
 
-/* Adds the envelope of a node in coordinates of its cell: the part of its parent's envelope in the
- * cell, cut by its own planes. The parent's envelope must be in the stack (for the root, it is the
- * cube). The result is valid until another node of the same level is added. */
+/* Adds the envelope of a node in coordinates of its cell: the part of the parent's envelope in this
+ * cell, cut by the node's own planes. The parent's envelope must be in the stack (for the root, it
+ * is the cube). The result is valid until another node of the same level is added. */
 const ebpo_polytope *ebpo_envelope_put(ebpo_envelope_stack *stack, ebpo_octcode octcode,
                                        const uint32_t *codes, uint64_t count);
 

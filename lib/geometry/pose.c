@@ -1,8 +1,8 @@
 /* Evaluates poses: rotations as quaternions and matrices, and the coordinates of posed vertices.
  *
  * A pose is checked once. Its matrix may differ from a rotation by rounding only. Posed coordinates
- * are doubles, each operation rounded once, and all decisions about two models are exact on these
- * doubles. Bounds: docs/develop/collision.md, "Posed coordinates". */
+ * are doubles, and each operation is rounded once. All decisions about two models are exact on
+ * these doubles. Bounds: docs/develop/collision.md, "Posed coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -80,7 +80,7 @@ static bool all_finite(const double *x, int n)
     return finite;
 }
 
-/* Returns the greatest |R^T R - 1|; infinite when that overflows. */
+/* Returns the greatest component of |R^T R - 1|, plus rounding; infinite on overflow. */
 static double error_bound_of(const double r[3][3])
 {
     double most = 0;

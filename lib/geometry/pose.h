@@ -1,4 +1,5 @@
-/* Rotations as quaternions (x, y, z, w; w is the real part), and posed coordinates. Thread-safe. */
+/* Rotations as quaternions (x, y, z, w; w is the real part), and posed coordinates. All functions
+ * are thread-safe. */
 #ifndef EBPO_GEOMETRY_POSE_H
 #define EBPO_GEOMETRY_POSE_H
 
@@ -15,27 +16,28 @@ bool ebpo_quaternion_normalise(double q[4]);
 /* Converts a quaternion, whose length is 1 up to rounding, to a matrix. */
 void ebpo_quaternion_matrix(const double q[4], double (*m)[3]);
 
-/* The pose of a model in the world, and the posed coordinates of its vertices: doubles, each
- * operation rounded once. All decisions about two models are exact on these doubles
- * (docs/develop/collision.md). Pure functions; any thread. */
+/* The pose of a model in the world, and the posed coordinates of its vertices. Posed coordinates
+ * are doubles, and each operation is rounded once. All decisions about two models are exact on
+ * these doubles (docs/develop/collision.md). All functions are pure and may be called by any
+ * thread. */
 
 /* A pose that has been checked. */
 typedef struct ebpo_posing {
     double matrix[3][3]; /* rotation times scale, each rounded once */
     double translation[3];
     double scale;
-    double error_bound; /* error bound of the rotation: the greatest |R^T R - 1|, plus rounding */
+    double error_bound; /* greatest component of |R^T R - 1|, plus rounding */
 } ebpo_posing;
 
-/* Checks a pose, for vertices whose coordinates are at most reach[axis] in size.
+/* Checks a pose, for vertices whose coordinates have absolute values of at most reach[axis].
  *
  * EBPO_E_ARGUMENT: a number is not finite, the matrix is not a rotation (the message gives the
  * deviation) or is a mirror, or the scale or a posed coordinate is out of range. */
 EBPO_MUST_USE ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose,
                                            const double reach[3], ebpo_error *error);
 
-/* Applies the pose. The result is finite and within 2^1000. Files that use this function include
- * core/strict_fp.h first, so its operations are never contracted. */
+/* Applies the pose. The result is finite and within 2^1000. Files that use this function must
+ * include core/strict_fp.h first, so that its operations are never contracted. */
 static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], double out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -47,8 +49,9 @@ static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], do
 /* Returns the rows of the rotation, in doubles. */
 void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3]);
 
-/* Returns a bound of the error of each posed coordinate, compared with the pose by the nearest true
- * rotation without rounding, for vertices at most `length` from the model's origin. */
+/* Returns a bound of the error of each posed coordinate, for vertices at most `length` from the
+ * model's origin. The error is the difference from the position that results from the nearest exact
+ * rotation without rounding. */
 double ebpo_posing_error(const ebpo_posing *p, double length);
 
 #endif

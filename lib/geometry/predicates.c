@@ -1,6 +1,6 @@
-/* Computes orientation predicates and signs of sums of products, exact for every finite double.
+/* Computes orientation predicates and signs of sums of products, exact for all finite doubles.
  *
- * Each predicate tries these stages, the cheapest first, until one gives a certain sign: signs of
+ * Each predicate tries these stages, the fastest first, until one gives a certain sign: signs of
  * factors, a floating-point filter, exact arithmetic on doubles (expansions) if exponents are in
  * range, and integers of any size. Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic
  * and Fast Robust Geometric Predicates", 1997; docs/develop/design.md. */
@@ -208,8 +208,8 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
     bool exact = true;
     for (int i = 0; i < 3; i++) {
         double x = row[i].head * scale;
-        /* Adding 1.5 * 2^52 rounds to an integer. A cast to an integer and back would be less
-         * safe: GCC 12 removes such pairs of casts when it vectorises. */
+        /* Adding 1.5 * 2^52 rounds to an integer. A cast to an integer and back is not used,
+         * because GCC 12 removes such pairs of casts when it vectorises. */
         exact &= (x + 0x1.8p52) - 0x1.8p52 == x;
         out[i] = (int64_t)x;
     }
@@ -257,7 +257,8 @@ static int expand_determinant(double *out, ebpo_difference m[3][3])
     return ebpo_expansion_sum(out, two, two_n, term[2], term_n[2]);
 }
 
-/* Returns a bound of the difference between the determinant of the heads and the exact one. */
+/* Returns a bound of the difference between the determinant of the heads and the exact determinant.
+ */
 static double error_of_heads(ebpo_pair m[3][3])
 {
     double permanent = 0;
@@ -269,10 +270,10 @@ static double error_of_heads(ebpo_pair m[3][3])
     return heads_error * permanent;
 }
 
-/* Returns a lower bound of the absolute value of the expansion e, for n <= 24: the heads alone give
- * at most 24 components. Components do not overlap, so the sum of their absolute values is below
- * twice the absolute value of the last component. The error of adding the components is less than n
- * eps times this sum. */
+/* Returns a lower bound of the absolute value of the expansion e, for n <= 24. (The determinant of
+ * the heads has at most 24 components.) Components do not overlap, so the sum of their absolute
+ * values is below twice the absolute value of the last component. The error of adding the
+ * components is less than n eps times this sum. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;
@@ -349,8 +350,8 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
  * `slack` covers underflow in the products. An overflow makes the bound infinite or NaN, so that
  * no comparison succeeds. */
 static const double eps = 0x1p-53;
-/* Far above every underflow error (2^-1075 each), and a normal number, because arithmetic on
- * denormal numbers is slow. */
+/* Much larger than the sum of all underflow errors (2^-1075 each), and a normal number, because
+ * arithmetic on denormal numbers is slow. */
 static const double slack = 0x1p-960;
 
 static inline int sign_of(double x) { return (x > 0) - (x < 0); }
@@ -368,7 +369,7 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
 {
     double ux = b[0] - a[0], uy = b[1] - a[1];
     double vx = c[0] - a[0], vy = c[1] - a[1];
-    /* Signs of differences are always right, also after overflow. */
+    /* Signs of differences are always correct, also after overflow. */
     int left_sign = sign_of(ux) * sign_of(vy), right_sign = sign_of(uy) * sign_of(vx);
     if (left_sign != right_sign)
         return left_sign > right_sign ? 1 : -1;
@@ -412,11 +413,11 @@ int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const
     int sign = orient3d_filter(m);
     if (sign != EBPO_SIGN_UNKNOWN)
         return sign;
-    /* All points are in one axis-parallel plane: the most frequent case of 0. */
+    /* The most frequent case of 0: all points are in one axis-parallel plane. */
     for (int k = 0; k < 3; k++)
         if (m[k][0] == 0 && m[k][1] == 0 && m[k][2] == 0)
             return 0;
-    /* Two points are equal, as for faces that share a corner. */
+    /* The next case: two points are equal, for example if faces share a corner. */
     if (same_point(a, b) || same_point(a, c) || same_point(a, d) || same_point(b, c) ||
         same_point(b, d) || same_point(c, d))
         return 0;

@@ -1,9 +1,9 @@
-/* Exact predicates over doubles: the sign is right for every finite input, whatever the compiler
- * and its flags. A floating-point filter decides nearly always. Where it does not, exact arithmetic
- * on doubles (expansions) decides, or integers of any size (GMP). The filter detects overflow and
- * underflow and does not decide then. All functions are pure and thread-safe. Source of the
- * filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
- * Predicates", 1997. */
+/* Exact predicates over doubles: the sign is correct for all finite numbers, with every compiler
+ * and its flags. A floating-point filter gives nearly all results. If the filter does not decide,
+ * exact arithmetic on doubles (expansions) or on integers of any size (GMP) decides. The filter
+ * detects overflow and underflow, and does not decide in these cases. All functions are pure and
+ * thread-safe. Source of the filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and
+ * Fast Robust Geometric Predicates", 1997. */
 #ifndef EBPO_GEOMETRY_PREDICATES_H
 #define EBPO_GEOMETRY_PREDICATES_H
 
@@ -23,21 +23,22 @@ int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const
 /* Returns the sign of component `axis` of the normal (b - a) x (c - a). */
 int ebpo_normal_sign(int axis, const double a[3], const double b[3], const double c[3]);
 
-/* Returns true when a, b, c are collinear or coincide: a face without area. */
+/* Returns true when a, b, c are collinear or equal, so that they form a face without area. */
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
 
-/* Returns the exact sign of the sum of n products factor[2i] * factor[2i+1]; up to 8 products are
- * fastest. */
+/* Returns the exact sign of the sum of n products factor[2i] * factor[2i+1]; the function is fast
+ * for up to 8 products. */
 int ebpo_sign_of_products(const double *factor, int n);
 
 /* Computes signed crossings of the face (a, b, c) with an axis-parallel segment, for winding
  * numbers.
  *
  * The segment runs from `from` in direction +axis (0, 1, 2) to coordinate `to` >= from[axis] on
- * that axis. Both ends are shifted by (d0, d1, d2), infinitely small positive numbers with d0 >> d1
- * >> d2 (each negligible against every power of the one before): simulation of simplicity, with the
- * same shift for every call. So no end is on a face, no segment intersects an edge or vertex, and
- * crossing numbers are exact and consistent. A face without area counts as no crossing.
+ * that axis. Both ends are shifted by (d0, d1, d2), infinitely small positive numbers where d0 >>
+ * d1 >> d2 (d1 is negligible compared with every power of d0, and d2 compared with every power of
+ * d1). This is simulation of simplicity, with the same shift for every call. Therefore no end is on
+ * a face, no segment intersects an edge or vertex, and crossing numbers are exact and consistent. A
+ * face without area counts as no crossing.
  *
  * Returns the change of the winding number from `from` to the end: +1 when the segment enters (goes
  * against the normal of the counter-clockwise face), -1 when it leaves, 0 when there is no
@@ -51,7 +52,7 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
 
 /* --- the exact stages, separately --- */
 
-/* Returned instead of a sign when coordinates are too large or too small for this stage. */
+/* Returned instead of a sign when coordinates are too large or too small for expansions. */
 enum { EBPO_SIGN_UNKNOWN = 2 };
 
 /* Compute in exact arithmetic on doubles, in tens to hundreds of nanoseconds, without allocation.
@@ -62,7 +63,7 @@ int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c
 int ebpo_sign_of_products_expansion(const double *factor, int n);
 
 /* Returns the exact sign of the determinant of three columns of differences, m[axis][column]; the
- * coordinates must be in the range of ebpo_orient3d_expansion, or closer to 1. */
+ * coordinates must be in the range of ebpo_orient3d_expansion. */
 int ebpo_determinant_expansion(ebpo_pair m[3][3]);
 
 /* Compute in integers of any size. Same results and ranges as the functions above without "_exact".

@@ -17,22 +17,24 @@ typedef struct ebpo_ray_intersection {
      * normal (leaves); 0: it intersects an edge or corner, is within the plane, or the triangle has
      * no area */
     int side;
-    /* direction of the line, wherever it intersects the triangle. 1: against the normal; -1: with
-     * the normal; 0: the line is within the plane, or the triangle has no area */
+    /* direction of the line relative to the normal, also if it intersects an edge or corner. 1:
+     * against the normal; -1: with the normal; 0: the line is within the plane, or the triangle has
+     * no area */
     int facing;
     double t; /* t of the first common point, correctly rounded */
 } ebpo_ray_intersection;
 
 /* Exact tests of rays and boxes against triangles: the decisions are those of arithmetic without
- * rounding, for every finite double. Filters in floating point come first, then exact arithmetic on
- * doubles (expansions), or integers of any size (GMP) where numbers are too large or too small for
- * expansions. Pure functions, any thread; the same results with every compiler and its flags. */
+ * rounding, for all finite doubles. Floating-point filters are tried first, then exact arithmetic
+ * on doubles (expansions), or on integers of any size (GMP) if numbers are too large or too small
+ * for expansions. All functions are pure and may be called by any thread. Results do not depend on
+ * the compiler and its flags. */
 
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
                        ebpo_ray_intersection *out);
 
 /* Same as ebpo_ray_triangle, for a line that certainly passes through the triangle's interior.
- * `facing` is as in the result, and not 0. */
+ * `facing` has the meaning of the member in ebpo_ray_intersection, and is not 0. */
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
                        ebpo_ray_intersection *out);
 

@@ -1,12 +1,12 @@
-/* Intersects rays with triangles in rational numbers, which is exact for every finite double, and
- * slow. This is the last stage of ray_triangle.c.
+/* Intersects rays with triangles in rational numbers. This is exact for all finite doubles, and
+ * slow. It is the last stage of ray_triangle.c.
  *
- * Corners relative to the origin become integers e_i in one unit, and the direction becomes
+ * Corners relative to the origin are converted to integers e_i in one unit, and the direction to
  * integers d in another unit. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line
  * intersects the plane at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it intersects the triangle
  * when no two of the s_i have different signs. When the denominator is 0 the line is parallel to
- * the triangle or the triangle has no area: then there is a common point only where all s_i are 0,
- * and line and triangle are in one plane. */
+ * the triangle or the triangle has no area: then they can have common points only if all s_i are 0
+ * and the line and the triangle are in one plane. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -21,7 +21,7 @@
 typedef struct integer_scene {
     mpz_t corner[3][3]; /* e_i */
     mpz_t direction[3];
-    int shift; /* t is the parameter in these units times 2^shift */
+    int shift; /* t is the parameter in the units of corners and direction, times 2^shift */
 } integer_scene;
 
 /* The intersection of the line and the triangle, in the units of integer_scene: an interval of the
@@ -118,8 +118,8 @@ static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominat
 
 /* --- the line and the triangle --- */
 
-/* Returns the axis with the direction's largest component: along that axis, the factor of a
- * multiple of the direction is computed. */
+/* Returns the axis with the direction's largest component. The parameter of a point on the line is
+ * computed from its coordinate on this axis. */
 static int main_axis(const integer_scene *s)
 {
     int axis = 0;
@@ -155,7 +155,7 @@ static void offsets_from_line(const integer_scene *s, mpz_t out[3])
 }
 
 /* Adds the crossing of the edge from corner i to corner j with the line, at (e_i w_j - e_j w_i) /
- * (w_j - w_i) = t d, where w are the offsets. */
+ * (w_j - w_i) = t d, where w are the offsets from the line. */
 static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz_t w[3], int i,
                               int j)
 {
@@ -220,7 +220,7 @@ static void scale_parameter(mpq_t t, int shift)
         mpq_div_2exp(t, t, (mp_bitcnt_t)-shift);
 }
 
-/* Narrows the stretch to 0 <= t <= t_max, in t's own unit. */
+/* Converts the stretch to the unit of t, and restricts it to 0 <= t <= t_max. */
 static void clip_stretch(stretch *st, int shift, double t_max)
 {
     if (!st->any)
@@ -253,7 +253,7 @@ static void intersect_ray(stretch *st, const ebpo_segment *ray, const double tri
 
 static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
 
-/* Rounds to the nearest double, t >= 0; mpq_get_d truncates. */
+/* Rounds t >= 0 to the nearest double. (mpq_get_d truncates.) */
 static double round_fraction(const mpq_t t)
 {
     double low = mpq_get_d(t), high = nextafter(low, INFINITY);

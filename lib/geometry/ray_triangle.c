@@ -1,16 +1,17 @@
 /* Intersects a ray with a triangle.
  *
- * A ray passes stages, cheapest first: the side of each edge on which the line passes, in floating
- * point with error bounds; then numerator and denominator of t in double-double arithmetic
- * (double_double_kernels.c), which gives t to its last bits; then expansions where this is not
- * certain; then rational numbers where exponents are out of the range of expansions (ray_exact.c).
+ * There are several stages, of which the fastest is tried first. The first stage computes the side
+ * of each edge on which the line passes, in floating-point arithmetic with error bounds. The second
+ * stage computes the numerator and the denominator of t in double-double arithmetic
+ * (double_double_kernels.c), which gives nearly all bits of t. Expansions are used if the result is
+ * not certain, and rational numbers (ray_exact.c) if exponents are out of the range of expansions.
  *
  * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
  * (e_i x e_j). If two edges have different signs, the line misses the triangle. This is also true
- * of triangles that have no area or are seen edge-on, because the three signs are those of one
- * planar figure, the triangle projected along d. If the three signs are equal, the line passes
- * through the interior. In all other cases the line touches an edge or a corner, or is not certain.
- */
+ * for triangles that have no area or whose plane contains d, because the three signs are those of
+ * one planar figure, the triangle projected along d. If the three signs are equal, the line passes
+ * through the interior. In all other cases the line touches an edge or a corner, or a sign is not
+ * certain. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -24,11 +25,11 @@
 #include "geometry/ray.h"
 #include "geometry/double_double_kernels.h"
 
-/* In place of the sign of the determinant of direction, corner i and corner i + 1 (relative to the
- * origin), where that sign is not certain. */
+/* Used instead of the sign of the determinant of direction, corner i and corner i + 1 (relative to
+ * the origin) if this sign is not certain. */
 enum { SIDE_OPEN = 2 };
 
-/* Returns true if a and b, which are rounded, are so far apart that their order is certain. */
+/* Returns true if the exact a is certainly less than the exact b. Both arguments are rounded. */
 static inline bool certainly_less(double a, double b)
 {
     return b - a > 0x1p-50 * (__builtin_fabs(a) + __builtin_fabs(b));
@@ -43,9 +44,9 @@ static inline void set_miss(ebpo_ray_intersection *out)
 
 /* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
  * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. The
- * comparison of two hits needs products of six numbers, so these must be from 2^-97 to 2^150, which
- * are multiples of 2^-150. Functions return false or EBPO_SIGN_UNKNOWN for numbers outside of these
- * ranges. */
+ * comparison of two hits needs products of six numbers, so these numbers must be from 2^-97 to
+ * 2^150; they are multiples of 2^-150. Functions return false or EBPO_SIGN_UNKNOWN for numbers
+ * outside of these ranges. */
 
 /* numerator / denominator; the denominator is not 0. */
 typedef struct fraction_of_expansions {
@@ -108,8 +109,8 @@ static void compress_fraction(fraction_of_expansions *f)
     f->m = ebpo_expansion_compress(f->denominator, f->m);
 }
 
-/* Returns the neighbour to which the fraction is closer, or the even one of the two if it is in the
- * middle. */
+/* Returns the neighbour to which the fraction is closer, or the even neighbour if the fraction is
+ * in the middle. */
 static double nearest_neighbour(const fraction_of_expansions *f, const double neighbour[2])
 {
     double low[192], high[192], middle[384], rest[576], half = (neighbour[1] - neighbour[0]) / 2;
@@ -168,8 +169,8 @@ static bool plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
 
 /* --- line and triangle in one plane --- */
 
-/* Positions where the line leaves or enters the triangle: at corners that it passes through, and
- * where it crosses edges. */
+/* The positions at which the line enters or leaves the triangle: corners on the line, and crossings
+ * with edges. */
 typedef struct crossings {
     int count;
     fraction_of_expansions at[3];
@@ -200,8 +201,8 @@ static ebpo_difference difference_of_double(double x)
     return ebpo_difference_of((ebpo_pair){ x, 0 });
 }
 
-/* Computes out[i] = component k of corner i x direction, n[i] components; returns false when all
- * are 0. */
+/* Computes out[i] = component k of corner i x direction, with n[i] components. Returns false when
+ * all are 0. */
 static bool offsets_along(const scene *s, int k, double out[3][16], int n[3])
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -223,7 +224,7 @@ static void add_corner(crossings *c, const scene *s, int i)
 }
 
 /* Adds the crossing of the edge from corner i to j with the line, at (e_i w_j - e_j w_i) / (w_j -
- * w_i) = t d, where w are the offsets. */
+ * w_i) = t d, where w are the offsets from the line. */
 static void add_crossing(crossings *c, const scene *s, double w[3][16], const int *n, int i, int j)
 {
     fraction_of_expansions *f = &c->at[c->count++];
@@ -318,7 +319,7 @@ static int compare_fractions(fraction_of_expansions *a, fraction_of_expansions *
            ebpo_expansion_sign(b->denominator, b->m);
 }
 
-/* Gets the t of the first common point. Returns false if it is not known. */
+/* Computes the t of the first common point. Returns false if expansions cannot decide. */
 static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
                            fraction_of_expansions *out)
 {
@@ -357,7 +358,8 @@ static inline int bounded_sign(const ebpo_bounded *b)
     return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : SIDE_OPEN;
 }
 
-/* t as a fraction: first in double-double arithmetic, and in expansions when these are needed. */
+/* t as a fraction, first in double-double arithmetic. Expansions are computed when they are needed.
+ */
 typedef struct parameter {
     const ebpo_segment *ray;
     const double (*triangle)[3];
@@ -404,8 +406,8 @@ static bool value_of_t(parameter *p, double *t)
     return make_fraction(p) && fraction_value(&p->fraction, t);
 }
 
-/* Returns the sign of t - t_max, where both are close; `denominator` is the sign of the
- * denominator. */
+/* Returns the sign of t - t_max, for t and t_max that are close to each other; `denominator` is the
+ * sign of the denominator. */
 static int beyond_end(parameter *p, int denominator)
 {
     double end = p->ray->t_max;
@@ -420,8 +422,8 @@ static int beyond_end(parameter *p, int denominator)
     return make_fraction(p) ? fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
 }
 
-/* Intersects the ray with a triangle that the line intersects. `side` is as in the result; `sign`
- * is the sign of normal . direction. */
+/* Intersects the ray with a triangle that the line intersects. `side` has the meaning of the member
+ * in ebpo_ray_intersection; `sign` is the sign of normal . direction. */
 static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3], int sign,
                             int side, ebpo_ray_intersection *out)
 {
@@ -486,8 +488,8 @@ static inline bool is_origin(const corner *c)
     return c->head[0] == 0 && c->head[1] == 0 && c->head[2] == 0;
 }
 
-/* Returns the exact sign of d . (a x b). Uses b - a in place of b, which loses less where the edge
- * is short compared with its distance from the origin. */
+/* Returns the exact sign of d . (a x b). Uses b - a instead of b, because fewer digits are lost if
+ * the edge is short compared with its distance from the origin. */
 static int close_edge_side(const double d[3], const corner *a, const corner *b)
 {
     ebpo_pair m[3][3];
@@ -524,9 +526,8 @@ static void close_sides(const double d[3], const corner e[3], int sign[3])
             sign[i] = close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
 }
 
-/* Intersects a ray that passes close to an edge or corner. No two of the given signs differ, except
- * unknown ones. Returns false if the result is not certain, because numbers are too large or too
- * small. */
+/* Intersects a ray that passes close to an edge or corner. The known signs must be equal or 0.
+ * Returns false if the result is not certain, because numbers are too large or too small. */
 static bool intersect_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
                               ebpo_ray_intersection *out)
 {
@@ -563,8 +564,8 @@ static bool has_corner(const double triangle[3][3], const double p[3])
     return has;
 }
 
-/* Returns true when the ray, which intersects both triangles, certainly does so in a shared corner
- * or edge, and therefore at the same t. `across`: the ray is in neither triangle's plane. */
+/* Returns true when the ray, which intersects both triangles, certainly intersects both in a shared
+ * corner or edge, and therefore at the same t. `across`: the ray is in neither triangle's plane. */
 static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
                               bool across)
 {
@@ -585,15 +586,16 @@ static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], con
 
 /* --- the filter --- */
 
-/* Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
- * values), the slack covers underflow, and an overflow makes the bound infinite or NaN, so that no
- * comparison succeeds. */
+/* Error bounds are as in predicates.c: they are valid with the computed permanent (the sum of
+ * absolute values), the slack covers underflow, and an overflow makes the bound infinite or NaN, so
+ * that no comparison succeeds. */
 static const double eps = 0x1p-53;
-/* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
+/* Much larger than the sum of all underflow errors (2^-1075 each), and a normal number, because
+ * arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
-/* Returns the sign of d . (a x b), a and b being rounded differences; weight: 1 + |d0| + |d1| +
- * |d2|. */
+/* Returns the sign of d . (a x b), or SIDE_OPEN. a and b are rounded differences; weight: 1 + |d0|
+ * + |d1| + |d2|. */
 static inline int filtered_edge_side(const double d[3], double weight, const double a[3],
                                      const double b[3])
 {
@@ -607,8 +609,8 @@ static inline int filtered_edge_side(const double d[3], double weight, const dou
     return det > bound ? 1 : det < -bound ? -1 : SIDE_OPEN;
 }
 
-/* Returns true when some axis shows that ray and triangle are disjoint; signs of differences are
- * always right. */
+/* Returns true when the coordinates on one axis show that ray and triangle are disjoint. The signs
+ * of differences are always correct. */
 static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
 {
     for (int k = 0; k < 3; k++) {

@@ -3,22 +3,23 @@
  * Error in doubles, with u = 2^-53 and M = |A||B||C|. Each component of A, B, C has a relative
  * error of at most u. The determinant is a sum of 6 products whose absolute values sum up to at
  * most sqrt(3) M, each with 3 rounded factors, 2 products and at most 3 sums: 8 u sqrt(3) M < 14 u
- * M, to first order. A dot product has an error of at most 5 u times the product of the lengths, a
- * length at most 4 u of itself; so each of the four terms of the real part has at most 13 u M, and
- * the three sums add 3 * 4 u M: 64 u M. Both together are below 80 u M < 2^-46 M = E, with a factor
- * of 1.6 for terms of second order and the rounding of M. The argument of a number of absolute
- * value H > 2 E, computed within 2^-48, therefore differs by at most asin(E / H) < 1.1 E / H; the
- * code uses 2 E / H + 2^-48.
+ * M, to first order. A dot product has an error of at most 5 u times the product of the lengths,
+ * and a length has a relative error of at most 4 u. So each of the four terms of the real part has
+ * an error of at most 13 u M, and the three sums add 3 * 4 u M: together 64 u M. The errors of both
+ * parts are together below 80 u M < 2^-46 M = E, with a factor of 1.6 for terms of second order and
+ * the rounding of M. The argument of a number of absolute value H > 2 E, computed within 2^-48,
+ * therefore differs by at most asin(E / H) < 1.1 E / H; the code uses 2 E / H + 2^-48.
  *
- * Near the negative real axis the sign of the imaginary part decides between pi and -pi. Where it
- * is uncertain, the exact orientation of the shifted point decides, and the bounds are cut at pi.
+ * Near the negative real axis the sign of the imaginary part decides between pi and -pi. If this
+ * sign is uncertain, the exact orientation of the shifted point decides, and the bounds are cut at
+ * pi.
  *
- * In 512 bits, A, B and C have relative errors of at most 2^-510, and the same terms give at most
- * 80 * 2^-509 M; the code uses 2^-500 M.
+ * In 512 bits, A, B and C have relative errors of at most 2^-510, and the same sums give an error
+ * of at most 80 * 2^-509 M; the code uses 2^-500 M.
  *
  * At a point on an edge a-b, with e = b - a, h = c - p and the shift d, the number is the limit
- *   -(|e|^2 (d.h) - (d.e)(h.e)) + i |e| (e.(d x h)),
- * divided by its length: the angle, around the edge, from -d to h. */
+ *   -(|e|^2 (d.h) - (d.e)(h.e)) + i |e| (e.(d x h)), divided by its length. Its argument is the
+ * angle, around the edge, from -d to h. */
 #include "core/strict_fp.h"
 
 #include "geometry/solid_angle.h"
@@ -30,8 +31,8 @@
 
 /* --- doubles --- */
 
-/* Returns atan(t) for t in [0, 1]: reduced to 1/8, then the series up to t^17, whose next term is
- * below 2^-61. */
+/* Returns atan(t) for t in [0, 1]. The argument is reduced to at most 1/8. The series has terms up
+ * to t^17; the next term is below 2^-61. */
 static double small_argument(double t)
 {
     static const double angle[5] = { 0, 0x1.f5b75f92c80ddp-3, 0x1.dac670561bb4fp-2,
@@ -147,7 +148,7 @@ static ebpo_big big_length(const big_vector *a)
  * `all` bounds the terms of both parts. */
 static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
 {
-    /* a common unit, in which the greater part is in [1/2, 1) */
+    /* in this common unit the greater part is in [1/2, 1) */
     const ebpo_big *x = &out->turn.real, *y = &out->turn.imaginary;
     if ((x->sign == 0 && y->sign == 0) || all->sign == 0)
         return false;
@@ -161,7 +162,7 @@ static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
     return true;
 }
 
-/* Computes the limit at a point on the edge a-b, for the shift. */
+/* Computes the limit for the shift of a point on the edge a-b. */
 static bool angle_on_edge(const double p[3], const double a[3], const double b[3],
                           const double c[3], ebpo_exact_angle *out)
 {

@@ -7,8 +7,8 @@
  *
  *   |A||B||C| + (A.B)|C| + (B.C)|A| + (C.A)|B|  +  i A.(B x C).
  *
- * At a point on the triangle the half angle jumps. There, p is shifted as in ebpo_axis_crossing, so
- * half angles and crossings belong to the same point. */
+ * The half angle is not continuous at points on the triangle. If p is such a point, it is shifted
+ * as in ebpo_axis_crossing, so that half angles and crossings are computed for the same point. */
 #ifndef EBPO_GEOMETRY_SOLID_ANGLE_H
 #define EBPO_GEOMETRY_SOLID_ANGLE_H
 
@@ -16,7 +16,7 @@
 
 #include "geometry/big_float.h"
 
-/* The value is in [middle - error, middle + error]. */
+/* A value in [middle - error, middle + error]. */
 typedef struct ebpo_bounded {
     double middle, error;
 } ebpo_bounded;
@@ -29,11 +29,12 @@ typedef struct ebpo_bounded {
  * give any value. */
 double ebpo_argument(double y, double x);
 
-/* Returns the half angle. The error is pi when p is too close to an edge to decide in doubles. */
+/* Returns the half angle. The error is pi when p is so close to an edge that doubles do not
+ * suffice. */
 ebpo_bounded ebpo_half_angle(const double p[3], const double a[3], const double b[3],
                              const double c[3]);
 
-/* The same in 512 bits. */
+/* A half angle, computed in 512 bits. */
 typedef struct ebpo_exact_angle {
     ebpo_big_complex turn; /* its argument is the half angle; not 0 */
     double error;          /* relative error of `turn`, at most 2^-300 */

@@ -1,16 +1,16 @@
-/* Computes the distance of a point to a triangle: bounds, correctly rounded values, and exact
+/* Computes the distance of a point from a triangle: bounds, correctly rounded values, and exact
  * comparisons.
  *
- * The stages, cheapest first: bounds in doubles; signs of products with error bounds, for points
- * that are far from the triangle compared with its size; double-double arithmetic
+ * The stages, the fastest first, are: bounds in doubles; signs of products with error bounds, for
+ * points that are far from the triangle compared with its size; double-double arithmetic
  * (double_double_kernels.c) while its error bound decides the rounding (Ziv, "Fast evaluation of
  * elementary mathematical functions with correctly rounded last bit", 1991); and integers of any
  * size.
  *
  * In all stages the nearest feature (corner, edge or interior) follows from the same signs, with
- * the corners taken relative to the point p. A corner is nearest when p is behind it along both of
- * its edges. An edge is nearest when p, projected to the plane, is between the edge's ends and
- * outside of the edge. The interior is nearest when the projection of p is inside of all edges.
+ * the corners taken relative to the point p. A corner is nearest when p is behind this corner along
+ * both of its edges. An edge is nearest when p, projected to the plane, is between the edge's ends
+ * and outside of the edge. The interior is nearest when the projection of p is inside of all edges.
  * Docs: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
@@ -71,7 +71,7 @@ static void bounded_cross(const bounded_number a[3], const bounded_number b[3],
 static int bounded_sign(bounded_number a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
 static bool bounded_is_zero(bounded_number a) { return a.x == 0 && a.error == 0; }
 
-/* Returns to - from, times 2^-exponent. */
+/* Returns (to - from) * 2^-exponent. */
 static bounded_number bounded_difference(double to, double from, int exponent)
 {
     double d = to - from;
@@ -98,13 +98,14 @@ static int exponent_of(const double (*a)[3], int count, const double b[3])
 }
 
 typedef struct far_triangle {
-    bounded_number corner[3][3], edge[3][3]; /* in separate units; corners are relative to p */
-    bounded_number along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
+    bounded_number corner[3][3],
+        edge[3][3]; /* corners are relative to p; corners and edges have separate units */
+    bounded_number along[3], back[3]; /* corner k . edge k; corner k + 1 . edge k */
     int exponent, edge_exponent;
 } far_triangle;
 
 /* Computes the products. Returns false if two corners are equal; then this stage cannot decide
- * which of the two is nearest. */
+ * which of these corners is nearest. */
 static bool relate_far(const double p[3], const double triangle[3][3], far_triangle *t)
 {
     bool apart = true;
@@ -134,7 +135,7 @@ static ebpo_feature far_feature_of(const far_triangle *t)
     bounded_cross(t->edge[0], t->edge[1], normal);
     for (int i = 0; i < 3; i++) {
         const bounded_number *along = &t->along[i], *before = &t->back[(i + 2) % 3];
-        /* behind the corner along both of its edges, or exactly beside it */
+        /* p is behind the corner along both of its edges, or exactly beside the corner */
         if ((bounded_sign(*along) > 0 || bounded_is_zero(*along)) &&
             (bounded_sign(*before) < 0 || bounded_is_zero(*before)))
             return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
@@ -175,8 +176,8 @@ static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance
     out->lo = fmin(out->lo, 0x1.fffffffffffffp1023);
 }
 
-/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. `out` may be NULL; it receives bounds of the
- * distance with a gap of about the triangle's size. */
+/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. `out` may be NULL. It receives bounds of the
+ * distance that differ by about the triangle's size. */
 static ebpo_feature find_far_feature(const double p[3], const double triangle[3][3],
                                      ebpo_distance_bounds *out)
 {
@@ -222,9 +223,9 @@ static void keep_feature(double t[3][3], ebpo_feature feature)
     memcpy(t[2], to, sizeof to);
 }
 
-/* Handles two features in one plane across an axis. Their distances compare in the same way from
- * the projection of p to that plane. Returns true if p has been moved to the projection, and a and
- * b have been reduced to their features. */
+/* Handles two features in one plane across an axis. The order of their distances from p is the same
+ * as from the projection of p to that plane. Returns true if p was replaced by its projection.
+ * Reduces a and b to their features. */
 static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
                         ebpo_feature of_b)
 {
@@ -245,8 +246,8 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
 
 /* --- bounds in doubles --- */
 
-/* Bounds of rounding errors. u = 2^-53, r bounds the 1-norms of the corners relative to p, l those
- * of the edges, and l^2 the normal's length.
+/* Bounds of rounding errors. u = 2^-53, r bounds the 1-norms of the corners relative to p, l bounds
+ * the 1-norms of the edges, and l^2 the normal's length.
  * - Relative corners and edges have relative errors of u.
  * - Products of a corner and an edge: 8 u r l.
  * - The normal: 8 u l^2 on each axis.
@@ -255,11 +256,11 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
  * - The distance to the plane: 16 u r, and the distance by which the plane moves within the
  *   triangle when its normal is tilted by 16 u l^2 / |n|.
  *
- * The code uses at least twice these bounds. Numbers whose fourth powers leave the doubles are
+ * The code uses at least twice these bounds. Numbers whose fourth powers overflow or underflow are
  * scaled first. */
 static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
-/* Above this multiple of the triangle's size, errors relative to the greatest product are too wide.
- */
+/* If r exceeds this multiple of the triangle's size, errors relative to the greatest product are
+ * too large. */
 static const double far_ratio = 0x1p20;
 
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
@@ -268,13 +269,13 @@ static inline double norm_1(const double a[3]) { return fabs(a[0]) + fabs(a[1]) 
 
 typedef struct relation {
     double corner[3][3]; /* relative to p */
-    double edge[3][3];   /* corner k to k + 1 */
+    double edge[3][3];   /* edge k is from corner k to corner k + 1 */
     double reach, size;  /* r and l */
-    /* corner k . edge k: distance of p behind corner k along its edge, times the edge's length */
+    /* corner k . edge k: distance of p behind corner k along edge k, times the edge's length */
     double along[3];
     double back[3]; /* corner k + 1 . edge k */
     double normal[3];
-    double side[3]; /* positive where p is within edge k */
+    double side[3]; /* positive if p is on the inner side of edge k */
 } relation;
 
 static void relate_to_point(const double p[3], const double triangle[3][3], relation *r)
@@ -303,8 +304,8 @@ static void multiply_relation(relation *r)
     }
 }
 
-/* Returns the distance to edge i, where the projection of p is between its ends. The nearest point
- * is the corner plus a fraction of the edge. */
+/* Returns the distance of p from edge i. The nearest point is the corner plus a fraction of the
+ * edge. */
 static double edge_distance(const relation *r, int i)
 {
     double length2 = ebpo_vec3_dot(r->edge[i], r->edge[i]),
@@ -322,7 +323,7 @@ static ebpo_feature certain_feature(const relation *r)
     bool inside = true;
     for (int i = 0; i < 3; i++) {
         int before = i == 0 ? 2 : i - 1;
-        /* Behind corner i along edge i, and beyond it along the edge before. */
+        /* p is behind corner i along edge i, and beyond corner i along the preceding edge. */
         if (r->along[i] > flat && r->back[before] < -flat)
             return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
         if (r->along[i] < -flat && r->back[i] > flat && r->side[i] < -solid)
@@ -340,8 +341,8 @@ static double plane_distance(const relation *r, double *error)
 }
 
 /* Bounds the distance. The plane is never farther than the triangle. If the tilt of the plane is
- * not known, it gives no bound; but no point of the triangle is farther from its edges than the
- * triangle's height. */
+ * not known, the plane gives no bound. Then another bound is used: no point of the triangle is
+ * farther from its edges than the triangle's height. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {
     double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
@@ -381,8 +382,8 @@ static void bound_relation(const relation *r, ebpo_distance_bounds *out)
     out->hi = d + error;
 }
 
-/* Scales everything by a power of two so that the largest coordinate is in 1/2 .. 1. Returns the
- * exponent that undoes it. */
+/* Scales p and the triangle by a power of two so that the largest coordinate is in 1/2 .. 1.
+ * Returns the exponent that undoes it. */
 static int scale_all(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
 {
     double most = 0;
@@ -408,7 +409,7 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     relation r;
     relate_to_point(q, (const double(*)[3])t, &r);
     if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
-        /* The triangle is almost a point: nothing more is known. */
+        /* The triangle is almost a point: only an upper bound is known. */
         *out = (ebpo_distance_bounds){
             0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
         };
@@ -417,7 +418,8 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     }
     multiply_relation(&r);
     bound_relation(&r, out);
-    /* Scaling up is exact, scaling down may have lost parts below 2^-1074. */
+    /* Scaling to larger numbers is exact; scaling to smaller ones may have lost parts below
+     * 2^-1074. */
     out->feature = find_far_feature(p, triangle, NULL);
     out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
     out->lo = out->lo > 0 ? out->lo : 0;
@@ -441,7 +443,8 @@ void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3
 
 /* --- integers of any size: the squared distance is a fraction of integers in a common unit --- */
 
-/* The nearest point is p + numerator / denominator, the squared distance square / denominator2. */
+/* The nearest point is p + offset / offset_denominator; the squared distance is square /
+ * denominator. */
 typedef struct nearest {
     int unit;
     ebpo_vectorz p, corner[3], edge[3], normal; /* corners relative to p */
@@ -507,8 +510,8 @@ static bool try_interior(nearest *n)
     return true;
 }
 
-/* Replaces the current feature by a corner or edge when it is nearer than the current feature; of
- * equally near ones, keeps the corner. */
+/* Replaces the current feature by a corner or edge that is nearer. If both are equally near, keeps
+ * the feature that is a corner. */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {
@@ -536,7 +539,7 @@ static void offer_edge(nearest *n, int i)
     bool taken;
     mpz_inits(along, length2, square, NULL);
     ebpo_vectorz_dot(along, &n->corner[i], &n->edge[i]);
-    mpz_neg(along, along); /* projection of p on the edge, times its length */
+    mpz_neg(along, along); /* projection of p on the edge, times the edge's length */
     ebpo_vectorz_dot(length2, &n->edge[i], &n->edge[i]);
     if (mpz_sgn(along) > 0 && mpz_cmp(along, length2) < 0) {
         ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
@@ -665,8 +668,8 @@ static void unit_normal_by_integers(const double triangle[3][3], double normal[3
 
 /* --- double-double arithmetic first, then integers --- */
 
-/* Beyond these limits, products of four coordinates or their rounding errors would leave the range
- * of doubles. */
+/* Beyond these limits, products of four coordinates or their rounding errors may overflow or
+ * underflow. */
 static const double max_reach = 0x1p120, least_size = 0x1p-120;
 
 static bool in_pair_range(const double p[3], const double triangle[3][3])
@@ -692,8 +695,9 @@ static bool rounds_certainly(const ebpo_measured *m, double *distance)
     return m->error < 0x1p-56 && least == most;
 }
 
-/* Computes the distance of a corner of a triangle that is far away: scaled, so that nothing
- * overflows. The lost parts of small coordinates are below 2^-1000 of the distance. */
+/* Computes the distance of a corner of a triangle that is far away. Numbers are scaled, so that
+ * none overflows. The parts of small coordinates that are lost are below 2^-1000 of the distance.
+ */
 static bool corner_by_pairs(const double p[3], const double triangle[3][3],
                             const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
 {
@@ -713,8 +717,8 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     return true;
 }
 
-/* Returns false if the arithmetic does not decide. Sets *known if the normal was requested and is
- * set. */
+/* Returns false if double-double arithmetic does not decide. *known: the normal was requested and
+ * is set. */
 static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, double *normal, bool *known,
                              ebpo_triangle_nearest *out)

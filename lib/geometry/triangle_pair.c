@@ -1,5 +1,5 @@
-/* Computes the relation of two faces: apart, touching, crossing or coplanar; exact for every finite
- * double.
+/* Computes the relation of two faces: apart, touching, crossing or coplanar. Exact for all finite
+ * doubles.
  *
  * If the planes of the faces intersect in a line, the corners of each face are reordered so that
  * the first corner is alone on its side of the other plane. Each face intersects the line in an

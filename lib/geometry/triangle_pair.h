@@ -1,4 +1,4 @@
-/* Computes the relation of two faces: apart, touching, crossing or coplanar. Exact. */
+/* Computes the exact relation of two faces: apart, touching, crossing or coplanar. */
 #ifndef EBPO_GEOMETRY_TRIANGLE_PAIR_H
 #define EBPO_GEOMETRY_TRIANGLE_PAIR_H
 
@@ -15,9 +15,9 @@ static inline int ebpo_corner_order(const double p[3], const double q[3])
     return 0;
 }
 
-/* Returns the relation of two faces, exact for every finite double. docs/develop/collision.md
- * defines the kinds. The result does not depend on the order of the faces or of their corners. Pure
- * functions, any thread. */
+/* Returns the relation of two faces, exact for all finite doubles. docs/develop/collision.md
+ * defines the kinds. The result does not depend on the order of the faces or of their corners. All
+ * functions are pure and may be called by any thread. */
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3]);
 

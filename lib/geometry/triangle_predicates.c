@@ -4,10 +4,10 @@
  * no case is degenerate (Edelsbrunner and Muecke, "Simulation of Simplicity", 1990).
  *
  * Boxes: a triangle and a box are disjoint exactly when they are separated along one of 13 axes:
- * those of the box, the triangle's normal, and the cross products of an axis of the box with an
- * edge of the triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine tests are
- * made in the plane: projected along an axis of the box, the box is a rectangle, and the test is
- * whether this rectangle is beyond an edge of the projected triangle. */
+ * the axes of the box, the triangle's normal, and the cross products of an axis of the box with an
+ * edge of the triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine tests use
+ * projections along an axis of the box. The projected box is a rectangle, and the test is whether
+ * this rectangle is beyond an edge of the projected triangle. */
 #include "core/strict_fp.h"
 
 #include "geometry/predicates.h"
@@ -33,8 +33,8 @@ bool ebpo_zero_area(const double a[3], const double b[3], const double c[3])
 
 /* Returns the side of the shifted point p relative to the line a-b, all projected along `axis`,
  * positive to the left; 0 only when a and b coincide in this projection. The shift changes the
- * orientation by (a_v - b_v) d_u + (b_u - a_u) d_v, where d_u and d_v are the shifts. The lower one
- * of the axes u and v has the larger shift. */
+ * orientation by (a_v - b_v) d_u + (b_u - a_u) d_v, where d_u and d_v are the shifts. The lower of
+ * the axes u and v has the larger shift. */
 static int shifted_side2d(int axis, const double a[3], const double b[3], const double p[3])
 {
     int sign = ebpo_normal_sign(axis, a, b, p);
@@ -59,7 +59,7 @@ static int shifted_side3d(const double a[3], const double b[3], const double c[3
 }
 
 /* Returns true if the coordinates alone show that there is no crossing. The shift is positive on
- * every axis, so an end equal to the face's maximum is beyond it. */
+ * every axis, so an end equal to the face's maximum is beyond this maximum. */
 static inline bool misses_bounds(const double from[3], double to, int axis, const double a[3],
                                  const double b[3], const double c[3])
 {
@@ -75,9 +75,9 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
 {
     if (!(from[axis] < to) || misses_bounds(from, to, axis, a, b, c))
         return 0;
-    /* In the projection along the axis, the point is inside when all edges turn the same way around
-     * it: `turn`, the sign of the normal along the axis. No point is inside a face that is seen
-     * edge-on. */
+    /* In the projection along the axis, the point is inside the face when all edges turn in the
+     * same direction around it. This direction is `turn`, the sign of the normal along the axis. No
+     * point is inside a face whose projection has no area. */
     int turn = shifted_side2d(axis, a, b, from);
     if (turn == 0 || shifted_side2d(axis, b, c, from) != turn ||
         shifted_side2d(axis, c, a, from) != turn)
@@ -143,10 +143,10 @@ static shadow shadow_along(int axis, const double triangle[3][3], const double m
 }
 
 /* Returns true when the rectangle is entirely on the side (1: left, -1: right) of the line from a
- * to b, without touching it. */
+ * to b, without touching the line. */
 static bool rectangle_on_side(const shadow *s, const double a[2], const double b[2], int side)
 {
-    /* Test the corner of the rectangle that is farthest to the other side. */
+    /* Tests the corner of the rectangle that is farthest to the other side. */
     bool far_x = side > 0 ? b[1] < a[1] : b[1] > a[1], far_y = side > 0 ? b[0] > a[0] : b[0] < a[0];
     const double corner[2] = { far_x ? s->min[0] : s->max[0], far_y ? s->min[1] : s->max[1] };
     return ebpo_orient2d(a, b, corner) == side;

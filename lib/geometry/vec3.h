@@ -31,7 +31,7 @@ static inline void ebpo_vec3_copy(const double a[3], double out[3])
         out[k] = a[k];
 }
 
-/* Returns the length, which overflows or underflows where its square does. */
+/* Returns the length, which overflows or underflows if its square does. */
 static inline double ebpo_vec3_length(const double v[3]) { return sqrt(ebpo_vec3_dot(v, v)); }
 
 /* Return the least and the greatest of three numbers. */
