@@ -1,12 +1,13 @@
-/* Finds the boxes that points and rays reach.
+/* Finds the boxes that contain a point, that may be near a point, or that a ray may intersect.
  *
- * Boxes are in a tree: eight neighbours along the Morton curve of their centres have a box around
- * them on the next level, up to a box that contains all. A query goes down from there and skips
- * boxes that it cannot reach. The tree is immutable, so any number of threads may query it.
+ * Boxes are in a tree. Eight boxes that are neighbours along the Morton curve of their centres have
+ * one box around them on the next level; the box of the highest level contains all boxes. A query
+ * begins with the highest level and skips boxes that are not relevant. The tree is immutable, so
+ * any number of threads may query it.
  *
- * A skipped box certainly does not matter: lengths are rounded some ten times here, each time by
- * 2^-53, and only boxes that are farther by a share of 2^-40 are skipped. So a query may get boxes
- * that it does not reach, whose models then find nothing; but no box is missing. */
+ * No relevant box is skipped: lengths are rounded some ten times here, each time by 2^-53, and only
+ * boxes that are farther by a share of 2^-40 are skipped. A query may get boxes that are not
+ * relevant; the models in these boxes then find nothing. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -80,18 +81,18 @@ static bool make_lowest(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes
     uint32_t *order = ebpo_alloc(count, sizeof *order);
     t->number = ebpo_alloc(count, sizeof *t->number);
     t->box[0] = ebpo_alloc(count, sizeof *t->box[0]);
-    bool fine = centre && order && t->number && t->box[0];
-    for (size_t i = 0; fine && i < count; i++)
+    bool good = centre && order && t->number && t->box[0];
+    for (size_t i = 0; good && i < count; i++)
         for (int k = 0; k < 3; k++)
             centre[i][k] = boxes[i].min[k] / 2 + boxes[i].max[k] / 2;
-    fine = fine && ebpo_catalogue_morton_order(centre[0], count, all.min, all.max, order);
-    for (size_t i = 0; fine && i < count; i++) {
+    good = good && ebpo_catalogue_morton_order(centre[0], count, all.min, all.max, order);
+    for (size_t i = 0; good && i < count; i++) {
         t->number[i] = numbers[order[i]];
         t->box[0][i] = boxes[order[i]];
     }
     free(centre);
     free(order);
-    return fine;
+    return good;
 }
 
 bool ebpo_catalogue_boxes_make(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
@@ -124,12 +125,12 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
     *t = (ebpo_catalogue_boxes){ .levels = 0 };
 }
 
-/* --- going down --- */
+/* --- visits of boxes --- */
 
 typedef struct walk {
     const ebpo_catalogue_boxes *t;
     const double *p, *d; /* the point, or the ray's origin and direction */
-    double reach;        /* nearest query: boxes farther away are not wanted */
+    double reach;        /* nearest query: boxes farther away are skipped */
     double pad;          /* ray: margin, more than the rounding error */
     uint32_t item;
     ebpo_catalogue_pairs *out; /* NULL: only `reach` is computed */
@@ -214,8 +215,8 @@ static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *least)
     return *least * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
 }
 
-/* Lowers `reach` to the distance of the box's farthest corner: the model in the box is nearer than
- * that. */
+/* Lowers `reach` to the distance of the box's farthest corner: the model in the box is not farther
+ * away than this corner. */
 static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     if (!may_be_near(w, b, least))

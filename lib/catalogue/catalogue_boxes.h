@@ -1,4 +1,5 @@
-/* Finds the boxes that points and rays reach. Immutable once made, for any number of threads. */
+/* Finds the boxes that contain a point, that may be near a point, or that a ray may intersect. The
+ * tree of boxes is immutable, and any number of threads may use it. */
 #ifndef EBPO_CATALOGUE_CATALOGUE_BOXES_H
 #define EBPO_CATALOGUE_CATALOGUE_BOXES_H
 
@@ -6,11 +7,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Maximum number of levels. Each level has eight times as many boxes as the one above: enough for
- * 2^33 boxes. */
+/* Maximum number of levels. Each level has eight times as many boxes as the next higher level, so
+ * this number of levels is sufficient for 2^33 boxes. */
 enum { EBPO_CATALOGUE_LEVELS = 12 };
 
-/* Share by which skipped boxes are farther at least; lengths are rounded some ten times. */
+/* Boxes are skipped only if they are farther than the limit by at least this share, because lengths
+ * are rounded some ten times. */
 #define EBPO_CATALOGUE_SLACK 0x1p-40
 
 /* A closed box. */
@@ -22,11 +24,11 @@ typedef struct ebpo_catalogue_boxes {
     uint32_t *number; /* [count[0]] numbers of the boxes, along the Morton curve of their centres */
     int levels;       /* 0: there is no box */
     size_t count[EBPO_CATALOGUE_LEVELS];
-    /* level 0: the boxes; levels above: the boxes around eight each */
+    /* level 0: the boxes; higher levels: boxes around eight boxes of the next lower level */
     ebpo_catalogue_box *box[EBPO_CATALOGUE_LEVELS];
 } ebpo_catalogue_boxes;
 
-/* A box, and a point or ray that reaches it. */
+/* A box, and a point or ray for which it was found. */
 typedef struct ebpo_catalogue_pair {
     uint32_t box, item;
     double least; /* set by ebpo_catalogue_boxes_near: lower bound of the distance to the box */
@@ -37,14 +39,14 @@ typedef struct ebpo_catalogue_pairs {
     uint64_t count, capacity;
 } ebpo_catalogue_pairs;
 
-/* Makes the tree of boxes[count]. numbers[count] identify the boxes in pairs. Returns false without
- * memory; call ebpo_catalogue_boxes_free in any case. */
+/* Makes the tree of boxes[count]. numbers[count] identify the boxes in pairs. Returns false when
+ * memory is short; call ebpo_catalogue_boxes_free in any case. */
 bool ebpo_catalogue_boxes_make(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
                                const uint32_t *numbers, size_t count);
 void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t);
 
 /* Appends a pair (box, item) for each box that contains the point. This and the next two functions
- * return false without memory. */
+ * return false when memory is short. */
 bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[3], uint32_t item,
                                   ebpo_catalogue_pairs *out);
 /* Appends pairs for all boxes that may contain the face nearest to the point, at most `most` away.
@@ -56,8 +58,8 @@ bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out);
 
 /* Writes the numbers (from 0) of points[count][3] in the order of the Morton curve of a box. Points
- * outside the box have the position of the nearest point of the box. Returns false without memory.
- */
+ * outside the box have the position of the nearest point of the box. Returns false when memory is
+ * short. */
 bool ebpo_catalogue_morton_order(const double *points, size_t count, const double min[3],
                                  const double max[3], uint32_t *numbers);
 

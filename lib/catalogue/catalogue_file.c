@@ -1,12 +1,12 @@
 /* Makes a catalogue, a list of models with their boxes, from a JSON file or an array.
  *
- * A catalogue file is untrusted input. Every used member is checked for its kind and range before
+ * A catalogue file is untrusted input. The kind and range of every used member are checked before
  * the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two corners
- * of three finite numbers each, with min not above max. open_models.c compares these with a model
- * when the model is opened. Unknown members are ignored.
+ * of three finite numbers each, with min not above max. When a model is opened, open_models.c
+ * compares the digest and the box with the model. Unknown members are ignored.
  *
- * Paths are kept as they are opened: relative paths of a file begin in the file's folder. A
- * catalogue is immutable, and any number of threads may use it.
+ * Entries have the paths by which files are opened: relative paths in a catalogue file are relative
+ * to the folder of this file. A catalogue is immutable, and any number of threads may use it.
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -28,8 +28,8 @@
 #include "core/fp_env.h"
 #include "core/hash.h"
 
-/* Maximum length of a file: enough for some millions of models; a larger file would take many times
- * as much memory. */
+/* Maximum length of a file. This is sufficient for some millions of models; a larger file would
+ * need many times as much memory. */
 enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
@@ -43,7 +43,7 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
 /* --- making --- */
 
 /* Returns a path by which a file is opened, from a path relative to a folder ("" or ending in '/').
- * Returns NULL without memory. */
+ * Returns NULL when memory is short. */
 static char *joined_path(const char *folder, const char *path)
 {
     bool whole = *path == '/' || strstr(path, "://");
@@ -56,7 +56,7 @@ static char *joined_path(const char *folder, const char *path)
     return joined;
 }
 
-/* Makes the tree of the boxes of all models; with `seen`, of the models that rays and distances
+/* Makes the tree of the boxes of all models or, with `seen`, of the models that rays and distances
  * use. */
 static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, bool seen)
 {
@@ -71,10 +71,10 @@ static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, boo
         memcpy(box[count].max, e->max, sizeof e->max);
         number[count++] = (uint32_t)i;
     }
-    bool fine = box && number && ebpo_catalogue_boxes_make(boxes, box, number, count);
+    bool good = box && number && ebpo_catalogue_boxes_make(boxes, box, number, count);
     free(box);
     free(number);
-    return fine;
+    return good;
 }
 
 /* Computes the derived data when all entries are set. */
@@ -175,19 +175,19 @@ static ebpo_status copy_entries(ebpo_catalogue *c, const ebpo_catalogue_entry *e
         if (length && folder[length - 1] != '/')
             memcpy(folder + length, "/", 2);
     }
-    bool fine = folder && c->entry;
+    bool good = folder && c->entry;
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < count && fine && status == EBPO_OK; i++) {
+    for (uint64_t i = 0; i < count && good && status == EBPO_OK; i++) {
         const char *fault = fault_of_entry(&entries[i]);
         c->count = i + 1;
         if (fault)
             status = ebpo_fail(error, EBPO_E_ARGUMENT, "entry %" PRIu64 " %s", i, fault);
         else
-            fine = copy_entry(&c->entry[i], &entries[i], folder);
+            good = copy_entry(&c->entry[i], &entries[i], folder);
     }
     free(folder);
     c->how.folder = NULL;
-    return fine ? status : ebpo_fail_memory(error, count * sizeof *c->entry);
+    return good ? status : ebpo_fail_memory(error, count * sizeof *c->entry);
 }
 
 ebpo_status ebpo_catalogue_new(const ebpo_catalogue_entry *entries, uint64_t count,
@@ -260,7 +260,7 @@ static ebpo_status bad_file(const reader *r, const char *what)
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: %s", what);
 }
 
-/* Reads a path; *out: NULL where the member is missing, null or empty. */
+/* Reads a path; *out stays NULL if the member is missing, null or empty. */
 static ebpo_status read_path(const reader *r, const json_t *model, const char *key,
                              const char **out)
 {
@@ -295,13 +295,13 @@ static ebpo_status read_digest(const reader *r, const json_t *model, const char 
 static bool read_corner(const json_t *model, const char *key, double out[3])
 {
     const json_t *value = json_object_get(model, key);
-    bool fine = json_array_size(value) == 3;
-    for (size_t k = 0; fine && k < 3; k++) {
+    bool good = json_array_size(value) == 3;
+    for (size_t k = 0; good && k < 3; k++) {
         const json_t *x = json_array_get(value, k);
         out[k] = json_number_value(x);
-        fine = json_is_number(x) && isfinite(out[k]);
+        good = json_is_number(x) && isfinite(out[k]);
     }
-    return fine;
+    return good;
 }
 
 static ebpo_status read_box(const reader *r, const json_t *model, ebpo_catalogue_entry *e)
@@ -327,7 +327,7 @@ static bool read_rule(const json_t *of, ebpo_rule *out)
     return found;
 }
 
-/* Returns a count that is only informative; 0 where it is invalid. */
+/* Returns a count that is only informative; 0 if it is invalid. */
 static uint64_t read_count(const json_t *model, const char *key)
 {
     double count = json_number_value(json_object_get(model, key));

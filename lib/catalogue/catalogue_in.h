@@ -13,7 +13,7 @@ struct ebpo_catalogue {
     char *path; /* path of the file that was read, or NULL */
     uint64_t file_bytes, file_hash;
     uint64_t count;                      /* at least 1, at most 2^32 - 2 */
-    ebpo_catalogue_entry *entry;         /* the catalogue owns their texts */
+    ebpo_catalogue_entry *entry;         /* the catalogue owns the texts of the entries */
     ebpo_catalogue_options how;          /* options; `folder` is not set */
     ebpo_catalogue_boxes all, seen;      /* boxes of all models; boxes of the models that rays and
                                           * distances use */
@@ -35,16 +35,16 @@ typedef struct ebpo_catalogue_held ebpo_catalogue_held;
 typedef ebpo_status (*ebpo_catalogue_query)(ebpo_context *context, const ebpo_catalogue_held *model,
                                             void *user, ebpo_error *error);
 
-/* Calls `run_query` with a model (with `surface`: the part of it that rays and distances use) when
- * memory is available. If the model's budget is too small for several threads, calls `run_query`
- * again while no other thread queries the model. Fails with the errors of ebpo/catalogue.h for
- * opening. */
+/* Calls `run_query` with a model (with `surface`: with the model's part that rays and distances
+ * use) when memory is available. If the model's budget is too small for several threads, calls
+ * `run_query` again while no other thread queries the model. Fails with the errors of
+ * ebpo/catalogue.h for opening. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
                                               const ebpo_catalogue *c, uint64_t number,
                                               bool surface, ebpo_catalogue_query run_query,
                                               void *user, ebpo_error *error);
 
-/* Returns true if the catalogue has one model, which is open and all in memory. */
+/* Returns true if the catalogue has a single model, which is open and completely in memory. */
 bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c);
 
 /* Converts the number of a part's face to its number in the whole model, if the catalogue has such
@@ -54,8 +54,8 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *mo
 
 /* --- numbers of faces: part_numbers.c --- */
 
-/* For each face of a part, its number in the whole model: a .npy file of integers, read when
- * needed. */
+/* A .npy file of integers: for each face of a part, the number of this face in the whole model.
+ * Numbers are read when they are needed. */
 typedef struct ebpo_catalogue_numbers {
     const char *path; /* owned by the caller */
     int fd;           /* -1: not open */
@@ -72,11 +72,11 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f,
 void ebpo_catalogue_numbers_close(ebpo_catalogue_numbers *f);
 
 /* Replaces *face by the number at the index *face. Returns EBPO_E_FORMAT if there is no such
- * number, or if it is negative or beyond 2^63; EBPO_E_IO. Any thread. */
+ * number, or if it is negative or beyond 2^63; EBPO_E_IO. May be called by any thread. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f,
                                                      uint64_t *face, ebpo_error *error);
 
-/* --- each model once, by one thread: catalogue_query.c --- */
+/* --- queries of each model once, by one thread: catalogue_query.c --- */
 
 typedef struct ebpo_catalogue_batch {
     const ebpo_catalogue *c;
@@ -104,7 +104,7 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_batch *
                                                     ebpo_catalogue_query run_query, void *user,
                                                     ebpo_error *error);
 
-/* Appends the pairs of an item, given the item's row; returns false without memory. */
+/* Appends the pairs of an item, given the item's row. Returns false when memory is short. */
 typedef bool (*ebpo_catalogue_find)(const ebpo_catalogue_boxes *boxes, const double *row,
                                     uint32_t item, ebpo_catalogue_pairs *out);
 bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
@@ -112,8 +112,8 @@ bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *
 bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
                              ebpo_catalogue_pairs *out);
 
-/* As ebpo_catalogue_query_runs, for rows[count]: `find` gives the boxes that each row reaches. With
- * `surface` these are the boxes of models that rays and distances use. */
+/* Same as ebpo_catalogue_query_runs, for rows[count]: `find` returns the boxes for each row. With
+ * `surface`, only models that rays and distances use are queried. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a,
                                                    const double *rows, uint32_t count, size_t width,
                                                    ebpo_catalogue_find find, bool surface,
@@ -123,9 +123,9 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a
 /* Returns EBPO_E_ABSENT if the catalogue contains caps only. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error);
 
-/* --- many rows, by any number of threads: catalogue_query.c --- */
+/* --- queries of many rows, by any number of threads: catalogue_query.c --- */
 
-/* Processes a stretch of rows in one thread. A row is a point, or an ebpo_ray as numbers. */
+/* Processes a range of rows in one thread. A row is a point, or the numbers of an ebpo_ray. */
 typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_batch *a, const double *rows,
                                               uint32_t count, void *out, uint64_t *model,
                                               ebpo_error *error);
@@ -135,11 +135,13 @@ typedef struct ebpo_catalogue_job {
     ebpo_catalogue_stretch run_query;
     const char *stage;
     size_t width, result; /* numbers in a row; bytes of a result */
-    bool ordered;         /* true if rows are points along the curve */
-    const double *rows;   /* rows of the remaining queries; the next two members also begin there */
+    bool ordered; /* true if rows are points, which may be processed along the Morton curve */
+    const double
+        *rows; /* rows of the remaining queries; the next two members begin at the same query */
     char *out;
-    uint64_t *model;       /* or NULL */
-    const uint32_t *order; /* order of the current lap, set while rows are processed */
+    uint64_t *model; /* model of each result; or NULL */
+    const uint32_t
+        *order; /* order of the rows of the current lap; set while the rows are processed */
 } ebpo_catalogue_job;
 
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_rows(ebpo_catalogue_job *job, uint64_t count,
@@ -148,7 +150,7 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_query_optio
                                                       const ebpo_catalogue_query_options *given,
                                                       ebpo_error *error);
 
-/* --- points inside, for a stretch of points: catalogue_inside.c --- */
+/* --- classification of a range of points: catalogue_inside.c --- */
 
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_batch *a,
                                                       const double *rows, uint32_t count, void *out,

@@ -1,7 +1,7 @@
 /* Classifies points by winding numbers, summed over the models whose boxes contain the points.
  *
- * Independent models: a point is inside if it is inside any model. A model that has the point on a
- * face adds 0 to the sum.
+ * Independent models: a point is inside if it is inside any model. A model with a face that
+ * contains the point adds 0 to the sum.
  *
  * Parts of one model are closed by caps, which do not belong to the surface of the whole model. If
  * the point is on no face and no cap, the winding numbers of all parts add up to the winding number
@@ -10,8 +10,8 @@
  * this exactly. Otherwise the point is on a cap. Then the point's winding number is counted along a
  * ray through the surfaces, which have no caps: the number of faces where the ray leaves the solid,
  * minus the number of faces where the ray enters the solid. If a ray hits an edge or runs along a
- * face, its crossings are not counted, and another ray is cast. The directions are always the same.
- * Every ray whose crossings are counted gives the same winding number.
+ * face, its crossings are not counted, and another ray is cast. The directions are the same in all
+ * queries. Every ray whose crossings are counted gives the same winding number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -30,7 +30,7 @@
 /* Maximum number of rays that are cast from a point. */
 enum { DIRECTIONS = 64 };
 
-/* Result for a point, from the models queried so far. */
+/* Result for a point from the models that were queried so far. */
 typedef struct found {
     int64_t winding;
     bool in, on;

@@ -1,14 +1,15 @@
 /* Finds the nearest face of all models to a point, and the first face that a ray hits.
  *
- * A point queries the models in the order of the distance of their boxes, while the next box may
- * contain a face nearer than the found one. Many points take their turns together, so that each
- * model is queried for all of them at once. Of models at the same rounded distance, the result is
- * from the first one in the catalogue, independent of the order of queries. So a box counts as near
- * unless it is farther by more than the rounding error (catalogue_boxes.c).
+ * For a point, the models are queried in the order of the distance of their boxes, while the next
+ * box may contain a face that is nearer than the nearest face found. Many points are processed
+ * together: in each step, the next model of each point is queried, and a model is queried for all
+ * its points at once. If several models have the same rounded distance, the result is from the
+ * first of these models in the catalogue, independent of the order of queries. Therefore a box is
+ * skipped only if it is farther by more than the rounding error (catalogue_boxes.c).
  *
- * A ray queries the models whose boxes it may intersect in the order of the catalogue, each only up
- * to the hit found before. If t overflows for several hits, a ray whose direction is longer by a
- * power of two, exactly, decides which hit is first. */
+ * For a ray, the models whose boxes it may intersect are queried in the order of the catalogue,
+ * each only up to the nearest hit so far. If t overflows for several hits, a ray with an exactly
+ * scaled, longer direction decides which hit is first. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,7 +24,7 @@
 
 /* --- distances --- */
 
-/* Points of a stretch, and their results so far. */
+/* Points of a range, and their results so far. */
 typedef struct search {
     const ebpo_catalogue_batch *a;
     const double *points;
@@ -81,26 +82,26 @@ static ebpo_status query_distances(ebpo_context *context, const ebpo_catalogue_h
     return status;
 }
 
-/* For each of some points, queries its next box while that may contain a nearer face. `begin`: for
- * each point the start of its boxes, and one entry for the end. `turn` has space for as many
- * entries. */
-static ebpo_status query_in_turn(search *s, const uint64_t *begin, uint64_t *turn, uint32_t points,
-                                 ebpo_error *error)
+/* Queries the next box of each point, until no remaining box may contain a nearer face. `begin`:
+ * index of each point's first box, and the end of the list. `next_box`: space for one number for
+ * each point. */
+static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *next_box,
+                                  uint32_t points, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    memcpy(turn, begin, points * sizeof *turn);
+    memcpy(next_box, begin, points * sizeof *next_box);
     do {
         s->queries.count = 0;
         for (uint32_t i = 0; i < points; i++) {
-            const ebpo_catalogue_pair *next = s->near.pair + turn[i];
-            if (turn[i] == begin[i + 1])
+            const ebpo_catalogue_pair *next = s->near.pair + next_box[i];
+            if (next_box[i] == begin[i + 1])
                 continue;
             if (next->least * (1 - EBPO_CATALOGUE_SLACK) <=
                 fmin(s->out[next->item].distance, s->max_distance)) {
                 s->queries.pair[s->queries.count++] = *next;
-                turn[i]++;
+                next_box[i]++;
             } else {
-                turn[i] = begin[i + 1]; /* later boxes are farther away */
+                next_box[i] = begin[i + 1]; /* later boxes are farther away */
             }
         }
         status = ebpo_catalogue_query_runs(s->a, &s->queries, s->points, 3, true, query_distances,
@@ -110,7 +111,7 @@ static ebpo_status query_in_turn(search *s, const uint64_t *begin, uint64_t *tur
 }
 
 /* Processes as many points from *at on as fit in memory, and sets *at to the next point. */
-static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *turn,
+static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *next_box,
                               ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -129,22 +130,22 @@ static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t
     }
     begin[points] = s->near.count;
     *at = first + points;
-    return status == EBPO_OK ? query_in_turn(s, begin, turn, points, error) : status;
+    return status == EBPO_OK ? query_in_steps(s, begin, next_box, points, error) : status;
 }
 
 static ebpo_status query_nearest(search *s, ebpo_error *error)
 {
     uint64_t *begin = ebpo_alloc((uint64_t)s->count + 1, sizeof *begin);
-    uint64_t *turn = ebpo_alloc(s->count, sizeof *turn);
+    uint64_t *next_box = ebpo_alloc(s->count, sizeof *next_box);
     s->queries.pair = ebpo_alloc(s->count, sizeof *s->queries.pair);
     ebpo_status status =
-        begin && turn && s->queries.pair
+        begin && next_box && s->queries.pair
             ? EBPO_OK
             : ebpo_fail_memory(error, (uint64_t)s->count * sizeof *s->queries.pair);
     for (uint32_t at = 0; at < s->count && status == EBPO_OK;)
-        status = query_some(s, &at, begin, turn, error);
+        status = query_some(s, &at, begin, next_box, error);
     free(begin);
-    free(turn);
+    free(next_box);
     free(s->queries.pair);
     free(s->near.pair);
     return status;
@@ -211,11 +212,11 @@ typedef struct shot {
     ebpo_ray_sides sides;
     ebpo_ray_hit *out;
     uint64_t *model;
-    double *longer_t; /* t along the longer direction, for hits whose t is INFINITY */
+    double *longer_t; /* t with the longer direction, for hits whose t is INFINITY */
 } shot;
 
-/* Returns the ray with a direction that is longer by a power of two, exactly, so that every hit's t
- * is finite. */
+/* Returns the ray with a longer direction, exactly scaled by a power of two, so that the t of every
+ * hit is finite. */
 static ebpo_ray longer_ray(const ebpo_ray *ray)
 {
     enum { ENOUGH = 3 }; /* coordinates are at most 2^1025 apart */
@@ -229,8 +230,8 @@ static ebpo_ray longer_ray(const ebpo_ray *ray)
     return out;
 }
 
-/* Sets *nearer to true if a hit comes before the kept hit. If t is INFINITY for both, they are
- * compared along a longer direction. */
+/* Sets *nearer to true if a hit comes before the kept hit. If t is INFINITY for both, the hits are
+ * compared with a longer direction. */
 static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ray *ray,
                              const ebpo_ray_hit *hit, uint32_t item, bool *nearer,
                              ebpo_error *error)
@@ -269,8 +270,8 @@ static ebpo_status merge_hits(const shot *s, const ebpo_catalogue_run *run, cons
     return status;
 }
 
-/* Queries one model, but no faces beyond the hits found so far. Models come in the order of the
- * catalogue: with equal t the first model's hit stays. */
+/* Queries one model, but no faces beyond the hits found so far. Models are queried in the order of
+ * the catalogue, so the hit of the first model is kept if others have an equal t. */
 static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                               ebpo_error *error)
 {

@@ -1,13 +1,13 @@
-/* Evaluates queries to a catalogue. They are divided into stretches. One thread processes a
- * stretch, and queries each model once for it.
+/* Evaluates queries to a catalogue. Rows (points or rays) are divided into ranges (stretches). Each
+ * range is processed by one thread, which queries each model once for all rows of the range.
  *
- * Points are taken in laps of some millions of points, and each lap in the order of the Morton
- * curve of the catalogue's box, so that a stretch visits few models and few of their subtrees; a
- * single model that is all in memory needs no order. Rays are processed in their given order, as
- * each model orders its rays itself.
+ * Points are processed in laps of some millions of points. The points of a lap are sorted along the
+ * Morton curve of the catalogue's box, so that a range needs few models and few subtrees. A single
+ * model that is completely in memory needs no sorting. Rays are processed in the given order,
+ * because each model sorts its rays itself.
  *
- * A result depends on its point or ray alone: not on the stretch, the threads, or the models that
- * happen to be open. A thread holds the results of its stretch only, and one model at a time. */
+ * A result depends only on its point or ray: not on the range, the threads, or the models that are
+ * open. A thread holds the results of one range and one model at a time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,11 +21,10 @@
 #include "core/parallel.h"
 #include "query/query_model.h"
 
-/* Least and greatest number of rows in a stretch; number of rows that are ordered together; number
- * of rows for which ordering is not worth the time. */
+/* Least and greatest number of rows in a range; number of rows in a lap; number of rows for which
+ * sorting takes more time than it saves. */
 enum { STRETCH_LEAST = 1 << 10, STRETCH_MAX = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
-/* Number of stretches for each thread: several, so that no thread waits long for the last stretch.
- */
+/* Number of ranges for each thread: several, so that no thread waits long for the last range. */
 enum { STRETCHES_EACH = 4 };
 
 ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)
@@ -36,7 +35,7 @@ ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *err
                                            "of all parts");
 }
 
-/* --- each model once --- */
+/* --- queries of each model once --- */
 
 static int by_model(const void *a, const void *b)
 {
@@ -45,7 +44,7 @@ static int by_model(const void *a, const void *b)
                             : (x->item > y->item) - (x->item < y->item);
 }
 
-/* Returns the largest number of pairs with one model. The pairs are sorted. */
+/* Returns the largest number of pairs with the same model. The pairs must be sorted. */
 static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
 {
     uint64_t longest = 0;
@@ -113,9 +112,9 @@ ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a, const double
     return status;
 }
 
-/* --- stretches --- */
+/* --- ranges of rows --- */
 
-/* Input of one thread, gathered in the order of the curve. */
+/* The rows and results of a range, in the order of the curve. */
 typedef struct gathered {
     double *rows;
     char *out;
@@ -159,7 +158,7 @@ static ebpo_status query_stretch(void *context, uint64_t begin, uint64_t end, un
 
 /* --- laps --- */
 
-/* Returns true if ordering this many points is worth the time. */
+/* Returns true if sorting this number of points saves time. */
 static bool needs_order(const ebpo_catalogue_job *j, uint64_t count)
 {
     return j->ordered && count > UNORDERED &&

@@ -1,11 +1,12 @@
-/* Writes catalogues as JSON files for ebpo_catalogue_open. Boxes read back bit for bit, and counts
- * below 2^53 exactly; entries without `file_bytes` are written without their counts.
+/* Writes catalogues as JSON files for ebpo_catalogue_open. The boxes that ebpo_catalogue_open reads
+ * are equal bit for bit, and counts below 2^53 are equal. Entries without `file_bytes` are written
+ * without counts.
  *
- * Paths that begin with the folder of the file become relative to it, so that a folder of models
- * and its catalogue can be moved together; a path that would then be read differently stays as it
- * is. Numbers have the fewest digits that read back as the same double, in any locale. A path that
- * is not UTF-8, which JSON cannot represent, is refused before anything is written. The file is
- * replaced atomically (io/publish.h).
+ * Paths that begin with the folder of the file become relative to this folder, so that a folder of
+ * models and its catalogue can be moved together. Paths that would have another meaning without the
+ * folder are not changed. Numbers have the fewest digits from which the same double is read, in any
+ * locale. A path that is not UTF-8, which JSON cannot represent, is refused before anything is
+ * written. The file is replaced atomically (io/publish.h).
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -36,8 +37,8 @@ static void write_text(FILE *to, const char *text)
     fputc('"', to);
 }
 
-/* Finds the fewest digits that read back as the same double in the form "1.5e+00", in any locale.
- * Returns the number of digits; sets `digits` and the exponent of ten. */
+/* Finds the fewest digits from which the same double is read, in any locale. Returns the number of
+ * digits, and sets `digits` and the exponent of ten of the first digit. */
 static int fewest_digits(double x, char digits[20], int *exponent)
 {
     char text[40];
@@ -57,7 +58,7 @@ static int fewest_digits(double x, char digits[20], int *exponent)
     return count;
 }
 
-/* Writes a number in the form of printf's %.17g, with no more digits than needed. */
+/* Writes a number in the form of printf's %.17g, with the fewest digits. */
 static void write_number(FILE *to, double x)
 {
     char digits[20];

@@ -1,18 +1,18 @@
 /* Keeps open models of any number of catalogues, all within one memory budget.
  *
  * A model is identified by the path and digest of its file, the options of opening, its face
- * numbers, and its share of the budget. The share is the same for each model of a catalogue, but at
- * least an eighth of the budget. A model is opened by the first query that needs it. A querying
- * thread holds the model, and its share is taken as long as any thread does. When memory is short,
- * models that no thread holds are closed, the least recently used first; if that is not enough, the
- * query waits until others are done. A thread holds one model at a time, so that no thread waits
- * for itself.
+ * numbers, and the share of the budget. All models of a catalogue have equal shares, of at least an
+ * eighth of the budget. A model is opened by the first query that needs it. A thread that queries a
+ * model holds the model, and the share is reserved while any thread holds the model. When memory is
+ * short, models that no thread holds are closed, the least recently used first. If memory is still
+ * short, the query waits until other queries end. A thread holds one model at a time, so that no
+ * thread waits for itself.
  *
  * The file is compared with its catalogue: the digest when the file is opened, and the box whenever
- * the model is lent, as two entries may describe one file differently.
+ * the model is lent, because two entries may describe one file differently.
  *
- * Locks: one lock is for the list and its sums; it is never held during a query or while a file is
- * opened, but while one is closed. Each model has a lock for opening and a lock for queries. */
+ * Locks: one lock is for the list and its sums. It is held while a file is closed, but never during
+ * a query or while a file is opened. Each model has a lock for opening and a lock for queries. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>
@@ -24,12 +24,12 @@
 #include "core/error.h"
 
 /* Maximum number of models that are queried at a time, if there are many; maximum number of open
- * models. The system may allow fewer: each model has one or two open files. */
+ * models. The system may allow fewer open models, because each model has one or two open files. */
 enum { SHARES = 8, OPEN_MAX = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
 
 /* Identity of a requested model. */
 typedef struct wanted {
-    const char *path, *numbers; /* numbers: NULL if there are no face numbers */
+    const char *path, *numbers; /* path of the model; path of its face numbers, or NULL */
     uint8_t digest[32];
     uint64_t share; /* maximum bytes; 0: no limit */
     ebpo_catalogue_open_fn open_file;
@@ -38,15 +38,16 @@ typedef struct wanted {
 } wanted;
 
 struct ebpo_catalogue_held {
-    ebpo_catalogue_held *before, *behind; /* list in the order of use, the latest first */
-    wanted key;                           /* the model owns the texts of its key */
-    unsigned users;                       /* `users` and the next fields are protected by the lock
-                                           * of all models */
-    uint64_t bytes;                       /* bytes that are counted for the model */
+    ebpo_catalogue_held *before,
+        *behind;    /* neighbours in the list of models, in which the last used model is first */
+    wanted key;     /* the model owns the texts of its key */
+    unsigned users; /* `users` and the next fields are protected by the lock
+                     * of all models */
+    uint64_t bytes; /* bytes that are counted for the model */
     pthread_mutex_t opening; /* protects the contexts, and the next fields until `model` is set */
-    pthread_rwlock_t query_lock; /* locked exclusively for a query that must run alone */
+    pthread_rwlock_t query_lock; /* held exclusively by a query that must run alone */
     ebpo_file *file;
-    ebpo_model *_Atomic model; /* for sums it is read without that lock */
+    ebpo_model *_Atomic model; /* for sums, `model` is read without the lock for opening */
     ebpo_catalogue_numbers numbers;
     ebpo_context *idle[CONTEXTS_KEPT];
     unsigned idle_count;
@@ -269,8 +270,8 @@ static bool has_capacity(const ebpo_catalogue_models *h, uint64_t size, unsigned
     return h->held + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
 }
 
-/* Closes idle models until `size` more bytes are available. Returns true if they are available, or
- * if no other model is used, so that waiting would not help. */
+/* Closes idle models until `size` more bytes are available. Returns true if these bytes are
+ * available, or if no other model is used, so that waiting would not make memory available. */
 static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *but)
 {
     unsigned more = but == NULL;
@@ -296,8 +297,8 @@ static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c
     return h->memory && !share ? 1 : share; /* 0 would mean no limit */
 }
 
-/* Returns the model with this key, new or already open, as used by the calling thread. Returns NULL
- * without memory. */
+/* Returns the model with this key, which may be new, and counts the calling thread as its user.
+ * Returns NULL when memory is short. */
 static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
                                           wanted *key)
 {
@@ -322,7 +323,8 @@ static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_c
         if (!m->users++) {
             h->busy++;
             h->taken +=
-                key->share - m->bytes; /* its use of memory may grow or shrink from now on */
+                key->share -
+                m->bytes; /* while the model is used, it may need any memory up to its share */
             m->bytes = key->share;
         }
     }
@@ -350,8 +352,8 @@ static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 
 /* --- lending --- */
 
-/* Runs a query while no other one runs. Contexts hold their last subtrees, so they are freed first:
- * their memory becomes available for this query. */
+/* Runs a query while no other query of the model runs. Contexts hold the last used subtrees. Idle
+ * contexts are freed first, so that their memory is available for this query. */
 static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_query, void *user,
                                ebpo_error *error)
 {

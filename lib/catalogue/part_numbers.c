@@ -1,10 +1,10 @@
-/* Reads, for each face of a part, its index in the whole model. The file is a .npy of integers with
- * one dimension (NumPy's format, versions 1 to 3), from which any thread reads single numbers when
- * needed.
+/* Reads the index in the whole model of each face of a part. The file is a .npy file of integers
+ * with one dimension (NumPy's format, versions 1 to 3). Any thread may read single numbers when
+ * they are needed.
  *
  * The file is untrusted input, as is the catalogue that refers to it. Its header is read once: the
- * type, the byte order, and the count of numbers, which must match the file's size. An invalid face
- * number, negative or beyond 2^63, is refused when it is read. */
+ * type, the byte order, and the count of numbers, which must match the file's size. A number that
+ * is negative or beyond 2^63 is refused when it is read. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -24,7 +24,7 @@ static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *erro
                           "is not a .npy array of integers with one dimension: %s", what);
 }
 
-/* Returns the text after 'key': in the header, or NULL. */
+/* Returns the text after `key` and a colon in the header, or NULL. */
 static const char *value_of(const char *head, const char *key)
 {
     const char *at = strstr(head, key);
@@ -44,7 +44,7 @@ static bool read_type(ebpo_catalogue_numbers *f, const char *at)
     return true;
 }
 
-/* Reads the shape, (N,). */
+/* Reads the shape, which must be (N,). */
 static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
 {
     char *end;
