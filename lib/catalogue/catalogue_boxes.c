@@ -134,8 +134,9 @@ typedef struct walk {
     double pad;          /* ray: margin, more than the rounding error */
     uint32_t item;
     ebpo_catalogue_pairs *out; /* NULL: only `reach` is computed */
+    /* returns false if the box, and all boxes below it, are skipped */
     bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *least);
-    bool failed;
+    bool failed; /* memory is short */
 } walk;
 
 static void append_pair(walk *w, uint32_t box, double least)
@@ -165,6 +166,7 @@ static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-rec
         descend_boxes(w, level - 1, child);
 }
 
+/* Visits all boxes that w->keep accepts. Returns false when memory is short. */
 static bool walk_boxes(walk *w)
 {
     if (w->t->levels)

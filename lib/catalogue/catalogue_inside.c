@@ -32,8 +32,8 @@ enum { DIRECTIONS = 64 };
 
 /* Result for a point from the models that were queried so far. */
 typedef struct found {
-    int64_t winding;
-    bool in, on;
+    int64_t winding; /* sum of the winding numbers */
+    bool in, on;     /* the point is inside a model; on a face of a model */
 } found;
 
 static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_held *model,

@@ -55,12 +55,12 @@ struct ebpo_catalogue_held {
 
 struct ebpo_catalogue_models {
     unsigned threads, open_max;
-    pthread_mutex_t lock; /* protects all fields below */
-    pthread_cond_t changed;
-    uint64_t memory;
-    ebpo_catalogue_held *first, *last;
-    unsigned held, busy;
-    uint64_t taken;
+    pthread_mutex_t lock;              /* protects all fields below */
+    pthread_cond_t changed;            /* signalled when memory may have become available */
+    uint64_t memory;                   /* budget in bytes; 0: no limit */
+    ebpo_catalogue_held *first, *last; /* list of all models */
+    unsigned held, busy;   /* number of models in the list; number of models with users */
+    uint64_t taken;        /* sum of the models' bytes */
     uint64_t closed;       /* number of closed models */
     ebpo_model_stats gone; /* sums of the closed models */
 };
@@ -427,6 +427,8 @@ ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *fac
 
 /* --- creating and freeing --- */
 
+/* Returns the maximum number of open models. They may use half of the files that the system allows
+ * to be open. */
 static unsigned may_be_open(void)
 {
     struct rlimit most;

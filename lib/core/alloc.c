@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 
+/* Sets *bytes to count * size, but at least 1. Returns false if the product is too large. */
 static bool size_ok(uint64_t count, size_t size, size_t *bytes)
 {
     uint64_t product;

@@ -35,6 +35,7 @@ static void mix_state(uint32_t s[3])
     }
 }
 
+/* Mixes the state for the last time, and returns the hash. */
 static uint32_t finish_state(uint32_t s[3])
 {
     static const uint8_t turn[7] = { 14, 11, 25, 16, 4, 14, 24 };

@@ -33,7 +33,7 @@ typedef struct run {
 
 typedef struct worker {
     run *r;
-    unsigned number;
+    unsigned number; /* index of the worker; the calling thread is worker 0 */
     pthread_t thread;
 } worker;
 
@@ -115,6 +115,7 @@ bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_
     return ebpo_progress_step(progress, stage, 0, 0, error);
 }
 
+/* Converts the progress of a pass to the progress of the whole stage, and reports it. */
 static bool report_pass(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const ebpo_pass *p = user;

@@ -42,7 +42,7 @@ bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64
  * to `end` of a stage with `of` passes, so that the reported progress of the stage never goes back.
  */
 typedef struct ebpo_pass {
-    const ebpo_progress *to; /* NULL is allowed */
+    const ebpo_progress *to; /* progress of the stage; NULL is allowed */
     uint64_t begin, end, of;
 } ebpo_pass;
 

@@ -58,6 +58,7 @@ static _Thread_local struct {
     void *context;
 } ebpo_sorting;
 
+/* Calls the comparison of the sort that this thread runs. */
 static inline int ebpo_compare_now(const void *a, const void *b)
 {
     return ebpo_sorting.compare(a, b, ebpo_sorting.context);

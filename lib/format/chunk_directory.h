@@ -18,6 +18,8 @@ enum {
     /* attributes follow */
 };
 
+/* Returns the number of array indices: of all arrays of the format, present or absent, and of the
+ * file's attributes. */
 static inline int ebpo_all_arrays(const ebpo_file *file)
 {
     return EBPO_ARRAYS_OF_FORMAT + file->attributes.arrays;

@@ -284,6 +284,7 @@ static uint64_t *row_of(const counting *c, uint64_t subtree)
     return c->sums->before + subtree * c->sums->cols;
 }
 
+/* Returns the sum of one column of a level before a subtree. `what`: EBPO_S_... */
 static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned what)
 {
     return row_of(c, subtree)[ebpo_subtree_column(c->info, level, what)];

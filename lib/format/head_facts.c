@@ -591,6 +591,7 @@ static ebpo_status get_word(ebpo_head *in, ebpo_head_object id, const char *obje
     return wrong_value(in, object, f->name, error);
 }
 
+/* Returns the value of a lower-case hexadecimal digit, or -1. */
 static int hex_digit(char c)
 {
     return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;

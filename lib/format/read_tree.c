@@ -41,7 +41,7 @@ static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *l
 
 typedef struct refs_job {
     const ebpo_file *file;
-    int number;
+    int number; /* number of the level */
     ebpo_level *level;
     const uint64_t *index; /* sums of leaf_index, three for each EBPO_INDEX_ROWS leaves */
 } refs_job;

@@ -211,6 +211,7 @@ static uint64_t subtree_count(const ebpo_info *info)
     return info->level[info->subtree_level].gray_count;
 }
 
+/* Returns the number of chunks of the array of subtree counts. */
 static uint64_t subtree_chunks(const ebpo_info *info)
 {
     uint64_t rows = ebpo_subtree_rows(info);
@@ -233,6 +234,7 @@ uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id)
                : ebpo_schema[id].cols;
 }
 
+/* Reads the uint64_t member of a struct at an offset. */
 static uint64_t load_field(const void *record, size_t offset)
 {
     uint64_t value;

@@ -21,6 +21,7 @@ enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
  */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
+/* Returns false if min > max on an axis, or a coordinate is too large or NaN. */
 static bool extents_usable(const double min[3], const double max[3])
 {
     for (int k = 0; k < 3; k++)

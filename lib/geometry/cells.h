@@ -141,6 +141,8 @@ static inline void ebpo_cell_bounds(const ebpo_box *box, ebpo_cell cell, double 
     }
 }
 
+/* Returns the position on an axis of the cell that contains the coordinate p, which must be within
+ * the root cell. */
 static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int axis, double p)
 {
     double cells = (double)(1u << level), guess = (p - box->origin[axis]) / box->size[axis] * cells;
@@ -230,6 +232,7 @@ static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, i
 
 typedef uint64_t ebpo_octcode;
 
+/* Returns true if the code is that of a cell at one of the levels 0 .. EBPO_MAX_LEVEL. */
 static inline bool ebpo_octcode_valid(ebpo_octcode code)
 {
     if (code == 0)

@@ -32,6 +32,8 @@ static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 static bool is_sign(char c) { return c == '+' || c == '-'; }
 
+/* Adds an exponent to d->exponent. `s`: digits without sign. Returns false if other characters
+ * follow. */
 static bool scan_exponent_of(decimal *d, bool negative, const char *s, const char *end)
 {
     int32_t e = 0;
@@ -49,6 +51,7 @@ static bool scan_exponent(decimal *d, const char *s, const char *end)
     return s < end && scan_exponent_of(d, negative, s, end);
 }
 
+/* Parses digits, decimal point and exponent. Returns false for other text. */
 static bool scan_number(decimal *d, const char *s, const char *end)
 {
     *d = (decimal){ .short_form = true };
@@ -104,6 +107,7 @@ static bool scan_foreign_word(double *out, const char *s, size_t n)
     return false;
 }
 
+/* Parses nan, inf and infinity with an optional sign. Returns false for other text. */
 static bool scan_word(double *out, const char *s, size_t n)
 {
     bool negative = n && *s == '-';
@@ -123,6 +127,7 @@ static bool scan_word(double *out, const char *s, size_t n)
     return true;
 }
 
+/* Converts by method 1. Returns false if this method does not apply. */
 static bool one_operation(double *out, const decimal *d)
 {
     if (!d->short_form || d->digits > (UINT64_C(1) << 53) || d->exponent < -22 || d->exponent > 22)

@@ -40,6 +40,7 @@ static inline ebpo_pair root_of_quotient(ebpo_pair a, ebpo_pair b, double first)
     return (ebpo_pair){ first, rest / (2 * first * b.head) };
 }
 
+/* Returns the 1-norm: the sum of the absolute components, rounded. */
 static inline double norm_1(const ebpo_pair a[3])
 {
     return fabs(a[0].head) + fabs(a[1].head) + fabs(a[2].head);

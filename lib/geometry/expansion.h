@@ -43,6 +43,7 @@ static inline ebpo_pair ebpo_two_product(double a, double b)
 #endif
 }
 
+/* Appends x to an expansion of n components, unless x is 0. Returns the number of components. */
 static inline int ebpo_expansion_push(double *out, int n, double x)
 {
     if (x != 0)

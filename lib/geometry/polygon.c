@@ -66,6 +66,7 @@ static void fill_tables(const ebpo_chain *c, double *cost, uint16_t *apex)
         }
 }
 
+/* Writes the triangulation of least area. Returns false when memory is short. */
 static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
 {
     uint64_t n = c->n, written = 0, open = 0;
@@ -97,15 +98,16 @@ static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
 
 typedef struct chain_ear {
     double area;
-    uint32_t tip;
+    uint32_t tip; /* middle point of the ear */
     /* version of the tip when the ear was computed; the ear is outdated if the tip has a newer
      * version */
     uint32_t version;
-    bool reflex;
+    bool reflex; /* the ear bends outward */
 } chain_ear;
 
 typedef struct cutting {
     const ebpo_chain *chain;
+    /* [n] previous and next point of the remaining chain; number of ears computed for each point */
     uint32_t *before, *after, *version;
     double normal[3]; /* area vector of the chain */
     chain_ear *heap;  /* the least ear first */
@@ -168,6 +170,7 @@ static void start_cutting(cutting *c)
         push_ear(c, i);
 }
 
+/* Cuts a chain ear by ear. Returns false when memory is short. */
 static bool cut_least_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
     uint64_t n = chain->n, written = 0;
@@ -271,6 +274,7 @@ typedef struct tested_ear {
     bool along_a, along_c; /* another edge runs from b's position towards a; towards c */
 } tested_ear;
 
+/* Returns 1 if the corners a, b, c turn counter-clockwise, -1 if clockwise, otherwise 0. */
 static int turn_of_corners(const outline *o, uint32_t a, uint32_t b, uint32_t c)
 {
     return ebpo_orient2d(o->at[a], o->at[b], o->at[c]);
@@ -432,6 +436,8 @@ static bool edge_enters(const outline *o, const tested_ear *e, const int side[3]
     return true;
 }
 
+/* Returns true if corner i blocks the ear. If corner i is at the position of the ear's corner b,
+ * also records the edges that run along the ear. */
 static bool corner_blocks(const outline *o, tested_ear *e, uint32_t i)
 {
     const double *p = o->at[i];
@@ -480,6 +486,7 @@ static uint32_t blocker_in_tree(outline *o, tested_ear *e)
     return NONE;
 }
 
+/* Returns a corner that blocks the ear, or NONE. */
 static uint32_t find_blocker(outline *o, tested_ear *e)
 {
     if (o->leaves)
@@ -557,6 +564,7 @@ static bool is_spike(const outline *o, uint32_t b)
            is_along(o->at[b], o->at[a], o->at[c]);
 }
 
+/* Returns the first tip of a spike, from corner b on, or NONE. */
 static uint32_t find_spike(outline *o, uint32_t b)
 {
     for (uint32_t i = 0; i < o->left; i++, b = o->next[b]) {

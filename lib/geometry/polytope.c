@@ -232,7 +232,8 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
 typedef struct cut {
     const ebpo_polytope *in;
     ebpo_polytope *out;
-    double dist[EBPO_POLYTOPE_VERTICES];
+    double dist[EBPO_POLYTOPE_VERTICES]; /* signed distance of each vertex of `in` from the plane;
+                                            positive: removed */
     uint16_t number[EBPO_POLYTOPE_VERTICES]; /* indices of kept vertices in `out` */
     bool on[EBPO_POLYTOPE_VERTICES]; /* true if the vertex of `out` is on the cutting plane */
     /* cut edges: their vertices in `in`, and the new vertex in `out` */
@@ -245,7 +246,7 @@ typedef struct cut {
         uint16_t from, to;
     } rim[EBPO_POLYTOPE_CORNERS];
     int rims;
-    bool full;
+    bool full; /* the capacity of `out` is exceeded */
     /* vertices of `in` are on the plane, so rim edges may have kept faces on both sides */
     bool touched;
 } cut;

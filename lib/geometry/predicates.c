@@ -32,6 +32,7 @@ static int unit_exponent(double x)
     return e - 53;
 }
 
+/* Returns the least unit_exponent of the numbers; INT_MAX if all are 0. */
 static int common_exponent(const double *x, int n)
 {
     int least = INT_MAX;

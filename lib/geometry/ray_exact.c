@@ -27,9 +27,9 @@ typedef struct integer_scene {
 /* The intersection of the line and the triangle, in the units of integer_scene: an interval of the
  * parameter. */
 typedef struct stretch {
-    bool any;
+    bool any; /* false: no common point, and the other members are unused */
     int side, facing;
-    mpq_t low, high;
+    mpq_t low, high; /* ends of the interval */
 } stretch;
 
 /* --- integers --- */

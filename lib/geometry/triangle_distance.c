@@ -333,6 +333,7 @@ static ebpo_feature certain_feature(const relation *r)
     return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
 }
 
+/* Returns the distance of p from the triangle's plane, and its error bound. */
 static double plane_distance(const relation *r, double *error)
 {
     double length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
@@ -453,8 +454,8 @@ typedef struct nearest {
                                                  */
     mpz_t offset_denominator;
     ebpo_feature feature;
-    mpz_t t, u;
-    ebpo_vectorz w;
+    mpz_t t, u;     /* scratch */
+    ebpo_vectorz w; /* scratch */
 } nearest;
 
 static void nearest_init(nearest *n)

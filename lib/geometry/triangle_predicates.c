@@ -152,6 +152,7 @@ static bool rectangle_on_side(const shadow *s, const double a[2], const double b
     return ebpo_orient2d(a, b, corner) == side;
 }
 
+/* Returns true if an edge of the projected triangle separates the triangle from the rectangle. */
 static bool shadows_apart(const shadow *s)
 {
     for (int i = 0; i < 3; i++) {

@@ -93,6 +93,7 @@ bool ebpo_corners_decode(const uint8_t *file, uint64_t rows, uint64_t *seen, uin
     return true;
 }
 
+/* Returns element i of an array of unsigned integers of `size` bytes. */
 static uint64_t get_native(const void *values, size_t size, uint64_t i)
 {
     switch (size) {
@@ -117,6 +118,7 @@ void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t
     }
 }
 
+/* Reads a little-endian integer. Signed integers are sign-extended to 64 bits. */
 static uint64_t load_integer(const uint8_t *p, size_t size, bool is_signed)
 {
     switch (size) {

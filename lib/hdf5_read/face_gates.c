@@ -34,8 +34,8 @@ enum { AS_CODES = 1 }; /* first byte of a chunk of shuffled codes, without gates
  * to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32, as in codes. */
 typedef struct open_edges {
     uint64_t edge[SPACE];
-    uint32_t begin, end;
-    uint32_t seen;
+    uint32_t begin, end; /* range of the open edges in `edge` */
+    uint32_t seen;       /* number of new vertices so far */
 } open_edges;
 
 static uint64_t edge_of(uint32_t from, uint32_t to) { return from | (uint64_t)to << 32; }
@@ -264,7 +264,8 @@ void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
 /* ---- reading ---- */
 
 typedef struct reading {
-    const uint8_t *gate, *third, *low, *more, *end;
+    const uint8_t *gate, *third, *low, *more; /* next byte of each stream */
+    const uint8_t *end;                       /* end of the stream `more` */
     open_edges open;
 } reading;
 

@@ -109,6 +109,7 @@ static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
            (!is_large || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
 }
 
+/* Encodes the blocks of a chunk in one frame. Returns the frame's size, or a zstd error. */
 static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes,
                             const ebpo_chunk_blocks *b, uint8_t *out)
 {

@@ -38,6 +38,8 @@ static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, si
     return used;
 }
 
+/* Replaces the buffer by its compressed content. Returns the compressed size, or 0 after an error.
+ */
 static size_t compress_chunk(size_t level_count, const unsigned level[], size_t bytes,
                              size_t *buffer_size, void **buffer)
 {
@@ -106,6 +108,7 @@ static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
     return 0;
 }
 
+/* The filter function that HDF5 calls for each chunk. Returns the new size, or 0 after an error. */
 static size_t filter_chunk(unsigned flags, size_t cd_count, const unsigned cd_values[],
                            size_t bytes, size_t *buffer_size, void **buffer)
 {

@@ -203,6 +203,7 @@ static void merge_wanted(ebpo_async *a, uint64_t gap)
     a->wanted_count = kept;
 }
 
+/* Adds a range to the wanted ranges. Returns false when memory is short. */
 static bool record_wanted(ebpo_async *a, ebpo_range range)
 {
     if (a->wanted_count && a->wanted_count % COMPACT_COUNT == 0)

@@ -75,7 +75,7 @@ static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_htt
 /* --- removing old blocks --- */
 
 typedef struct entry {
-    struct timespec used;
+    struct timespec used; /* time of the last use */
     uint64_t bytes;
     char name[NAME_BYTES];
 } entry;
@@ -86,7 +86,8 @@ static bool ends_with(const char *name, const char *end)
     return n >= e && strcmp(name + n - e, end) == 0;
 }
 
-static int is_older(const void *a, const void *b)
+/* Compares entries for qsort: the least recently used entry comes first. */
+static int compare_use_times(const void *a, const void *b)
 {
     const struct timespec *x = &((const entry *)a)->used, *y = &((const entry *)b)->used;
     if (x->tv_sec != y->tv_sec)
@@ -155,7 +156,7 @@ static void trim_folder(ebpo_disk *d)
     uint64_t count, bytes;
     entry *entries = list_entries(d, &count, &bytes);
     if (bytes > d->limit / 8 * 7) {
-        qsort(entries, count, sizeof *entries, is_older);
+        qsort(entries, count, sizeof *entries, compare_use_times);
         for (uint64_t i = 0; i < count && bytes > d->limit / 4 * 3; i++)
             if (unlinkat(d->folder, entries[i].name, 0) == 0)
                 bytes -= entries[i].bytes;
@@ -402,6 +403,7 @@ static void remove_at(ebpo_range_cache *p, uint64_t i)
     p->count--;
 }
 
+/* Inserts the range [begin, end) at index i. Returns false when memory is short. */
 static bool insert_range(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     ebpo_cached_range *range = ebpo_alloc_zero(1, sizeof *range);

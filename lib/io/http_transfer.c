@@ -133,12 +133,12 @@ typedef struct ebpo_slot {
 } ebpo_slot;
 
 struct ebpo_transfers {
-    const char *url, *shown;
+    const char *url, *shown; /* `shown` is the URL in messages, without login data */
     const ebpo_http_options *options;
     pthread_mutex_t *lock;
-    pthread_cond_t *done;
+    pthread_cond_t *done; /* signalled when a request ends */
     CURLM *multi;
-    struct curl_slist *headers, *bare_headers; /* headers with, and without, those of the caller */
+    struct curl_slist *headers, *bare_headers; /* headers with and without the caller's headers */
     pthread_t thread;
     bool running;
     ebpo_slot slots[EBPO_SLOTS_MAX];
@@ -185,6 +185,8 @@ static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t
     return s->stalled;
 }
 
+/* Called by libcurl with each line of the head. Returns 0 to end the transfer, otherwise the number
+ * of bytes. */
 static size_t receive_header(char *line, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
@@ -215,6 +217,7 @@ static void judge_slot(ebpo_slot *s)
     s->has_verdict = true;
 }
 
+/* Ends the transfer with an error. Returns 0, the result of receive_body that stops libcurl. */
 static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
 {
     s->verdict = EBPO_HTTP_REFUSED;
@@ -224,6 +227,7 @@ static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
     return 0;
 }
 
+/* Stores bytes of the requested range. Returns `size`, or 0 after an error. */
 static size_t receive_part(ebpo_slot *s, const char *bytes, size_t size)
 {
     uint64_t capacity = s->response.last + 1 - s->begin - s->taken;
@@ -237,6 +241,7 @@ static size_t receive_part(ebpo_slot *s, const char *bytes, size_t size)
     return size;
 }
 
+/* Stores bytes of the whole file. Returns `size`, or 0 after an error. */
 static size_t receive_whole(ebpo_slot *s, const char *bytes, size_t size)
 {
     ebpo_request *r = s->request;
@@ -252,6 +257,8 @@ static size_t receive_whole(ebpo_slot *s, const char *bytes, size_t size)
     return size;
 }
 
+/* Called by libcurl with bytes of the body. Returns 0 to end the transfer, otherwise the number of
+ * bytes. */
 static size_t receive_body(char *bytes, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
@@ -434,6 +441,7 @@ static void enqueue_request(ebpo_transfers *t, ebpo_request *r)
     *at = r;
 }
 
+/* Removes a request from the queue. Returns false if the request is not in the queue. */
 static bool dequeue_request(ebpo_transfers *t, ebpo_request *r)
 {
     for (ebpo_request **at = &t->queue; *at; at = &(*at)->next)

@@ -234,6 +234,7 @@ FILE *ebpo_publish_stream(ebpo_publish *publish)
     return publish->stream;
 }
 
+/* Closes the stream or the descriptor. Returns false if data could not be written. */
 static bool close_writer(ebpo_publish *publish)
 {
     bool good = true;
@@ -250,6 +251,7 @@ static bool close_writer(ebpo_publish *publish)
     return good;
 }
 
+/* Returns false, with errno, if the sync fails. */
 static bool sync_and_close(int fd)
 {
     /* EINVAL: a file system without sync of folders */
@@ -260,6 +262,7 @@ static bool sync_and_close(int fd)
     return good;
 }
 
+/* Returns false, with errno, if the folder cannot be synced. */
 static bool sync_folder(const char *path)
 {
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_DIRECTORY);

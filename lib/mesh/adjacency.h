@@ -19,6 +19,7 @@ EBPO_MUST_USE ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mes
                                            const ebpo_progress *progress, ebpo_error *error);
 void ebpo_stars_free(ebpo_stars *stars);
 
+/* Returns the number of faces in the star of v. */
 static inline uint64_t ebpo_stars_degree(const ebpo_stars *stars, uint32_t v)
 {
     return stars->first[v + (uint64_t)1] - stars->first[v];

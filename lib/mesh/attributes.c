@@ -237,7 +237,7 @@ ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *f
 typedef struct picking {
     ebpo_workspace *workspace;
     const ebpo_attribute *from;
-    const uint32_t *rows;
+    const uint32_t *rows; /* [count] row of `from` for each row of `made` */
     uint64_t count;
     ebpo_attribute made;
 } picking;
@@ -253,6 +253,7 @@ static void pick_columns(picking *p)
     }
 }
 
+/* Returns the index of the first item of a row's list. */
 static uint64_t list_begin(const ebpo_attribute *a, uint64_t row)
 {
     return row ? a->ends[row - 1] : 0;

@@ -155,14 +155,14 @@ EBPO_MUST_USE ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo
 
 enum { EBPO_COLOUR_CHANNELS = 4 }; /* red, green, blue and an optional alpha */
 
-/* A column of a numeric array. `of` is NULL if the mesh has no such column. */
+/* A column of a numeric array. */
 typedef struct ebpo_colour_column {
-    const ebpo_attribute *of;
+    const ebpo_attribute *of; /* the array; NULL: the mesh has no such column */
     uint32_t column;
 } ebpo_colour_column;
 
-/* Finds the colour columns of "vertex" or "face". Returns false without red, green and blue, or
- * when `in` is NULL. */
+/* Finds the colour columns of "vertex" or "face". Returns false if red, green or blue is missing,
+ * or `in` is NULL. */
 bool ebpo_colour_columns(const ebpo_attributes *in, const char *element,
                          ebpo_colour_column out[EBPO_COLOUR_CHANNELS]);
 

@@ -260,6 +260,7 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
     return true;
 }
 
+/* Connects the edges at all vertices. Returns false when memory is short. */
 static bool connect_all(chaining *c)
 {
     uint64_t a = 0, d = 0, visits = 0;
@@ -417,7 +418,7 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
 
 typedef struct rank {
     uint64_t key;
-    uint32_t number, triangles;
+    uint32_t number, triangles; /* index of the loop; number of triangles that close it */
 } rank;
 
 typedef struct ranking {

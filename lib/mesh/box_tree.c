@@ -155,6 +155,7 @@ typedef struct walking {
     void *user;
 } walking;
 
+/* Visits the points p[count] below a node. Returns false as soon as `visit` does. */
 static bool walk_node(const walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
     ebpo_box_node n = { &w->tree->node[node], &w->filled[node], count };

@@ -201,7 +201,7 @@ typedef struct scratch {
     uint32_t *fans; /* disjoint sets of the star's faces (parents); a fan is a set of faces joined
                        across edges */
     uint64_t fan_capacity;
-    ebpo_same_faces same;
+    ebpo_same_faces same; /* faces of the star with equal vertices */
     ebpo_boundary *boundary;
     unsigned worker;
 } scratch;
@@ -212,6 +212,8 @@ typedef struct star_pass {
     scratch *scratch; /* one for each worker */
 } star_pass;
 
+/* Returns the root of the fan that contains face i of the star, and shortens the path to this root.
+ */
 static uint32_t fan_root(uint32_t *fans, uint32_t i)
 {
     while (fans[i] != i)
@@ -509,7 +511,7 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
  * adjacent. */
 typedef struct curve_run {
     const ebpo_mesh *mesh;
-    uint64_t at, end;
+    uint64_t at, end; /* the remaining vertices of the range: indices at .. end - 1 */
 } curve_run;
 
 /* Compares the next vertices of two runs along the curve, in the order in which the mesh is

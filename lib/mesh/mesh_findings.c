@@ -79,7 +79,7 @@ typedef struct finding_search {
     ebpo_findings_options options;
     ebpo_findings_fn take;
     void *user;
-    ebpo_found_list all;
+    ebpo_found_list all; /* locations of all kinds, sorted */
     uint32_t *component; /* [vertex_count] */
     ebpo_stars stars;
     uint64_t *faces; /* faces around the current location */

@@ -159,6 +159,7 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_erro
  * and cubes of values between 2^-256 and 2^256 are far from overflow and underflow. */
 enum { EBPO_EXPONENT_MAX = 256 };
 
+/* Returns true if a value with this exponent must be scaled. */
 static inline bool ebpo_exponent_is_far(int exponent)
 {
     return exponent > EBPO_EXPONENT_MAX || exponent < -EBPO_EXPONENT_MAX;

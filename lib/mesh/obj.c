@@ -550,6 +550,7 @@ static ebpo_status read_faces(obj_reading *r)
 
 enum { MAX_WORDS = 8 };
 
+/* Reads the next words of the statement. Returns their number, at most MAX_WORDS. */
 static int read_words(obj_reading *r, ebpo_obj_word word[MAX_WORDS])
 {
     int n = 0;

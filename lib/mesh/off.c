@@ -108,10 +108,12 @@ typedef struct off_reading {
     rows_in rows;
     off_word rest[MAX_REST]; /* extra words of the row */
     int rest_count;
-    bool broken;                                       /* a colour is not an integer */
-    float most;                                        /* greatest colour value */
+    bool not_bytes;        /* a colour is not an integer from 0 to 255 */
+    float greatest_colour; /* greatest colour value */
     uint64_t surplus_vertices, surplus_faces, indexed; /* numbers of rows with omitted values */
-    uint64_t divided;
+    uint64_t divided; /* number of vertices with a weight other than 1 */
+    /* alpha: a colour has an opacity; both: vertices and faces have colours; more: text follows the
+     * last face */
     bool alpha, both, more;
 } off_reading;
 
@@ -295,8 +297,8 @@ static ebpo_status keep_values(off_reading *r, ebpo_import_sort sort, int first,
             continue;
         /* checks the range first: converting NaN to int is undefined */
         bool byte = value[k] >= 0 && value[k] <= 255;
-        r->broken |= memchr(word.s, '.', word.n) || !byte || value[k] != (float)(int)value[k];
-        r->most = value[k] > r->most ? value[k] : r->most;
+        r->not_bytes |= memchr(word.s, '.', word.n) || !byte || value[k] != (float)(int)value[k];
+        r->greatest_colour = value[k] > r->greatest_colour ? value[k] : r->greatest_colour;
     }
     return r->build->attributes ? ebpo_import_row(r->build, sort, value) : EBPO_OK;
 }
@@ -516,7 +518,7 @@ static ebpo_status build_off(ebpo_import_build *b, const ebpo_import_job *job)
         status = read_rows(&r);
     if (status == EBPO_OK)
         status = ebpo_import_end(b);
-    b->table[EBPO_IMPORT_COLOURS].bytes = !r.broken && r.most > 1;
+    b->table[EBPO_IMPORT_COLOURS].bytes = !r.not_bytes && r.greatest_colour > 1;
     if (status == EBPO_OK && b->attributes)
         status = ebpo_import_attributes(b);
     if (status == EBPO_OK && b->attributes)

@@ -34,6 +34,8 @@ static bool parse_word(char *to, size_t capacity, ebpo_ply_word word)
     return strlen(to) == word.n && ebpo_text_ok(to);
 }
 
+/* Writes the names of the properties, separated by spaces. Returns false if they do not fit or are
+ * not valid text. */
 static bool keep_names(char *to, size_t capacity, const ebpo_ply_property *property, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
@@ -205,6 +207,7 @@ static bool value_fits(int64_t value, ebpo_ply_type type)
     return value >= least[type] && value <= most[type];
 }
 
+/* Returns false if the text is not a value of the type. */
 static bool text_bits(ebpo_ply_parser *p, ebpo_ply_type type, ebpo_ply_word token, uint64_t *bits)
 {
     int64_t whole;

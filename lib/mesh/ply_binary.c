@@ -17,6 +17,7 @@
 
 /* --- numbers --- */
 
+/* Reads the bits of a value. `swap`: reverses the byte order. */
 static inline uint64_t load_raw(const uint8_t *at, unsigned bytes, bool swap)
 {
     uint8_t b1;

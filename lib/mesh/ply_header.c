@@ -80,6 +80,7 @@ static bool next_line(reader *r, ebpo_ply_word *line)
     return true;
 }
 
+/* Finds the words of a line. Returns their number, at most MAX_WORDS. */
 static int split_line(ebpo_ply_word line, ebpo_ply_word words[MAX_WORDS])
 {
     int n = 0;

@@ -500,6 +500,7 @@ static void put_corners(writing *w, const ply_out_property *p, uint64_t row)
         put_bytes(w, ebpo_ply_type_bytes(p->type), w->mesh->faces[3 * row + k]);
 }
 
+/* Returns the bits of a value in memory. */
 static uint64_t native_bits(const uint8_t *at, unsigned bytes)
 {
     uint16_t b2;

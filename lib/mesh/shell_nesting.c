@@ -22,8 +22,8 @@
 typedef struct seeker {
     ebpo_box_tree probes; /* samples of these shells, whose values are winding numbers */
     struct probing *all;
-    const ebpo_shell *host;
-    const double (*face)[3];
+    const ebpo_shell *host;  /* current host */
+    const double (*face)[3]; /* [3] corners of the current face of the host */
 } seeker;
 
 typedef struct probing {
@@ -249,6 +249,7 @@ static tally *tally_of(caster *w, int32_t host)
     return t;
 }
 
+/* Adds the crossings of the current ray with some faces. Returns true, so that the walk goes on. */
 static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
 {
     caster *w = user;
@@ -556,6 +557,7 @@ void ebpo_nesting_free(ebpo_nesting *n, const ebpo_mesh *mesh)
 
 /* Turns shells outwards, or inwards if they bound a cavity. */
 
+/* Reverses the faces of a component. Returns their number. */
 static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
 {
     uint64_t begin = c->faces.begin[component], end = c->faces.begin[component + (uint64_t)1];

@@ -128,14 +128,14 @@ typedef struct numbered {
     const ebpo_attribute
         *of_faces; /* attribute of the faces that refers to the names; NULL: none */
     words *name;
-    bool *used;
+    bool *used; /* [count] true: a kept face refers to the name */
     uint64_t count, capacity;
 } numbered;
 
 typedef struct naming {
     ebpo_attributes *all;
     numbered materials, files;
-    bool *kept; /* [rows] */
+    bool *kept; /* [rows of the textures] true: the bytes are kept */
 } naming;
 
 static words trim_words(words t)
@@ -214,6 +214,7 @@ static bool read_header(naming *n)
     return good;
 }
 
+/* Marks the names that the faces refer to. Returns false when memory is short. */
 static bool mark_used(numbered *to, const uint32_t *faces, uint64_t count,
                       ebpo_workspace *workspace)
 {
