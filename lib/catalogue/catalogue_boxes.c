@@ -250,9 +250,9 @@ static bool may_be_found(walk *w, const ebpo_catalogue_box *b, double *least)
                 return false;
             continue;
         }
-        double one = lower / w->d[k], other = upper / w->d[k];
-        near = fmax(near, fmin(one, other));
-        far = fmin(far, fmax(one, other));
+        double lower_t = lower / w->d[k], upper_t = upper / w->d[k];
+        near = fmax(near, fmin(lower_t, upper_t));
+        far = fmin(far, fmax(lower_t, upper_t));
     }
     return !(near > far + EBPO_CATALOGUE_SLACK * fabs(far)) && !(far < 0);
 }

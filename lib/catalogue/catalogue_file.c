@@ -166,12 +166,12 @@ static bool copy_entry(ebpo_catalogue_entry *to, const ebpo_catalogue_entry *fro
 static ebpo_status copy_entries(ebpo_catalogue *c, const ebpo_catalogue_entry *entries,
                                 uint64_t count, ebpo_error *error)
 {
-    const char *given = c->how.folder ? c->how.folder : "";
-    size_t length = strlen(given);
+    const char *folder_option = c->how.folder ? c->how.folder : "";
+    size_t length = strlen(folder_option);
     char *folder = malloc(length + 2);
     c->entry = ebpo_alloc_zero(count, sizeof *c->entry);
     if (folder) {
-        memcpy(folder, given, length + 1);
+        memcpy(folder, folder_option, length + 1);
         if (length && folder[length - 1] != '/')
             memcpy(folder + length, "/", 2);
     }

@@ -136,12 +136,12 @@ typedef struct ebpo_catalogue_job {
     const char *stage;
     size_t width, result; /* numbers in a row; bytes of a result */
     bool ordered; /* true if rows are points, which may be processed along the Morton curve */
-    const double
-        *rows; /* rows of the remaining queries; the next two members begin at the same query */
+    /* rows of the remaining queries; the next two members begin at the same query */
+    const double *rows;
     char *out;
     uint64_t *model; /* model of each result; or NULL */
-    const uint32_t
-        *order; /* order of the rows of the current lap; set while the rows are processed */
+    /* order of the rows of the current lap; set while the rows are processed */
+    const uint32_t *order;
 } ebpo_catalogue_job;
 
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_rows(ebpo_catalogue_job *job, uint64_t count,

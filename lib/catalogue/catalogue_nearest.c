@@ -50,9 +50,9 @@ static ebpo_status merge_nearest(const search *s, const ebpo_catalogue_run *run,
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
         uint32_t item = run->pair[i].item;
-        double now = s->out[item].distance, new = reported[i].distance;
+        double current = s->out[item].distance, candidate = reported[i].distance;
         if (reported[i].face == EBPO_NO_FACE ||
-            !(new < now || (new == now && run->model < s->model[item])))
+            !(candidate < current || (candidate == current && run->model < s->model[item])))
             continue;
         status = ebpo_catalogue_held_face(model, &reported[i].face, error);
         s->out[item] = reported[i];
@@ -242,13 +242,14 @@ static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ra
     if (hit->face == EBPO_NO_FACE || hit->t < INFINITY)
         return EBPO_OK;
     ebpo_ray along = longer_ray(ray);
-    ebpo_ray_hit there;
+    ebpo_ray_hit longer_hit;
     how.sides = s->sides;
     how.threads = 1;
-    ebpo_status status = ebpo_ray_first_many(context, &along, 1, &how, &there, error);
-    *nearer = kept->face == EBPO_NO_FACE || (kept->t == INFINITY && there.t < s->longer_t[item]);
+    ebpo_status status = ebpo_ray_first_many(context, &along, 1, &how, &longer_hit, error);
+    *nearer =
+        kept->face == EBPO_NO_FACE || (kept->t == INFINITY && longer_hit.t < s->longer_t[item]);
     if (status == EBPO_OK && *nearer)
-        s->longer_t[item] = there.t;
+        s->longer_t[item] = longer_hit.t;
     return status;
 }
 

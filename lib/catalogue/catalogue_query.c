@@ -65,18 +65,18 @@ ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_batch *a, ebpo_catalo
         return EBPO_OK;
     qsort(pairs->pair, pairs->count, sizeof *pairs->pair, by_model);
     uint64_t longest = longest_run(pairs);
-    double *some = ebpo_alloc(longest, width * sizeof *some);
-    if (!some)
-        return ebpo_fail_memory(error, longest * width * sizeof *some);
+    double *input = ebpo_alloc(longest, width * sizeof *input);
+    if (!input)
+        return ebpo_fail_memory(error, longest * width * sizeof *input);
     for (uint64_t at = 0; at < pairs->count && status == EBPO_OK;) {
         const ebpo_catalogue_pair *pair = pairs->pair + at;
-        ebpo_catalogue_run run = { .model = pair->box, .pair = pair, .rows = some, .user = user };
+        ebpo_catalogue_run run = { .model = pair->box, .pair = pair, .rows = input, .user = user };
         for (; at < pairs->count && pairs->pair[at].box == run.model; at++, run.count++)
-            memcpy(some + run.count * width, rows + pairs->pair[at].item * width,
-                   width * sizeof *some);
+            memcpy(input + run.count * width, rows + pairs->pair[at].item * width,
+                   width * sizeof *input);
         status = ebpo_catalogue_lend(a->models, a->c, run.model, surface, run_query, &run, error);
     }
-    free(some);
+    free(input);
     return status;
 }
 
@@ -193,13 +193,13 @@ ebpo_status ebpo_catalogue_query_rows(ebpo_catalogue_job *j, uint64_t count, ebp
     bool in_order = needs_order(j, count);
     ebpo_status status = EBPO_OK;
     for (uint64_t at = 0; at < count && status == EBPO_OK; at += LAP) {
-        uint64_t here = count - at < LAP ? count - at : LAP;
-        ebpo_pass pass = { &j->batch.options->progress, at, at + here, count };
+        uint64_t lap_rows = count - at < LAP ? count - at : LAP;
+        ebpo_pass pass = { &j->batch.options->progress, at, at + lap_rows, count };
         ebpo_progress reported = ebpo_pass_progress(&pass);
-        status = query_lap(j, here, in_order, count > LAP ? &reported : pass.to, error);
-        j->rows += here * j->width;
-        j->out += here * j->result;
-        j->model += j->model ? here : 0;
+        status = query_lap(j, lap_rows, in_order, count > LAP ? &reported : pass.to, error);
+        j->rows += lap_rows * j->width;
+        j->out += lap_rows * j->result;
+        j->model += j->model ? lap_rows : 0;
     }
     return status;
 }

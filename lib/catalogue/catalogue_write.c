@@ -113,16 +113,16 @@ static void write_flag(FILE *to, const char *key, bool value)
 
 static void write_entry(FILE *to, const ebpo_catalogue_entry *e, const char *folder)
 {
-    bool known = e->file_bytes > 0;
+    bool has_counts = e->file_bytes > 0;
     write_path(to, "", "path", e->path, folder);
-    if (known)
+    if (has_counts)
         fprintf(to, ",\n      \"bytes\": %" PRIu64, e->file_bytes);
     write_digest(to, "content_sha256", e->digest);
-    if (known)
+    if (has_counts)
         fprintf(to, ",\n      \"faces\": %" PRIu64 ",\n      \"vertices\": %" PRIu64, e->face_count,
                 e->vertex_count);
     write_flag(to, "solid", e->solid);
-    if (known) {
+    if (has_counts) {
         fprintf(to, ",\n      \"rule\": \"%s\"", ebpo_catalogue_rules[e->rule]);
         write_flag(to, "mesh", e->mesh);
         write_flag(to, "pruned", e->pruned);

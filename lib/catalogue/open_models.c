@@ -39,11 +39,11 @@ typedef struct wanted {
 
 struct ebpo_catalogue_held {
     ebpo_catalogue_held *before,
-        *behind;    /* neighbours in the list of models, in which the last used model is first */
-    wanted key;     /* the model owns the texts of its key */
-    unsigned users; /* `users` and the next fields are protected by the lock
-                     * of all models */
-    uint64_t bytes; /* bytes that are counted for the model */
+        *behind;             /* in the list of models, with the last used model first */
+    wanted key;              /* the model owns the texts of its key */
+    unsigned users;          /* `users` and the next fields are protected by the lock
+                              * of all models */
+    uint64_t bytes;          /* bytes that are counted for the model */
     pthread_mutex_t opening; /* protects the contexts, and the next fields until `model` is set */
     pthread_rwlock_t query_lock; /* held exclusively by a query that must run alone */
     ebpo_file *file;
@@ -59,10 +59,10 @@ struct ebpo_catalogue_models {
     pthread_cond_t changed;            /* signalled when memory may have become available */
     uint64_t memory;                   /* budget in bytes; 0: no limit */
     ebpo_catalogue_held *first, *last; /* list of all models */
-    unsigned held, busy;   /* number of models in the list; number of models with users */
-    uint64_t taken;        /* sum of the models' bytes */
-    uint64_t closed;       /* number of closed models */
-    ebpo_model_stats gone; /* sums of the closed models */
+    unsigned held, busy;           /* number of models in the list; number of models with users */
+    uint64_t taken;                /* sum of the models' bytes */
+    uint64_t closed;               /* number of closed models */
+    ebpo_model_stats closed_stats; /* sums of the closed models */
 };
 
 /* --- one model --- */
@@ -255,8 +255,8 @@ static void add_up(const ebpo_catalogue_held *m, ebpo_model_stats *sums)
 static void drop_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 {
     if (m->model) {
-        add_up(m, &h->gone);
-        h->gone.memory = 0;
+        add_up(m, &h->closed_stats);
+        h->closed_stats.memory = 0;
         h->closed++;
     }
     h->taken -= m->bytes;
@@ -396,10 +396,10 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
         status = check_box(c, e, m, error);
     if (status == EBPO_OK)
         status = run_query(context, m, user, error);
-    bool again = status == EBPO_E_LIMIT && context;
+    bool run_alone = status == EBPO_E_LIMIT && context;
     put_by(m, context);
     pthread_rwlock_unlock(&m->query_lock);
-    if (again)
+    if (run_alone)
         status = query_alone(m, run_query, user, error);
     give_back(models, m);
     return status;
@@ -451,7 +451,7 @@ ebpo_status ebpo_catalogue_models_new(const ebpo_catalogue_models_options *optio
         return ebpo_fail_memory(error, sizeof *h);
     h->memory = own.memory;
     h->threads = own.threads;
-    h->gone = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
+    h->closed_stats = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
     h->open_max = may_be_open();
     pthread_mutex_init(&h->lock, NULL);
     pthread_cond_init(&h->changed, NULL);
@@ -496,7 +496,7 @@ ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *h,
 {
     ebpo_catalogue_models_stats n = EBPO_CATALOGUE_MODELS_STATS_INIT;
     pthread_mutex_lock(&h->lock);
-    ebpo_model_stats all = h->gone;
+    ebpo_model_stats all = h->closed_stats;
     n.closed = h->closed;
     for (const ebpo_catalogue_held *m = h->first; m; m = m->behind) {
         add_up(m, &all);

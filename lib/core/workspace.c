@@ -507,9 +507,9 @@ void ebpo_release_pages(ebpo_workspace *workspace)
     if (!w || read_residency(w).all <= w->usage.memory / 4 * 3)
         return;
     pthread_mutex_lock(&w->table_lock);
-    residency now = read_residency(w); /* another thread may have released pages meanwhile */
-    /* also return if releasing would free hardly anything */
-    if (now.all <= w->usage.memory / 4 * 3 || now.files < w->floor + w->usage.memory / 16) {
+    residency current = read_residency(w); /* another thread may have released pages meanwhile */
+    /* also returns if a release would free few pages */
+    if (current.all <= w->usage.memory / 4 * 3 || current.files < w->floor + w->usage.memory / 16) {
         pthread_mutex_unlock(&w->table_lock);
         return;
     }

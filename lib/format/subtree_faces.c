@@ -102,9 +102,9 @@ ebpo_status ebpo_subtree_faces_check(ebpo_chunks *chunks, const ebpo_node *node,
     ebpo_subtree_row row;
     if (chunks->counted)
         return EBPO_OK;
-    unsigned what = node->type == EBPO_GRAY ? EBPO_S_GRAY : EBPO_S_LEAF;
+    unsigned column = node->type == EBPO_GRAY ? EBPO_S_GRAY : EBPO_S_LEAF;
     ebpo_status status =
-        ebpo_subtree_table_find(chunks, ebpo_subtree_column(info, node->cell.level, what),
+        ebpo_subtree_table_find(chunks, ebpo_subtree_column(info, node->cell.level, column),
                                 node->rank, &row, error);
     if (status != EBPO_OK || ebpo_subtree_faces_known(chunks, row.subtree))
         return status;

@@ -330,12 +330,12 @@ typedef struct writer {
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
     uint64_t *checksum_row; /* [chunks] rows of the list of chunk checksums, if it is written */
-    uint64_t
-        *first_checksum; /* [arrays of the plan] index of the array's first row in checksum_row */
-    uint64_t *size_row;  /* rows of the list of chunk sizes, if it is written */
-    uint64_t size_rows;  /* number of these rows so far */
-    uint64_t top_bytes;  /* end of the chunks with which a reader locates a subtree */
-    uint64_t index_at;   /* offset of HDF5's chunk indexes; 0: none, or not yet written */
+    /* [arrays of the plan] index of the array's first row in checksum_row */
+    uint64_t *first_checksum;
+    uint64_t *size_row; /* rows of the list of chunk sizes, if it is written */
+    uint64_t size_rows; /* number of these rows so far */
+    uint64_t top_bytes; /* end of the chunks with which a reader locates a subtree */
+    uint64_t index_at;  /* offset of HDF5's chunk indexes; 0: none, or not yet written */
 } writer;
 
 /* Encodes the rows of chunks begin .. end - 1 of the window. Pads the last chunk of an array with
@@ -611,8 +611,8 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
  */
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint8_t
-        first[256]; /* large enough, because the first chunk has two bytes before it is encoded */
+    /* large enough, because the first chunk has two bytes before it is encoded */
+    uint8_t first[256];
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)

@@ -60,13 +60,13 @@ static bool scan_number(decimal *d, const char *s, const char *end)
         s++;
     bool point = false;
     int significant = 0;
-    size_t seen = 0;
+    size_t digit_count = 0;
     for (; s < end && (is_digit(*s) || (*s == '.' && !point)); s++) {
         if (*s == '.') {
             point = true;
             continue;
         }
-        seen++;
+        digit_count++;
         d->exponent -= point;
         if (significant == 19) {
             d->short_form = false;
@@ -75,7 +75,7 @@ static bool scan_number(decimal *d, const char *s, const char *end)
         d->digits = d->digits * 10 + (uint64_t)(*s - '0');
         significant += d->digits != 0;
     }
-    if (!seen)
+    if (!digit_count)
         return false;
     if (s == end || *s == 'e' || *s == 'E')
         return s == end || scan_exponent(d, s + 1, end);

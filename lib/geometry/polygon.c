@@ -650,9 +650,10 @@ static uint64_t ears_scratch_bytes(uint64_t n)
 {
     /* each corner has six numbers, at most 4 / BLOCK boxes and counts, and bits in less than one
      * byte */
-    const uint64_t each = 6 * sizeof(uint32_t) + 4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
+    const uint64_t corner_bytes =
+        6 * sizeof(uint32_t) + 4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
     uint64_t bytes;
-    return ebpo_mul_ok(n + WORD, each, &bytes) ? bytes : 0;
+    return ebpo_mul_ok(n + WORD, corner_bytes, &bytes) ? bytes : 0;
 }
 
 static void *place_array(char **at, uint64_t bytes)

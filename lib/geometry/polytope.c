@@ -123,8 +123,8 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
 {
     if (!(height > 1e-9) || !(width > 0))
         return 0;
-    double left = height < width ? 1 - height / width : 0;
-    return volume * (1 - left * left * left);
+    double remaining = height < width ? 1 - height / width : 0;
+    return volume * (1 - remaining * remaining * remaining);
 }
 
 /* The part of a polytope beyond a plane, as pyramids from the farthest vertex: faces with this
@@ -450,9 +450,9 @@ bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytop
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
-    bool some = halve_in_place(out, 2, octant >> 2 & 1);
-    some = halve_in_place(out, 1, octant >> 1 & 1) && some;
-    return halve_in_place(out, 0, octant & 1) && some;
+    bool not_empty = halve_in_place(out, 2, octant >> 2 & 1);
+    not_empty = halve_in_place(out, 1, octant >> 1 & 1) && not_empty;
+    return halve_in_place(out, 0, octant & 1) && not_empty;
 }
 
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])

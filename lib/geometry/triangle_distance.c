@@ -348,8 +348,8 @@ static void bound_by_edges(const relation *r, double plane, double error, ebpo_d
 {
     double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
     for (int i = 1; i < 3; i++) {
-        double other = edge_distance(r, i);
-        edges = other < edges ? other : edges;
+        double distance = edge_distance(r, i);
+        edges = distance < edges ? distance : edges;
     }
     double height = length > 0 ? 2 * length / r->size + 0x1p-44 * r->size : 0x1p-44 * r->size;
     double low = edges - error - 4 * height,

@@ -162,8 +162,8 @@ static bool segment_intersects_triangle(const ends *s, const double t[3][3], int
             return ebpo_point_on_triangle(s->at[i], t[0], t[1], t[2]);
     for (int i = 0; i < 3; i++)
         around[i] = ebpo_orient3d(s->at[0], s->at[1], t[i], t[i == 2 ? 0 : i + 1]);
-    bool left = around[0] >= 0 && around[1] >= 0 && around[2] >= 0;
-    return left || (around[0] <= 0 && around[1] <= 0 && around[2] <= 0);
+    bool all_left = around[0] >= 0 && around[1] >= 0 && around[2] >= 0;
+    return all_left || (around[0] <= 0 && around[1] <= 0 && around[2] <= 0);
 }
 
 /* Classifies a pair in which a face has no area or both faces are in one plane. */

@@ -70,12 +70,12 @@ static attempt try_lock(ebpo_file_lock *lock)
             return NO_LOCKS;
         }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
-            attempt why = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
+            attempt result = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
             /* EBADF: the lock file belongs to another user */
-            if (why == NO_LOCKS && errno != EBADF)
+            if (result == NO_LOCKS && errno != EBADF)
                 unlink(lock->path);
             close(fd);
-            return why;
+            return result;
         }
         if (has_its_name(fd, lock->path)) {
             lock->fd = fd;

@@ -134,19 +134,19 @@ static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, 
 {
     enum { STEP = 1 << 16 };
     ebpo_status status = EBPO_OK;
-    uint8_t *now = ebpo_alloc(STEP, 1);
-    if (!now)
+    uint8_t *current = ebpo_alloc(STEP, 1);
+    if (!current)
         return ebpo_fail_memory(error, STEP);
     *same = true;
     EBPO_FOR_ITEMS_EVERY(file->workspace, 64, step, 0, (file->size + STEP - 1) / STEP) {
         uint64_t at = step * STEP, remaining = file->size - at;
         size_t bytes = remaining < STEP ? (size_t)remaining : STEP;
-        status = ebpo_whole_file_read(file, at, now, bytes, path, error);
-        *same = status == EBPO_OK && memcmp(now, file->data + at, bytes) == 0;
+        status = ebpo_whole_file_read(file, at, current, bytes, path, error);
+        *same = status == EBPO_OK && memcmp(current, file->data + at, bytes) == 0;
         if (!*same)
             break;
     }
-    free(now);
+    free(current);
     return status;
 }
 
@@ -158,7 +158,7 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
         return ebpo_fail_errno(error, path, "cannot be examined");
     bool same = (uint64_t)st.st_size == file->size && st.st_mtim.tv_sec == file->mtime_s &&
                 st.st_mtim.tv_nsec == file->mtime_ns;
-    /* the modification time proves nothing then */
+    /* the file may have changed although the modification time is equal */
     bool doubtful =
         file->fresh || st.st_ctim.tv_sec != file->ctime_s || st.st_ctim.tv_nsec != file->ctime_ns;
     ebpo_status status =

@@ -202,14 +202,16 @@ void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expecte
 
 void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 {
-    struct stat now, read;
+    struct stat target_stat, input_stat;
     char *from = realpath(input->shown, NULL);
     int fd = ebpo_input_descriptor(input);
     bool named = from && strcmp(from, publish->target) == 0,
-         exists = lstat(publish->target, &now) == 0, known = fd >= 0 && fstat(fd, &read) == 0,
-         same = exists && known && now.st_dev == read.st_dev && now.st_ino == read.st_ino;
+         exists = lstat(publish->target, &target_stat) == 0,
+         known = fd >= 0 && fstat(fd, &input_stat) == 0,
+         same = exists && known && target_stat.st_dev == input_stat.st_dev &&
+                target_stat.st_ino == input_stat.st_ino;
     if ((named || same) && (known || exists)) {
-        ebpo_file_version version = version_of(known ? &read : &now);
+        ebpo_file_version version = version_of(known ? &input_stat : &target_stat);
         ebpo_publish_expect(publish, &version, false);
     }
     free(from);
@@ -298,9 +300,10 @@ static bool is_expected(const ebpo_publish *publish)
     const ebpo_file_version *e = &publish->expected;
     if (!publish->expects || lstat(publish->target, &st) != 0)
         return true;
-    ebpo_file_version now = version_of(&st);
-    return e->exists && e->device == now.device && e->inode == now.inode && e->size == now.size &&
-           e->modified.tv_sec == now.modified.tv_sec && e->modified.tv_nsec == now.modified.tv_nsec;
+    ebpo_file_version current = version_of(&st);
+    return e->exists && e->device == current.device && e->inode == current.inode &&
+           e->size == current.size && e->modified.tv_sec == current.modified.tv_sec &&
+           e->modified.tv_nsec == current.modified.tv_nsec;
 }
 
 static ebpo_status put_in_place(ebpo_publish *publish, ebpo_error *error)

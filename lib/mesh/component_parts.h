@@ -16,8 +16,8 @@ typedef struct ebpo_found_component {
     double volume;  /* signed volume of a closed component, in the unit common to all components
                      * (mesh_parts.h) */
     double min[3], max[3];
-    uint32_t
-        host; /* for a cavity, the component around the cavity; otherwise the component itself */
+    /* for a cavity, the component around the cavity; otherwise the component itself */
+    uint32_t host;
 } ebpo_found_component;
 
 /* The indices of faces or vertices by group, ascending within each group. */

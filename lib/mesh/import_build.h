@@ -27,8 +27,8 @@ typedef enum ebpo_import_sort {
 typedef struct ebpo_import_table {
     float *values; /* [rows][columns] */
     uint64_t rows, capacity;
-    uint32_t
-        *index; /* [faces of the mesh][3] rows; EBPO_IMPORT_NONE: no row; only with attributes */
+    /* [faces of the mesh][3] rows; EBPO_IMPORT_NONE: no row; only with attributes */
+    uint32_t *index;
     uint64_t index_capacity;
     bool named;   /* some corner refers to a row */
     bool bytes;   /* values are integers up to 255, stored as bytes */
@@ -153,8 +153,8 @@ typedef struct ebpo_import_job {
 /* A format: a row of the table in import.c. */
 typedef struct ebpo_import_format {
     const char *called; /* name with an article for messages: "an OBJ" */
-    const char
-        *ending; /* ending of file names: ".obj"; without the dot, the mesh's source_format */
+    /* ending of file names: ".obj"; without the dot, the mesh's source_format */
+    const char *ending;
     /* Returns true if the file begins like files of this format. */
     bool (*recognise)(const uint8_t *data, uint64_t size);
     /* true: a file that begins like this format is read as this format, even if its name has the

@@ -33,8 +33,8 @@ struct ebpo_arrangement {
     /* for a component: numbers of vertices and faces of the mesh that contains the component;
      * otherwise 0 */
     uint64_t whole_vertices, whole_faces;
-    uint64_t
-        dropped_faces; /* faces of the source that were dropped later; their indices are unused */
+    /* faces of the source that were dropped later; their indices are unused */
+    uint64_t dropped_faces;
 };
 
 /* Copies geometry and order, without attributes, into the same workspace; free with ebpo_mesh_free.

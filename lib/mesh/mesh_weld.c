@@ -43,16 +43,16 @@ static bool insert_position(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
     for (uint64_t h = ebpo_hash_three(k.bits) & t->mask;; h = (h + 1) & t->mask) {
-        uint32_t held = __atomic_load_n(&t->slots[h], __ATOMIC_RELAXED);
-        if (held == EBPO_NO_INDEX &&
-            __atomic_compare_exchange_n(&t->slots[h], &held, v, false, __ATOMIC_RELAXED,
+        uint32_t stored = __atomic_load_n(&t->slots[h], __ATOMIC_RELAXED);
+        if (stored == EBPO_NO_INDEX &&
+            __atomic_compare_exchange_n(&t->slots[h], &stored, v, false, __ATOMIC_RELAXED,
                                         __ATOMIC_RELAXED))
             return false;
-        key other = key_of(t->mesh, held);
-        if (!same_key(&k, &other))
+        key stored_key = key_of(t->mesh, stored);
+        if (!same_key(&k, &stored_key))
             continue;
-        while (v < held && !__atomic_compare_exchange_n(&t->slots[h], &held, v, false,
-                                                        __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+        while (v < stored && !__atomic_compare_exchange_n(&t->slots[h], &stored, v, false,
+                                                          __ATOMIC_RELAXED, __ATOMIC_RELAXED))
             ;
         return true;
     }
@@ -93,12 +93,12 @@ void ebpo_positions_free(ebpo_positions *positions)
     *positions = (ebpo_positions){ .mesh = NULL };
 }
 
-static inline bool has_key(const ebpo_positions *t, uint32_t held, uint32_t v, const key *k)
+static inline bool has_key(const ebpo_positions *t, uint32_t stored, uint32_t v, const key *k)
 {
-    if (held == v)
+    if (stored == v)
         return true;
-    key other = key_of(t->mesh, held);
-    return same_key(k, &other);
+    key stored_key = key_of(t->mesh, stored);
+    return same_key(k, &stored_key);
 }
 
 uint32_t ebpo_positions_first(const ebpo_positions *t, uint32_t v)
@@ -118,13 +118,13 @@ typedef struct welding {
     uint64_t collapsed; /* faces that repeat a vertex only after welding */
     uint64_t kept;      /* number of remaining vertices */
     uint32_t *map;      /* [vertex_count] new index of each vertex */
-    uint32_t *from;     /* [kept] the vertex of each group that stays */
+    uint32_t *from;     /* [kept] the remaining vertex of each group */
     /* arranged mesh: [blocks of GRAIN vertices + 1] number of groups that begin in the block; later
      * the number in all previous blocks */
     uint64_t *heads;
-    uint64_t *stays;  /* arranged mesh: bit s is set if vertex s of the source stays */
-    uint64_t *before; /* [words of `stays`] number of bits set before the word */
-    uint32_t *rows;   /* arranged mesh with attributes: [kept] attribute rows that stay */
+    uint64_t *remaining; /* arranged mesh: bit s is set if vertex s of the source remains */
+    uint64_t *before;    /* [words of `remaining`] number of bits that are set before the word */
+    uint32_t *rows;      /* arranged mesh with attributes: [kept] attribute rows that stay */
 } welding;
 
 static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -256,7 +256,7 @@ static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, uns
     (void)worker, (void)error;
     EBPO_FOR_ITEMS_SCATTERED(w->mesh->workspace, i, begin, end) {
         uint64_t s = ebpo_mesh_source_vertex(w->mesh, w->from[i]);
-        __atomic_fetch_or(&w->stays[s / WORD], UINT64_C(1) << s % WORD, __ATOMIC_RELAXED);
+        __atomic_fetch_or(&w->remaining[s / WORD], UINT64_C(1) << s % WORD, __ATOMIC_RELAXED);
     }
     return EBPO_OK;
 }
@@ -267,15 +267,15 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
 {
     ebpo_workspace *workspace = w->mesh->workspace;
     uint64_t words = w->mesh->vertex_count / WORD + 1, sum = 0;
-    w->stays = ebpo_array_zero(workspace, words, sizeof *w->stays);
+    w->remaining = ebpo_array_zero(workspace, words, sizeof *w->remaining);
     w->before = ebpo_array_alloc(workspace, words, sizeof *w->before);
-    if (!w->stays || !w->before)
-        return ebpo_workspace_fail(workspace, 2 * words * sizeof *w->stays, error);
+    if (!w->remaining || !w->before)
+        return ebpo_workspace_fail(workspace, 2 * words * sizeof *w->remaining, error);
     ebpo_status status =
         ebpo_parallel_for(0, NULL, w->kept, GRAIN, mark_sources, w, NULL, "", error);
     EBPO_FOR_ITEMS(workspace, i, 0, words) {
         w->before[i] = sum;
-        sum += (uint64_t)__builtin_popcountll(w->stays[i]);
+        sum += (uint64_t)__builtin_popcountll(w->remaining[i]);
     }
     return status;
 }
@@ -287,10 +287,11 @@ static void record_differences(const welding *w)
     const ebpo_mesh *mesh = w->mesh;
     uint64_t differ = 0;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
-        uint64_t stays = w->from[w->map[v]];
-        differ += stays != v && !ebpo_attributes_equal_rows(mesh->attributes, "vertex",
-                                                            ebpo_mesh_source_vertex(mesh, v),
-                                                            ebpo_mesh_source_vertex(mesh, stays));
+        uint64_t remaining = w->from[w->map[v]];
+        differ +=
+            remaining != v && !ebpo_attributes_equal_rows(mesh->attributes, "vertex",
+                                                          ebpo_mesh_source_vertex(mesh, v),
+                                                          ebpo_mesh_source_vertex(mesh, remaining));
     }
     if (differ)
         ebpo_attributes_lose(mesh->attributes,
@@ -310,7 +311,7 @@ static ebpo_status list_rows(welding *w, ebpo_error *error)
     if (!w->rows)
         return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->rows, error);
     EBPO_FOR_ITEMS(mesh->workspace, s, 0, mesh->vertex_count)
-        if (w->stays[s / WORD] >> s % WORD & 1)
+        if (w->remaining[s / WORD] >> s % WORD & 1)
             w->rows[kept++] = (uint32_t)s;
     return EBPO_OK;
 }
@@ -359,7 +360,7 @@ static void move_vertices(welding *w)
             uint64_t s = order->vertex_source[from];
             order->vertex_source[i] =
                 (uint32_t)(w->before[s / WORD] +
-                           (uint64_t)__builtin_popcountll(w->stays[s / WORD] &
+                           (uint64_t)__builtin_popcountll(w->remaining[s / WORD] &
                                                           ((UINT64_C(1) << s % WORD) - 1)));
         }
     }
@@ -432,7 +433,7 @@ static ebpo_status weld_mesh(ebpo_mesh *mesh, double distance, ebpo_repair_recor
     }
     ebpo_array_free(mesh->workspace, w.map);
     ebpo_array_free(mesh->workspace, w.from);
-    ebpo_array_free(mesh->workspace, w.stays);
+    ebpo_array_free(mesh->workspace, w.remaining);
     ebpo_array_free(mesh->workspace, w.rows);
     ebpo_array_free(mesh->workspace, w.before);
     free(w.heads);

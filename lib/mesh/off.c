@@ -207,11 +207,11 @@ static void read_edges(off_reading *r)
  * rows span lines; fewer lines mean several rows per line. */
 static ebpo_status find_rows(off_reading *r)
 {
-    off_text here = r->text;
+    off_text after_counts = r->text;
     off_word word;
     uint64_t lines = count_lines(&r->text), rows = r->vertices + r->faces;
     r->rows = lines == rows ? ROW_A_LINE : lines > rows ? ROWS_OVER_LINES : ROWS_ANYHOW;
-    if (r->rows != ROWS_ANYHOW && next_word_here(&here, &word))
+    if (r->rows != ROWS_ANYHOW && next_word_here(&after_counts, &word))
         return fail_counts(r);
     return EBPO_OK;
 }

@@ -283,9 +283,9 @@ static ebpo_status read_vertices(void *context, uint64_t begin, uint64_t end, un
 
 static ebpo_status record_deviation(plain *t, uint64_t row)
 {
-    uint64_t known = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
-    while (row < known && !__atomic_compare_exchange_n(&t->deviates, &known, row, true,
-                                                       __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+    uint64_t lowest = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
+    while (row < lowest && !__atomic_compare_exchange_n(&t->deviates, &lowest, row, true,
+                                                        __ATOMIC_RELAXED, __ATOMIC_RELAXED))
         ;
     return EBPO_E_FORMAT;
 }

@@ -58,8 +58,8 @@ static void add_triangle(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
  * in this order. */
 static ebpo_status reserve_scratch(ebpo_ply_parser *p, uint64_t n)
 {
-    uint64_t each = 3 * sizeof(double) + 3 * sizeof(uint32_t) + sizeof(uint32_t), bytes;
-    if (!ebpo_mul_ok(n, each, &bytes) ||
+    uint64_t corner_bytes = 3 * sizeof(double) + 3 * sizeof(uint32_t) + sizeof(uint32_t), bytes;
+    if (!ebpo_mul_ok(n, corner_bytes, &bytes) ||
         __builtin_add_overflow(bytes, ebpo_polygon_scratch_bytes(n), &bytes))
         return ebpo_fail_memory(p->error, UINT64_MAX);
     if (!ebpo_grow(&p->scratch, &p->scratch_capacity, bytes, 1))

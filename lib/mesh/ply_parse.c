@@ -39,14 +39,14 @@ static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *elemen
  */
 static ebpo_status check_file_size(ebpo_ply_parser *p)
 {
-    uint64_t left = p->size - p->header.body;
+    uint64_t available = p->size - p->header.body;
     /* the blank after the last value may be missing */
-    left += p->header.encoding == EBPO_PLY_ASCII;
+    available += p->header.encoding == EBPO_PLY_ASCII;
     for (uint64_t i = 0; i < p->header.elements; i++) {
         const ebpo_ply_element *e = &p->header.element[i];
         uint64_t need;
-        if (least_bytes(p, e, &need) && need <= left) {
-            left -= need;
+        if (least_bytes(p, e, &need) && need <= available) {
+            available -= need;
             continue;
         }
         char name[EBPO_IMPORT_WORD_TEXT];
@@ -57,9 +57,9 @@ static ebpo_status check_file_size(ebpo_ply_parser *p)
                 "line %" PRIu64 ": %" PRIu64
                 " rows of element '%s' do not fit into the rest of the file, %" PRIu64
                 " bytes; it is cut short or damaged, get it again",
-                e->line, e->count, name, left);
+                e->line, e->count, name, available);
         p->at = p->size;
-        return ebpo_ply_fail_end(p, e, left / e->row_bytes);
+        return ebpo_ply_fail_end(p, e, available / e->row_bytes);
     }
     return EBPO_OK;
 }

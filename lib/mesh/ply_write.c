@@ -102,16 +102,16 @@ static bool type_holds(ebpo_ply_type type, double v)
     static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
         INT8_MAX, UINT8_MAX, INT16_MAX, UINT16_MAX, INT32_MAX, UINT32_MAX
     };
-    uint64_t bits, back;
-    double again;
+    uint64_t bits, converted_bits;
+    double converted;
     if (type == EBPO_PLY_FLOAT64)
         return true;
     if (type != EBPO_PLY_FLOAT32 && !(v >= least[type] && v <= most[type]))
         return false;
-    again = type == EBPO_PLY_FLOAT32 ? (double)(float)v : (double)(int64_t)v;
+    converted = type == EBPO_PLY_FLOAT32 ? (double)(float)v : (double)(int64_t)v;
     memcpy(&bits, &v, sizeof v);
-    memcpy(&back, &again, sizeof again);
-    return bits == back;
+    memcpy(&converted_bits, &converted, sizeof converted);
+    return bits == converted_bits;
 }
 
 /* Returns the wanted type if this type holds all coordinates of the axis, otherwise double. */

@@ -25,13 +25,15 @@ typedef struct dropping {
     ebpo_stars stars;
     ebpo_same_faces *scratch; /* one for each worker */
     unsigned threads;
-    uint64_t *gone; /* bit f is set if face f is to be removed */
-    uint64_t count; /* faces to be removed */
-    uint64_t
-        opposite; /* faces to be removed whose orientation is opposite to that of the kept face */
+    uint64_t *removed; /* bit f is set if face f is to be removed */
+    uint64_t count;    /* faces to be removed */
+    uint64_t opposite; /* faces to be removed that are oriented opposite to the kept face */
 } dropping;
 
-static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
+static bool is_removed(const dropping *d, uint64_t f)
+{
+    return d->removed[f / WORD] >> f % WORD & 1;
+}
 
 /* Starts at the vertex with the face's lowest index. Returns true if the index of the next vertex
  * is lower than the index of the last vertex. Repeated faces with different results have opposite
@@ -53,7 +55,7 @@ static void mark_repeated(dropping *d, const ebpo_same_faces *same)
             continue;
         }
         uint64_t f = same->item[i].face, kept = same->item[first].face;
-        __atomic_fetch_or(&d->gone[f / WORD], UINT64_C(1) << f % WORD, __ATOMIC_RELAXED);
+        __atomic_fetch_or(&d->removed[f / WORD], UINT64_C(1) << f % WORD, __ATOMIC_RELAXED);
         opposite += runs_up(faces + 3 * f) != runs_up(faces + 3 * kept);
         count++;
     }
@@ -131,9 +133,9 @@ static ebpo_status mark_all(dropping *d, ebpo_error *error)
     ebpo_status status = ebpo_stars_build(&d->stars, mesh, d->threads, NULL, error);
     if (status != EBPO_OK)
         return status;
-    d->gone = ebpo_array_zero(mesh->workspace, words, sizeof *d->gone);
-    if (!d->gone)
-        return ebpo_workspace_fail(mesh->workspace, words * sizeof *d->gone, error);
+    d->removed = ebpo_array_zero(mesh->workspace, words, sizeof *d->removed);
+    if (!d->removed)
+        return ebpo_workspace_fail(mesh->workspace, words * sizeof *d->removed, error);
     return ebpo_parallel_for(d->threads, mesh->workspace, mesh->vertex_count, DROP_GRAIN,
                              find_repeated, d, NULL, "", error);
 }
@@ -155,7 +157,7 @@ static ebpo_status drop_faces(dropping *d, ebpo_error *error)
 static void free_dropping(dropping *d)
 {
     ebpo_stars_free(&d->stars);
-    ebpo_array_free(d->mesh->workspace, d->gone);
+    ebpo_array_free(d->mesh->workspace, d->removed);
     for (unsigned t = 0; d->scratch && t < d->threads; t++)
         ebpo_same_faces_free(&d->scratch[t]);
     free(d->scratch);

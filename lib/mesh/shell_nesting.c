@@ -38,13 +38,13 @@ static bool near_host(void *user, const ebpo_box_node *node)
 
 static bool add_probes(seeker *w, uint32_t number)
 {
-    const ebpo_shell *one = &w->all->n->shells[number];
+    const ebpo_shell *shell = &w->all->n->shells[number];
     for (int d = 0; d < EBPO_SHELL_SAMPLES; d++) {
         ebpo_tree_point *p = ebpo_box_tree_add(&w->probes);
         if (!p)
             return false;
         *p = (ebpo_tree_point){ .number = number };
-        memcpy(p->at, one->sample[d], sizeof p->at);
+        memcpy(p->at, shell->sample[d], sizeof p->at);
     }
     return true;
 }
@@ -53,8 +53,8 @@ static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;
     for (uint64_t i = 0; i < count; i++) {
-        const ebpo_shell *one = &w->all->n->shells[points[i].number];
-        if (one != w->host && ebpo_shell_box_within(one, w->host) &&
+        const ebpo_shell *shell = &w->all->n->shells[points[i].number];
+        if (shell != w->host && ebpo_shell_box_within(shell, w->host) &&
             !add_probes(w, points[i].number))
             return false;
     }
@@ -417,21 +417,21 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
     const ebpo_components *c = n->components;
     (void)worker, (void)error;
     for (uint64_t s = begin; s < end; s++) {
-        ebpo_shell *one = &n->shells[s];
-        const ebpo_found_component *m = &c->list[one->component];
+        ebpo_shell *shell = &n->shells[s];
+        const ebpo_found_component *m = &c->list[shell->component];
         for (int d = 0; d < EBPO_SHELL_SAMPLES; d++)
-            ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)m->face], one->sample[d]);
-        memcpy(one->min, m->min, sizeof one->min);
-        memcpy(one->max, m->max, sizeof one->max);
-        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[one->component],
-                                 c->faces.begin[one->component + (uint64_t)1]) {
+            ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)m->face], shell->sample[d]);
+        memcpy(shell->min, m->min, sizeof shell->min);
+        memcpy(shell->max, m->max, sizeof shell->max);
+        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[shell->component],
+                                 c->faces.begin[shell->component + (uint64_t)1]) {
             for (uint64_t k = 0; k < 3; k++) {
                 double at[3];
                 ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.members[i] + k],
                                    at);
                 for (int d = 0; d < EBPO_SHELL_SAMPLES; d++)
-                    if (comes_before(at, one->sample[d], d))
-                        memcpy(one->sample[d], at, sizeof at);
+                    if (comes_before(at, shell->sample[d], d))
+                        memcpy(shell->sample[d], at, sizeof at);
             }
         }
     }
@@ -501,9 +501,9 @@ static ebpo_status list_shells(ebpo_nesting *n, ebpo_error *error)
 
 static void box_of_shell(const void *user, const ebpo_tree_point *p, ebpo_point_box *out)
 {
-    const ebpo_shell *one = &((const ebpo_nesting *)user)->shells[p->number];
-    memcpy(out->min, one->min, sizeof out->min);
-    memcpy(out->max, one->max, sizeof out->max);
+    const ebpo_shell *shell = &((const ebpo_nesting *)user)->shells[p->number];
+    memcpy(out->min, shell->min, sizeof out->min);
+    memcpy(out->max, shell->max, sizeof out->max);
 }
 
 static ebpo_status make_tree(ebpo_nesting *n, ebpo_error *error)

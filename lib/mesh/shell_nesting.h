@@ -26,17 +26,16 @@ typedef struct ebpo_nesting {
     ebpo_components *components;
     ebpo_shell *shells; /* the components that are closed and whose volume is not 0 */
     uint64_t count;
-    ebpo_box_tree
-        tree; /* tree over the boxes of the shells; the point of a shell is its sample[0] */
+    ebpo_box_tree tree; /* boxes of the shells; the point of a shell is its sample[0] */
     unsigned threads;
 } ebpo_nesting;
 
-static inline bool ebpo_shell_faces_inwards(const ebpo_nesting *n, const ebpo_shell *one)
+static inline bool ebpo_shell_faces_inwards(const ebpo_nesting *n, const ebpo_shell *shell)
 {
-    return n->components->list[one->component].volume < 0;
+    return n->components->list[shell->component].volume < 0;
 }
 
-static inline bool ebpo_shell_is_cavity(const ebpo_shell *one) { return one->depth % 2 != 0; }
+static inline bool ebpo_shell_is_cavity(const ebpo_shell *shell) { return shell->depth % 2 != 0; }
 
 static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, double t[3][3])
 {

@@ -32,8 +32,8 @@ typedef struct grouping {
     uint32_t *slots; /* [mask + 1] last remaining vertex of the cells with each hash */
     uint32_t *chain; /* [vertex_count] previous remaining vertex in the same slot */
     uint64_t mask;
-    double
-        *moved; /* [threads] largest squared distance of a vertex from the one that replaces it */
+    /* [threads] largest squared distance of a vertex from the one that replaces it */
+    double *moved;
 } grouping;
 
 /* ---- positions, ascending ---- */
