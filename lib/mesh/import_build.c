@@ -480,8 +480,8 @@ ebpo_status ebpo_import_attributes(ebpo_import_build *b)
     }
     if (b->rounded)
         ebpo_attributes_lose(b->mesh->attributes,
-                             "digits of %" PRIu64 " colours, normals or texture coordinates, which "
-                             "are floats",
+                             "digits of colours, normals or texture coordinates, which are "
+                             "floats: %" PRIu64,
                              b->rounded);
     return status;
 }

@@ -295,8 +295,8 @@ static void record_differences(const welding *w)
     }
     if (differ)
         ebpo_attributes_lose(mesh->attributes,
-                             "attribute values of %llu joined vertices that differ from the "
-                             "remaining one",
+                             "attribute values of joined vertices that differ from the remaining "
+                             "vertex: %llu",
                              (unsigned long long)differ);
 }
 

@@ -706,13 +706,14 @@ static void record_losses(const obj_reading *r, ebpo_attributes *to)
     if (l->third) /* only two components have names */
         ebpo_attributes_lose(to, "the third texture coordinate");
     if (l->uncoloured)
-        ebpo_attributes_lose(to, "that %" PRIu64 " vertices have no colours", l->uncoloured);
+        ebpo_attributes_lose(to, "missing colours of vertices (stored as black): %" PRIu64,
+                             l->uncoloured);
     if (l->alpha)
         ebpo_attributes_lose(to, "opacity of vertices");
     if (l->no_numbers)
         ebpo_attributes_lose(to,
-                             "%" PRIu64 " colours, normals or texture coordinates that are not "
-                             "numbers",
+                             "colours, normals or texture coordinates that are not numbers: "
+                             "%" PRIu64,
                              l->no_numbers);
     if (l->smoothing)
         ebpo_attributes_lose(to, "smoothing groups");

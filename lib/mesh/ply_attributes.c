@@ -360,9 +360,9 @@ ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p)
         return EBPO_OK;
     ebpo_status status = is_plain(&p->header) ? EBPO_OK : keep_header(p);
     if (p->header.encoding != EBPO_PLY_ASCII && p->at < p->size)
-        ebpo_attributes_lose(to, "%" PRIu64 " bytes after the last element", p->size - p->at);
+        ebpo_attributes_lose(to, "bytes after the last element: %" PRIu64, p->size - p->at);
     if (p->rounded)
-        ebpo_attributes_lose(to, "digits of %" PRIu64 " values that the header declares as float",
+        ebpo_attributes_lose(to, "digits of values that the header declares as float: %" PRIu64,
                              p->rounded);
     for (uint64_t i = to->count; i-- > 0;) {
         ebpo_attribute *a = &to->array[i];

@@ -160,8 +160,8 @@ static ebpo_status record_bytes(ebpo_import_build *b, const stl_bytes *is, uint6
     ebpo_attributes_count_unread(to, "bytes after the last facet", is->behind);
     if (words)
         ebpo_attributes_lose(to,
-                             "the attribute bytes of %" PRIu64
-                             " facets (possibly colours), as the file holds several models",
+                             "the attribute bytes of facets (possibly colours), because the file "
+                             "holds several models: %" PRIu64,
                              words);
     if (is->models > 1 && b->attributes)
         ebpo_attributes_lose(to, "the start of each of %" PRIu64 " models", is->models);

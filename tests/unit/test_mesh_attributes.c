@@ -468,8 +468,9 @@ static void weld_two(bool arranged)
     ck_assert_uint_eq(mesh.vertex_count, 4);
     ck_assert_uint_eq(red->rows, 4);
     ck_assert(memcmp(red->values, (uint8_t[]){ 1, 2, 3, 5 }, 4) == 0);
-    ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh),
-                     "attribute values of 1 joined vertices that differ from the remaining one");
+    ck_assert_str_eq(
+        ebpo_mesh_attributes_lost(&mesh),
+        "attribute values of joined vertices that differ from the remaining vertex: 1");
     ebpo_mesh_free(&mesh);
 }
 
