@@ -631,9 +631,9 @@ static ebpo_status read_vertex(obj_reading *r)
     int n = read_words(r, word), bad;
     if (n < 3)
         return fail_statement(r,
-                              "vertex %" PRIu64 " has %d coordinates, expected 3; add z (0 in a "
+                              "vertex %" PRIu64 " has %d coordinate%s, expected 3; add z (0 in a "
                               "plane), or repair the file",
-                              r->build->vertices + 1, n);
+                              r->build->vertices + 1, n, n == 1 ? "" : "s");
     if (!read_position(r, word, xyz, &bad))
         return fail_number(r, word[bad]);
     ebpo_status status = n == 4 ? divide_by_weight(r, word, xyz) : EBPO_OK;

@@ -462,8 +462,9 @@ static ebpo_status read_loop(stl_text *t)
     if (status == EBPO_OK && t->corners != 3)
         status = ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
                                 "line %" PRIu64 ": facet %" PRIu64 " has %" PRIu64
-                                " vertices, expected 3; repair the file",
-                                t->line, t->loops + 1, t->corners);
+                                " %s, expected 3; repair the file",
+                                t->line, t->loops + 1, t->corners,
+                                t->corners == 1 ? "vertex" : "vertices");
     t->loops++;
     pass_odd(t);
     return status;
