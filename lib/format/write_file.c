@@ -181,7 +181,7 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
     return status;
 }
 
-/* Writes all headers and the first chunk. If a metadata block is the last thing in the file, HDF5
+/* Writes all headers and the first chunk. If a metadata block is the last block of the file, HDF5
  * enlarges the block instead of using its free space. So the first chunk is written early, before
  * the attributes of the first array. The chunk is then stored after the block. The block cannot
  * grow any more, so all later headers use its free space. */

@@ -273,8 +273,8 @@ static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_
     return EBPO_OK;
 }
 
-/* Joins faces of patches that are not closed by themselves, so that they alternate around the edge
- * like the boundary of a solid: inside and outside take turns. */
+/* Joins faces of patches that are not closed by themselves, so that around the edge, regions inside
+ * and outside of a solid alternate. */
 static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                unsigned worker, ebpo_error *error)
 {

@@ -302,8 +302,8 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
     }
 }
 
-/* Reads faces. Behind a row that deviates, the offsets are wrong; the row-by-row reader reads the
- * deviating row and all rows behind it again. */
+/* Reads faces. After a row that deviates, the offsets are wrong. The row-by-row reader reads this
+ * row and all later rows again. */
 static ebpo_status read_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
