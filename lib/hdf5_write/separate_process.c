@@ -34,10 +34,11 @@ static uint64_t address_bytes(void)
 
 static void limit_resource(int what, uint64_t most)
 {
-    struct rlimit now;
-    if (getrlimit(what, &now) == 0 && (now.rlim_max == RLIM_INFINITY || most < now.rlim_max)) {
-        now.rlim_cur = now.rlim_max = most;
-        setrlimit(what, &now);
+    struct rlimit limit;
+    if (getrlimit(what, &limit) == 0 &&
+        (limit.rlim_max == RLIM_INFINITY || most < limit.rlim_max)) {
+        limit.rlim_cur = limit.rlim_max = most;
+        setrlimit(what, &limit);
     }
 }
 

@@ -10,12 +10,12 @@
 
 /* A component: faces connected by vertices. */
 typedef struct ebpo_found_component {
-    uint64_t first; /* least source index of its faces */
-    uint32_t face;  /* index of that face in the current mesh */
+    uint64_t first; /* least source index of the component's faces */
+    uint32_t face;  /* index in the current mesh of the face with this source index */
     bool open;      /* true: some edge is not used equally often in both directions */
     double volume;  /* signed volume of a closed component, in the unit common to all components
                      * (mesh_parts.h) */
-    double min[3], max[3];
+    double min[3], max[3]; /* bounding box */
     /* for a cavity, the component around the cavity; otherwise the component itself */
     uint32_t host;
 } ebpo_found_component;
@@ -74,9 +74,9 @@ EBPO_MUST_USE ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_err
 
 struct ebpo_mesh_groups {
     ebpo_mesh_group *list; /* [count] groups with faces first, in the order of their faces */
-    uint64_t count;        /* of groups */
+    uint64_t count;        /* number of groups */
     uint64_t with_faces;   /* number of groups with faces */
-    uint64_t face_count;   /* of all groups */
+    uint64_t face_count;   /* number of faces of all groups */
     char *names;
     /* a run is a range of consecutive faces of one group */
     uint64_t *run_end;   /* [run_count] one past the last face of each run, ascending */
