@@ -29,7 +29,7 @@ static void names(const uint8_t *data, size_t size)
     ebpo_texture_names_of_ply(&of, (const char *)data, size);
     ebpo_obj_libraries(data, size, take_library, &libraries);
     for (uint64_t i = 0; i < of.count; i++)
-        fuzz_must(of.of[i].name && *of.of[i].name);
+        fuzz_must(of.name[i].name && *of.name[i].name);
     ebpo_texture_names_free(&of);
 }
 
