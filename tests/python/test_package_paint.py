@@ -70,7 +70,7 @@ class Painting(Case):
         self.assertEqual(len(titles), 13)
         with self.assertRaises(ZeroDivisionError), ebpo.Paint.change("turns.paint.h5") as changed:
             changed.add_layer(title="never")
-            with self.assertRaisesRegex(ebpo.IOFailure, "has been changing it"):
+            with self.assertRaisesRegex(ebpo.IOFailure, "has been changing the file"):
                 with ebpo.Paint.change("turns.paint.h5", wait=.1):
                     pass
             1 / 0

@@ -208,7 +208,7 @@ START_TEST(test_paint_second_save_is_refused)
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
     /* the handle that created the file is also refused, because it has not read the file again */
     ck_assert(ebpo_paint_save(other, scratch("p.paint.h5"), &error) == EBPO_E_IO);
-    ck_assert(strstr(error.message, "another program has changed it") != NULL);
+    ck_assert(strstr(error.message, "another program has changed the file") != NULL);
     ck_assert(ebpo_paint_save(o.paint, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
     /* the last saver may save again, and copies may be saved anywhere */
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
@@ -252,7 +252,7 @@ START_TEST(test_paint_file_is_locked_for_changes)
     /* other programs also wait for a new paint */
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
-    ck_assert(strstr(error.message, "another program has been changing it") && !other);
+    ck_assert(strstr(error.message, "another program has been changing the file") && !other);
     /* a save to another path, even a failed one, does not release the lock */
     ck_assert(ebpo_paint_save(one, scratch("absent/q.paint.h5"), NULL) == EBPO_E_IO);
     ck_assert(ebpo_paint_save(one, scratch(NULL), NULL) == EBPO_E_IO);
