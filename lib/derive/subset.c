@@ -13,16 +13,19 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #include <ebpo/subset.h>
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "derive/subset_parts.h"
 #include "format/border_loops.h"
 #include "format/file_nodes.h"
+#include "format/patch_table.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
 #include "format/surface_patches.h"
@@ -243,17 +246,53 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-/* Keeps the patches of the levels that are kept. With a box or a maximum error, a node may lose
- * faces, so the patches are omitted. */
+/* Lists the patches that are kept: those of the kept levels, and with a box only the root's and
+ * those below nodes whose cells intersect the box. Returns their number. */
+static uint64_t list_patches(const ebpo_cutting *c, const ebpo_patch_table *table, bool *kept,
+                             uint64_t *list)
+{
+    const ebpo_subset_options *o = c->options;
+    int last = c->out->info.level_count - 1;
+    uint64_t count = 0;
+    kept[0] = true;
+    for (uint64_t i = 0; i < table->count; i++) {
+        ebpo_cell cell =
+            ebpo_cell_of_octcode(table->row[EBPO_PATCH_COLUMNS * i + EBPO_PATCH_OCTCODE]);
+        if (!kept[i] || cell.level > last)
+            continue;
+        list[count++] = i;
+        if (!o->boxed || ebpo_cell_intersects(&c->box, cell, o->min, o->max))
+            for (uint64_t child = table->child[i]; child < table->child_end[i]; child++)
+                kept[child] = true;
+    }
+    return count;
+}
+
+/* Reads the patches that are kept. With a maximum error, a node loses faces, so the part is
+ * omitted. */
 static ebpo_status cut_surface(ebpo_cutting *c)
 {
     ebpo_surface *surface = &c->out->surface;
-    ebpo_status status = EBPO_OK;
-    if (!c->options->boxed && !c->tolerance)
-        status = ebpo_file_read_surface(c->file, 0, c->last_level, surface, c->error);
+    ebpo_patch_table table = { 0 };
+    ebpo_hints hints = EBPO_HINTS_INIT(c->file);
+    ebpo_status status = c->tolerance ? EBPO_OK : ebpo_patch_table_read(&table, c->chunks, c->error);
+    uint64_t *list = ebpo_alloc(table.count, sizeof *list), count = 0;
+    bool *kept = ebpo_alloc_zero(table.count, sizeof *kept);
+    if (status == EBPO_OK && !(list && kept))
+        status = ebpo_fail_memory(c->error, table.count * (sizeof *list + sizeof *kept));
+    if (status == EBPO_OK && table.count)
+        count = list_patches(c, &table, kept, list);
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_patch_hint(&table, c->chunks, &hints, list[i]);
+    ebpo_hint_all(&hints);
+    if (count)
+        status = ebpo_patches_take(&table, c->chunks, list, count, surface, c->error);
     if (surface->patch_count == 0)
         c->parts &= ~(uint32_t)EBPO_PART_SURFACE;
     ebpo_surface_summarise(surface, &c->out->info);
+    free(list);
+    free(kept);
+    ebpo_patch_table_free(&table);
     return status;
 }
 

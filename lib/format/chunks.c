@@ -525,7 +525,8 @@ static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int l
                               uint64_t rows, size_t size, ebpo_error *error)
 {
     const char *shown = chunks->file->in.shown;
-    if ((id >= EBPO_LEVEL_ARRAYS && id != EBPO_A_SUBTREE_SHARED) || level < 0 ||
+    bool of_surface = id >= EBPO_A_SURFACE_PATCHES && id <= EBPO_A_SURFACE_COLOURS;
+    if ((id >= EBPO_LEVEL_ARRAYS && id != EBPO_A_SUBTREE_SHARED && !of_surface) || level < 0 ||
         level >= chunks->file->info.level_count)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
                               "level %d has no integer array number %d", level, (int)id);

@@ -603,7 +603,7 @@ static const char *find_row_fault(const ebpo_info *info, const uint64_t *row, ui
     return NULL;
 }
 
-static const char *find_fault(const ebpo_info *info, const ebpo_surface *surface)
+const char *ebpo_surface_fault(const ebpo_info *info, const ebpo_surface *surface)
 {
     uint64_t triangles = 0, vertices = 0, bytes = 0, before = 0;
     for (uint64_t i = 0; i < surface->patch_count; i++) {
@@ -663,7 +663,7 @@ ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
                                 surface->code_bytes != info->surface_code_bytes ||
                                 surface->colour_count != info->surface_colours
                             ? "patches are missing"
-                            : find_fault(info, surface);
+                            : ebpo_surface_fault(info, surface);
     return fault ? ebpo_check_fail(check, -1, "/surface/patches", fault, error)
                  : check_codes(check, surface, error);
 }
@@ -754,13 +754,10 @@ static void hint_rows(ebpo_hints *hints, const ebpo_file *file, ebpo_array_id id
         ebpo_hint_chunks(hints, array, first / rows, (end - 1) / rows + 1);
 }
 
-static ebpo_status read_surface(const ebpo_file *file, int first_level, int last_level,
-                                ebpo_surface *out, ebpo_error *error)
+static ebpo_status read_table(const ebpo_file *file, ebpo_surface *out, ebpo_error *error)
 {
     const ebpo_info *info = &file->info;
     ebpo_check check = ebpo_reader_check(file, NULL);
-    ebpo_hints hints = EBPO_HINTS_INIT(file);
-    uint64_t vertex, code;
     ebpo_status status =
         read_rows(file, EBPO_A_SURFACE_PATCHES, 0, info->surface_patches, &out->patch, error);
     if (status != EBPO_OK)
@@ -770,9 +767,19 @@ static ebpo_status read_surface(const ebpo_file *file, int first_level, int last
     out->vertex_count = info->surface_vertices;
     out->code_bytes = info->surface_code_bytes;
     out->colour_count = info->surface_colours;
-    const char *fault = find_fault(info, out);
-    if (fault)
-        return ebpo_check_fail(&check, -1, "/surface/patches", fault, error);
+    const char *fault = ebpo_surface_fault(info, out);
+    return fault ? ebpo_check_fail(&check, -1, "/surface/patches", fault, error) : EBPO_OK;
+}
+
+static ebpo_status read_surface(const ebpo_file *file, int first_level, int last_level,
+                                ebpo_surface *out, ebpo_error *error)
+{
+    ebpo_check check = ebpo_reader_check(file, NULL);
+    ebpo_hints hints = EBPO_HINTS_INIT(file);
+    uint64_t vertex, code;
+    ebpo_status status = read_table(file, out, error);
+    if (status != EBPO_OK)
+        return status;
     select_levels(out, first_level, last_level, &vertex, &code);
     uint64_t vertex_end = vertex + out->vertex_count;
     hint_rows(&hints, file, EBPO_A_SURFACE_TRIANGLES, code, code + out->code_bytes);
@@ -791,14 +798,30 @@ static ebpo_status read_surface(const ebpo_file *file, int first_level, int last
     return status == EBPO_OK ? check_codes(&check, out, error) : status;
 }
 
+ebpo_status ebpo_surface_absent(const ebpo_file *file, ebpo_error *error)
+{
+    return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                          "the file was written without its simplified surface; add it with "
+                          "'ebpo repack --parts=+surface'");
+}
+
+ebpo_status ebpo_file_read_patches(const ebpo_file *file, ebpo_surface *out, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    if (!(file->info.parts & EBPO_PART_SURFACE))
+        return ebpo_surface_absent(file, error);
+    ebpo_status status = read_table(file, out, error);
+    if (status != EBPO_OK)
+        ebpo_surface_free(out);
+    return status;
+}
+
 ebpo_status ebpo_file_read_surface(const ebpo_file *file, int first_level, int last_level,
                                    ebpo_surface *out, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     if (!(file->info.parts & EBPO_PART_SURFACE))
-        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "the file was written without its simplified surface; add it with "
-                              "'ebpo repack --parts=+surface'");
+        return ebpo_surface_absent(file, error);
     ebpo_status status = read_surface(file, first_level, last_level, out, error);
     if (status != EBPO_OK)
         ebpo_surface_free(out);

@@ -48,6 +48,12 @@ EBPO_MUST_USE bool ebpo_patch_mark_border(const uint32_t *triangle, uint64_t tri
 EBPO_MUST_USE ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
                                              const ebpo_surface *surface, ebpo_error *error);
 
+/* Returns what is wrong with the table of patches or its sums, or NULL. */
+const char *ebpo_surface_fault(const ebpo_info *info, const ebpo_surface *surface);
+
+/* Returns EBPO_E_ABSENT, with a message that the file does not have the part. */
+ebpo_status ebpo_surface_absent(const ebpo_file *file, ebpo_error *error);
+
 /* Sets the counts of the header. */
 void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info);
 

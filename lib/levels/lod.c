@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "format/pick_rows.h"
 #include "format/schema.h"
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
@@ -198,6 +199,7 @@ void ebpo_lod_model_free(ebpo_lod_model *model)
         ebpo_level_ranks_free(&model->ranks[i]);
     }
     ebpo_mesh_free(&model->mesh);
+    free(model->picked);
 }
 
 static ebpo_status read_levels(ebpo_lod_model *out, const ebpo_file *file,
@@ -220,12 +222,107 @@ static ebpo_status read_levels(ebpo_lod_model *out, const ebpo_file *file,
     return EBPO_OK;
 }
 
-static bool has_leaves(const ebpo_lod_model *model)
+/* --- faces of leaves --- */
+
+/* Returns the number of faces in the lists of all leaves; faces in several lists count repeatedly.
+ */
+static uint64_t count_listed(const ebpo_lod_model *model)
 {
+    uint64_t count = 0;
     for (int i = 0; i <= model->target; i++)
-        if (model->level[i].leaf_count)
-            return true;
-    return false;
+        for (uint64_t k = 0; k < model->level[i].leaf_count; k++)
+            count += (uint64_t)model->level[i].leaf_new[k] + model->level[i].leaf_ref_count[k];
+    return count;
+}
+
+static void list_faces(const ebpo_lod_model *model, uint32_t *out)
+{
+    for (int i = 0; i <= model->target; i++) {
+        const ebpo_level *level = &model->level[i];
+        const uint32_t *ref = level->leaf_refs;
+        for (uint64_t k = 0; k < level->leaf_count; k++) {
+            for (uint32_t n = 0; n < level->leaf_ref_count[k]; n++)
+                *out++ = *ref++;
+            for (uint32_t n = 0; n < level->leaf_new[k]; n++)
+                *out++ = (uint32_t)(level->leaf_first[k] + n);
+        }
+    }
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Sorts numbers and removes repeated ones; returns their number. */
+static uint64_t sort_unique(uint32_t *numbers, uint64_t count)
+{
+    uint64_t kept = 0;
+    qsort(numbers, count, sizeof *numbers, compare_numbers);
+    for (uint64_t i = 0; i < count; i++)
+        if (i == 0 || numbers[i] != numbers[i - 1])
+            numbers[kept++] = numbers[i];
+    return kept;
+}
+
+static uint32_t position_of(uint32_t number, const uint32_t *sorted, uint64_t count)
+{
+    const uint32_t *at = bsearch(&number, sorted, count, sizeof *sorted, compare_numbers);
+    return at ? (uint32_t)(at - sorted) : UINT32_MAX;
+}
+
+/* Reads the faces of out->picked and their vertices as out->mesh. */
+static ebpo_status pick_mesh(ebpo_lod_model *out, ebpo_chunks *chunks, unsigned threads,
+                             ebpo_error *error)
+{
+    ebpo_mesh *mesh = &out->mesh;
+    uint64_t corners = 3 * mesh->face_count;
+    bool doubles = out->info->double_coordinates;
+    ebpo_faces_hint(chunks, out->picked, mesh->face_count, 0);
+    mesh->faces = ebpo_alloc(corners, sizeof *mesh->faces);
+    uint32_t *vertex = ebpo_alloc(corners, sizeof *vertex);
+    ebpo_status status = mesh->faces && vertex
+                             ? ebpo_pick_rows(chunks, EBPO_A_FACES, out->picked, mesh->face_count,
+                                              threads, mesh->faces, error)
+                             : ebpo_fail_memory(error, 2 * corners * sizeof *vertex);
+    if (status == EBPO_OK) {
+        memcpy(vertex, mesh->faces, corners * sizeof *vertex);
+        mesh->vertex_count = sort_unique(vertex, corners);
+        for (uint64_t i = 0; i < corners; i++)
+            mesh->faces[i] = position_of(mesh->faces[i], vertex, mesh->vertex_count);
+        void *rows = ebpo_alloc(mesh->vertex_count, doubles ? 24 : 12);
+        mesh->xyz64 = doubles ? rows : NULL;
+        mesh->xyz32 = doubles ? NULL : rows;
+        status = rows ? ebpo_pick_rows(chunks, EBPO_A_VERTICES, vertex, mesh->vertex_count, threads,
+                                       rows, error)
+                      : ebpo_fail_memory(error, mesh->vertex_count * 24);
+    }
+    free(vertex);
+    return status;
+}
+
+/* Reads the faces that leaves list: only these faces if they are few, otherwise the whole mesh. */
+static ebpo_status read_faces(ebpo_lod_model *out, const ebpo_file *file,
+                              const ebpo_read_options *read, ebpo_error *error)
+{
+    enum { SHARE = 8, CHUNK_BUDGET = 64 << 20 };
+    uint64_t count = count_listed(out);
+    ebpo_chunks *chunks = NULL;
+    if (count == 0)
+        return EBPO_OK;
+    if (count > out->info->face_count / SHARE)
+        return ebpo_file_read_mesh(file, read, &out->mesh, error);
+    out->picked = ebpo_alloc(count, sizeof *out->picked);
+    if (!out->picked)
+        return ebpo_fail_memory(error, count * sizeof *out->picked);
+    list_faces(out, out->picked);
+    out->mesh.face_count = sort_unique(out->picked, count);
+    ebpo_status status = ebpo_chunks_make(&chunks, file, CHUNK_BUDGET, error);
+    if (status == EBPO_OK)
+        status = pick_mesh(out, chunks, read->threads, error);
+    ebpo_chunks_free(chunks);
+    return status;
 }
 
 ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int target,
@@ -240,8 +337,8 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
                        : parts & EBPO_PART_MESH      ? EBPO_LEAF_DERIVED
                                                      : EBPO_LEAF_INHERITED;
     ebpo_status status = read_levels(out, file, read, error);
-    if (status == EBPO_OK && out->leaf_source == EBPO_LEAF_DERIVED && has_leaves(out))
-        status = ebpo_file_read_mesh(file, read, &out->mesh, error);
+    if (status == EBPO_OK && out->leaf_source == EBPO_LEAF_DERIVED)
+        status = read_faces(out, file, read, error);
     if (status != EBPO_OK)
         ebpo_lod_model_free(out);
     return status;
@@ -250,8 +347,12 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
 /* --- envelopes of leaves --- */
 
 /* Returns false if the mesh has no such face or not all of its vertices. */
-static bool copy_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
+static bool copy_face(const ebpo_lod_model *model, uint64_t face, ebpo_triangle *out)
 {
+    const ebpo_mesh *mesh = &model->mesh;
+    if (model->picked)
+        face = face < UINT32_MAX ? position_of((uint32_t)face, model->picked, mesh->face_count)
+                                 : UINT32_MAX;
     if (face >= mesh->face_count)
         return false;
     for (int i = 0; i < 3; i++) {
@@ -281,9 +382,9 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
         level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;
     bool valid = true;
     for (uint64_t i = 0; i < refs && valid; i++)
-        valid = copy_face(&model->mesh, ref[i], &scratch->faces[i]);
+        valid = copy_face(model, ref[i], &scratch->faces[i]);
     for (uint64_t i = 0; i < fresh && valid; i++)
-        valid = copy_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
+        valid = copy_face(model, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
     if (!valid)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: leaf %llu names a face or vertex that the mesh does not have; "

@@ -58,6 +58,9 @@ typedef struct ebpo_lod_model {
     ebpo_level level[EBPO_LEVELS_MAX];
     ebpo_level_ranks ranks[EBPO_LEVELS_MAX];
     ebpo_mesh mesh; /* empty except for EBPO_LEAF_DERIVED */
+    /* [mesh.face_count] ascending file indices of the mesh's faces, if it has only the faces of
+     * leaves; NULL: it has all faces */
+    uint32_t *picked;
 } ebpo_lod_model;
 
 /* Reads levels 0 .. target. After a failure there is nothing to free. */

@@ -4,7 +4,8 @@
  * levels below the patches' nodes. Patches are joined from coarse to fine: a vertex on the border
  * of a finer patch is replaced by the vertex of the coarsest cell that contains it and has a
  * vertex. Both sides of a border then have the same vertices, as each vertex of the model on the
- * border is in a cell with a vertex. Source: format-spec/surface.md. */
+ * border is in a cell with a vertex. Vertices of the model's faces are replaced in the same way.
+ * Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,12 +20,12 @@
 #include "core/hash.h"
 #include "format/surface_patches.h"
 #include "geometry/cells.h"
+#include "levels/surface_mesh.h"
 
 #define NONE UINT32_MAX
 
 typedef struct joiner {
-    const ebpo_surface *surface;
-    const ebpo_info *info;
+    const ebpo_patch_reader *reader;
     ebpo_box box;
     ebpo_surface_mesh *out;
     uint64_t vertices, triangles; /* so far */
@@ -53,11 +54,33 @@ static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     uint32_t to = (uint32_t)j->vertices++;
     memcpy(j->out->mesh.xyz64 + 3 * (uint64_t)to, patch->xyz + 3 * v, 3 * sizeof(double));
     memcpy(j->out->normals + 3 * (uint64_t)to, patch->normals + 3 * v, 3 * sizeof(float));
-    if (patch->colours) {
+    if (j->out->colours.vertex)
+        memset(j->out->colours.vertex + 4 * (uint64_t)to, 0, 4);
+    if (j->out->colours.vertex && patch->colours) {
         memcpy(j->out->colours.vertex + 4 * (uint64_t)to, patch->colours + 3 * v, 3);
         j->out->colours.vertex[4 * (uint64_t)to + 3] = 255;
     }
     return to;
+}
+
+/* Returns the vertex of the coarsest border cell of levels below `levels` that contains the point
+ * and has a vertex, or NONE. */
+static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
+{
+    for (int level = 0; level < levels; level++) {
+        uint32_t cell[3];
+        double cells = ldexp(1, level + EBPO_PATCH_CELLS);
+        if (!j->level_used[level])
+            continue;
+        for (int k = 0; k < 3; k++)
+            cell[k] =
+                (uint32_t)fmin(fmax(floor((p[k] - j->box.origin[k]) / j->box.size[k] * cells), 0),
+                               cells - 1);
+        uint64_t i = find_slot(j, make_key(level, cell));
+        if (j->slot[i] != NONE)
+            return j->slot[i];
+    }
+    return NONE;
 }
 
 /* Returns the vertex that replaces a vertex on the border of a patch. */
@@ -87,11 +110,8 @@ static uint32_t join_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return j->slot[i];
 }
 
-static void add_patch(joiner *j, const ebpo_patch *patch, const bool *border, uint32_t *number)
+static void add_triangles(joiner *j, const ebpo_patch *patch, const uint32_t *number)
 {
-    for (uint64_t v = 0; v < patch->vertex_count; v++)
-        number[v] = border[v] ? join_vertex(j, patch, v) : add_vertex(j, patch, v);
-    j->level_used[patch->level] = true;
     for (uint64_t i = 0; i < patch->triangle_count; i++) {
         const uint32_t *t = patch->triangles + 3 * i;
         uint32_t joined[3] = { number[t[0]], number[t[1]], number[t[2]] };
@@ -101,10 +121,18 @@ static void add_patch(joiner *j, const ebpo_patch *patch, const bool *border, ui
     j->out->error = fmax(j->out->error, patch->error);
 }
 
+static void add_patch(joiner *j, const ebpo_patch *patch, const bool *border, uint32_t *number)
+{
+    for (uint64_t v = 0; v < patch->vertex_count; v++)
+        number[v] = border[v] ? join_vertex(j, patch, v) : add_vertex(j, patch, v);
+    j->level_used[patch->level] = true;
+    add_triangles(j, patch, number);
+}
+
 static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
 {
     ebpo_patch patch = EBPO_PATCH_INIT;
-    ebpo_status status = ebpo_surface_decode(j->surface, j->info, index, &patch, error);
+    ebpo_status status = j->reader->read(j->reader->user, index, &patch, error);
     if (status != EBPO_OK)
         return status;
     bool *border = ebpo_alloc(patch.vertex_count, sizeof *border);
@@ -120,6 +148,23 @@ static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
     return status;
 }
 
+/* Adds faces of the model; vertices that no face uses any more remain. */
+static ebpo_status join_faces(joiner *j, const ebpo_patch *faces, ebpo_error *error)
+{
+    uint32_t *number = ebpo_alloc(faces->vertex_count, sizeof *number);
+    if (!number)
+        return ebpo_fail_memory(error, faces->vertex_count * sizeof *number);
+    for (uint64_t v = 0; v < faces->vertex_count; v++) {
+        number[v] = find_vertex(j, faces->xyz + 3 * v, EBPO_PATCH_LEVEL + 1);
+        if (number[v] == NONE)
+            number[v] = add_vertex(j, faces, v);
+    }
+    add_triangles(j, faces, number);
+    j->out->faces = faces->triangle_count;
+    free(number);
+    return EBPO_OK;
+}
+
 void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh)
 {
     if (!mesh)
@@ -130,45 +175,101 @@ void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh)
     memset(mesh, 0, sizeof *mesh);
 }
 
-ebpo_status ebpo_surface_join(const ebpo_surface *surface, const ebpo_info *info,
-                              const uint64_t *patches, uint64_t count, ebpo_surface_mesh *out,
-                              ebpo_error *error)
+/* Counts vertices and triangles, and allocates the arrays. */
+static ebpo_status begin_mesh(joiner *j, const uint64_t *patches, uint64_t count,
+                              const ebpo_patch *faces, ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
-    joiner j = { .surface = surface, .info = info, .box = ebpo_root_box(info), .out = out };
-    uint64_t vertices = 0, triangles = 0;
-    memset(out, 0, sizeof *out);
+    ebpo_surface_mesh *out = j->out;
+    uint64_t vertices = faces ? faces->vertex_count : 0,
+             triangles = faces ? faces->triangle_count : 0;
     for (uint64_t i = 0; i < count; i++) {
-        if (patches[i] >= surface->patch_count || (i && patches[i] <= patches[i - 1]))
+        if (patches[i] >= j->reader->count || (i && patches[i] <= patches[i - 1]))
             return ebpo_fail(error, EBPO_E_ARGUMENT, "patches: not ascending numbers of patches");
-        const uint64_t *row = surface->patch + EBPO_PATCH_COLUMNS * patches[i];
+        const uint64_t *row = j->reader->row + EBPO_PATCH_COLUMNS * patches[i];
         vertices += row[EBPO_PATCH_VERTICES];
         triangles += row[EBPO_PATCH_TRIANGLES];
     }
     if (vertices >= NONE)
         return ebpo_fail(error, EBPO_E_LIMIT, "the patches have more than 2^32 - 2 vertices");
-    j.slots = ebpo_hash_slots(2 * vertices);
-    j.slot = ebpo_alloc(j.slots, sizeof *j.slot);
-    j.key = ebpo_alloc(j.slots, sizeof *j.key);
+    j->slots = ebpo_hash_slots(2 * vertices);
+    j->slot = ebpo_alloc(j->slots, sizeof *j->slot);
+    j->key = ebpo_alloc(j->slots, sizeof *j->key);
     out->mesh.xyz64 = ebpo_alloc(vertices, 3 * sizeof *out->mesh.xyz64);
     out->mesh.faces = ebpo_alloc(triangles, 3 * sizeof *out->mesh.faces);
     out->normals = ebpo_alloc(vertices, 3 * sizeof *out->normals);
-    out->colours.vertex = surface->colour ? ebpo_alloc(vertices, 4) : NULL;
-    ebpo_status status = EBPO_OK;
-    if (!j.slot || !j.key || !out->mesh.xyz64 || !out->mesh.faces || !out->normals ||
-        (surface->colour && !out->colours.vertex))
-        status = ebpo_fail_memory(error, vertices * 48);
-    else
-        memset(j.slot, 0xff, j.slots * sizeof *j.slot);
+    out->colours.vertex = j->reader->coloured ? ebpo_alloc(vertices, 4) : NULL;
+    if (!j->slot || !j->key || !out->mesh.xyz64 || !out->mesh.faces || !out->normals ||
+        (j->reader->coloured && !out->colours.vertex))
+        return ebpo_fail_memory(error, vertices * 48);
+    memset(j->slot, 0xff, j->slots * sizeof *j->slot);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader, const uint64_t *patches,
+                              uint64_t count, const ebpo_patch *faces, ebpo_surface_mesh *out,
+                              ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    joiner j = { .reader = reader, .box = ebpo_root_box(reader->info), .out = out };
+    memset(out, 0, sizeof *out);
+    out->pixels = NAN;
+    ebpo_status status = begin_mesh(&j, patches, count, faces, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         status = join_patch(&j, patches[i], error);
+    if (status == EBPO_OK && faces)
+        status = join_faces(&j, faces, error);
     out->mesh.vertex_count = j.vertices;
     out->mesh.face_count = j.triangles;
+    out->patches = count;
     free(j.slot);
     free(j.key);
     if (status != EBPO_OK)
         ebpo_surface_mesh_free(out);
     return status;
+}
+
+typedef struct decoding {
+    const ebpo_surface *surface;
+    const ebpo_info *info;
+} decoding;
+
+static ebpo_status decode_patch(const void *user, uint64_t patch, ebpo_patch *out,
+                                ebpo_error *error)
+{
+    const decoding *d = user;
+    return ebpo_surface_decode(d->surface, d->info, patch, out, error);
+}
+
+ebpo_status ebpo_surface_join(const ebpo_surface *surface, const ebpo_info *info,
+                              const uint64_t *patches, uint64_t count, ebpo_surface_mesh *out,
+                              ebpo_error *error)
+{
+    decoding d = { surface, info };
+    ebpo_patch_reader reader = { info,           decode_patch,         &d,
+                                 surface->patch, surface->patch_count, surface->colour != NULL };
+    return ebpo_patches_join(&reader, patches, count, NULL, out, error);
+}
+
+typedef struct reading {
+    const ebpo_patch_table *table;
+    ebpo_chunks *chunks;
+} reading;
+
+static ebpo_status read_patch(const void *user, uint64_t patch, ebpo_patch *out, ebpo_error *error)
+{
+    const reading *r = user;
+    return ebpo_patch_read(r->table, r->chunks, patch, out, error);
+}
+
+ebpo_status ebpo_table_join(const ebpo_patch_table *table, ebpo_chunks *chunks,
+                            const uint64_t *patches, uint64_t count, const ebpo_patch *faces,
+                            ebpo_surface_mesh *out, ebpo_error *error)
+{
+    reading r = { table, chunks };
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_patch_reader reader = { info,       read_patch,   &r,
+                                 table->row, table->count, info->surface_colours > 0 };
+    return ebpo_patches_join(&reader, patches, count, faces, out, error);
 }
 
 ebpo_status ebpo_surface_select(const ebpo_surface *surface, int level, uint64_t **patches,

@@ -8,6 +8,7 @@
 #include <ebpo/view.h>
 
 #include "format/file_nodes.h"
+#include "format/patch_table.h"
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "levels/stream.h"
@@ -41,6 +42,8 @@ ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *bo
 /* Converts a squared distance of ebpo_viewpoint_see to a distance in the model's unit. Returns NAN
  * without an observer. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
+/* Returns the size in pixels of a length at a distance. Returns NAN without an observer. */
+double ebpo_viewpoint_length(const ebpo_viewpoint *viewpoint, double length, double distance2);
 /* Returns the size in pixels of a cell's diagonal at the cell's distance. Returns NAN without an
  * observer. */
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
@@ -54,6 +57,12 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *
  * cells that do not contain each other may be compared. */
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
+
+/* Makes the mesh of ebpo_view_stream_surface. Reads the table of patches when it is needed. */
+EBPO_MUST_USE ebpo_status ebpo_view_surface(ebpo_patch_table *table, ebpo_chunks *chunks,
+                                            const ebpo_viewpoint *viewpoint,
+                                            const ebpo_view_options *options,
+                                            ebpo_surface_mesh *out, ebpo_error *error);
 
 /* --- the delivered part of a tree --- */
 

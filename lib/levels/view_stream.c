@@ -71,6 +71,7 @@ struct ebpo_view_stream {
     /* nodes that are deeper than this level, or smaller in pixels, are not prefetched yet */
     int soon_level;
     double soon_pixels;
+    ebpo_patch_table patches; /* read by ebpo_view_stream_surface */
 };
 
 static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebpo_error *error)
@@ -511,6 +512,7 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
     ebpo_partial_free(&s->partial);
     ebpo_frontier_free(&s->frontier);
     view_leaves_free(s->leaves);
+    ebpo_patch_table_free(&s->patches);
     free(s->envelopes);
     free(s);
 }
@@ -840,4 +842,12 @@ ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream, ebpo_view
 {
     static const ebpo_view_faces none = EBPO_VIEW_FACES_INIT;
     return EBPO_GIVE(ebpo_view_faces, out, stream->leaves ? &stream->leaves->current : &none);
+}
+
+ebpo_status ebpo_view_stream_surface(ebpo_view_stream *stream, ebpo_surface_mesh *out,
+                                     ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    return ebpo_view_surface(&stream->patches, stream->chunks, &stream->viewpoint, &stream->options,
+                             out, error);
 }

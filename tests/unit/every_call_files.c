@@ -458,7 +458,10 @@ static ebpo_status call_add_surface(every_call_env *e)
     if (status != EBPO_OK)
         return status;
     /* the model has too few faces */
-    status = ebpo_file_read_surface(e->file, 0, 20, &surface, e->error);
+    status = ebpo_file_read_patches(e->file, &surface, e->error);
+    ebpo_surface_free(&surface);
+    if (status == EBPO_E_ABSENT)
+        status = ebpo_file_read_surface(e->file, 0, 20, &surface, e->error);
     ebpo_surface_free(&surface);
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }

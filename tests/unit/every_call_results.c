@@ -336,8 +336,13 @@ static ebpo_status take_view(ebpo_view_stream *stream, int most, ebpo_error *err
 static ebpo_status view(ebpo_view_stream *stream, ebpo_view_options *options, ebpo_error *error)
 {
     ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
+    ebpo_surface_mesh mesh;
     int visited = 0;
-    ebpo_status status = take_view(stream, 50, error);
+    ebpo_status status = ebpo_view_stream_surface(stream, &mesh, error);
+    ebpo_surface_mesh_free(&mesh);
+    if (status != EBPO_E_ABSENT) /* the model has too few faces */
+        return status;
+    status = take_view(stream, 50, error);
     options->priority = EBPO_PRIORITY_DISTANCE;
     if (status == EBPO_OK)
         status = ebpo_view_stream_change(stream, options, error);

@@ -8,6 +8,7 @@
 #include <ebpo/lod.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
+#include <ebpo/view.h>
 
 #include "check_main.h"
 #include "construct/simplify.h"
@@ -243,6 +244,185 @@ START_TEST(test_hostile_codes)
 }
 END_TEST
 
+/* --- views --- */
+
+static const double *sorted_points;
+
+static int by_point(const void *a, const void *b)
+{
+    const double *p = sorted_points + 3 * (uint64_t) * (const uint32_t *)a,
+                 *q = sorted_points + 3 * (uint64_t) * (const uint32_t *)b;
+    for (int k = 0; k < 3; k++)
+        if (p[k] != q[k])
+            return p[k] < q[k] ? -1 : 1;
+    return 0;
+}
+
+/* Gives vertices at equal points the same index. */
+static void weld(ebpo_mesh *mesh)
+{
+    uint32_t *order = malloc(mesh->vertex_count * sizeof *order),
+             *number = malloc(mesh->vertex_count * sizeof *number);
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        order[v] = v;
+    sorted_points = mesh->xyz64;
+    qsort(order, mesh->vertex_count, sizeof *order, by_point);
+    for (uint64_t i = 0; i < mesh->vertex_count; i++)
+        number[order[i]] =
+            i && by_point(&order[i - 1], &order[i]) == 0 ? number[order[i - 1]] : order[i];
+    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+        mesh->faces[i] = number[mesh->faces[i]];
+    free(order);
+    free(number);
+}
+
+static void make_view(const char *name, uint32_t around, uint32_t across, ebpo_file **file)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    build(&tree, waves(around, across), 2);
+    must(ebpo_tree_write(&tree, scratch(name), NULL, &error), "write", &error);
+    ebpo_tree_free(&tree);
+    must(ebpo_open(scratch(name), file, &error), "open", &error);
+}
+
+/* Returns the bytes read from the file. */
+static uint64_t bytes_read(const ebpo_file *file)
+{
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    ebpo_file_get_stats(file, &stats);
+    return stats.bytes_read;
+}
+
+static ebpo_status take_view(const ebpo_file *file, const ebpo_view_options *options,
+                             ebpo_surface_mesh *out, ebpo_error *error)
+{
+    ebpo_view_stream *stream;
+    ebpo_status status = ebpo_view_stream_new(file, options, &stream, error);
+    if (status == EBPO_OK)
+        status = ebpo_view_stream_surface(stream, out, error);
+    ebpo_view_stream_free(stream);
+    return status;
+}
+
+/* Views of any error are closed, and no coarser than requested. The nearest patches are the finest.
+ * The error in the image holds at random points of the model. */
+START_TEST(test_views_are_closed)
+{
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    uint64_t before = 0;
+    make_view("view.ebpo.h5", 240, 130, &file);
+    observer.eye[0] = 1.2;
+    observer.eye[2] = 0.9;
+    options.observer = &observer;
+    for (double pixels = 64; pixels > 0.01; pixels /= 4)
+        for (int faces = 0; faces < 2; faces++) {
+            ebpo_surface_mesh mesh;
+            options.pixels = pixels;
+            options.faces = faces;
+            must(take_view(file, &options, &mesh, &error), "view", &error);
+            ck_assert(faces || mesh.faces == 0);
+            ck_assert(mesh.pixels <= pixels || (!faces && mesh.patches > 4));
+            ck_assert(faces || mesh.mesh.face_count >= before);
+            before = faces ? before : mesh.mesh.face_count;
+            weld(&mesh.mesh);
+            ck_assert(is_closed(&mesh.mesh));
+            ebpo_surface_mesh_free(&mesh);
+        }
+    ebpo_close(file);
+}
+END_TEST
+
+/* Without a limit of the error, all faces of the model are drawn, each once. */
+START_TEST(test_views_end_at_faces)
+{
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_surface_mesh mesh;
+    make_view("faces.ebpo.h5", 120, 70, &file);
+    options.faces = true;
+    must(take_view(file, &options, &mesh, &error), "view", &error);
+    ck_assert_uint_eq(mesh.patches, 0);
+    ck_assert_uint_eq(mesh.faces, ebpo_file_info(file)->face_count);
+    ck_assert_uint_eq(mesh.mesh.face_count, mesh.faces);
+    ck_assert_double_eq(mesh.error, 0);
+    weld(&mesh.mesh);
+    ck_assert(is_closed(&mesh.mesh));
+    ebpo_surface_mesh_free(&mesh);
+    ebpo_close(file);
+}
+END_TEST
+
+/* A limit of bytes is kept; a greater one gives a finer view. */
+START_TEST(test_views_within_bytes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    uint64_t before = 0;
+    ebpo_file *file;
+    make_view("bytes.ebpo.h5", 240, 130, &file);
+    uint64_t most = ebpo_file_info(file)->file_bytes;
+    ebpo_close(file);
+    for (uint64_t limit = 1000; limit <= most; limit += most / 9) {
+        ebpo_surface_mesh mesh;
+        must(ebpo_open(scratch("bytes.ebpo.h5"), &file, &error), "open", &error);
+        options.bytes = limit;
+        ebpo_status status = take_view(file, &options, &mesh, &error);
+        ck_assert(status == EBPO_OK || status == EBPO_E_LIMIT);
+        ck_assert(bytes_read(file) <= limit || status == EBPO_E_LIMIT);
+        ck_assert_uint_ge(mesh.mesh.face_count, before);
+        before = mesh.mesh.face_count;
+        ebpo_surface_mesh_free(&mesh);
+        ebpo_close(file);
+    }
+    ck_assert_uint_gt(before, 0);
+}
+END_TEST
+
+/* A subset with a box keeps the patches in the box; the view of the subset is that of the file. */
+START_TEST(test_boxes_keep_patches)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options subset = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    ebpo_file *file, *part;
+    ebpo_surface_mesh whole, kept;
+    make_view("whole.ebpo.h5", 300, 160, &file);
+    subset.boxed = true;
+    for (int k = 0; k < 3; k++) {
+        subset.min[k] = 0.2;
+        subset.max[k] = 2;
+    }
+    must(ebpo_subset(file, scratch("part.ebpo.h5"), &subset, &error), "subset", &error);
+    must(ebpo_open(scratch("part.ebpo.h5"), &part, &error), "open", &error);
+    uint64_t patches = ebpo_file_info(part)->surface_patches;
+    ck_assert_uint_gt(patches, 1);
+    ck_assert_uint_lt(patches, ebpo_file_info(file)->surface_patches);
+    must(ebpo_verify(part, NULL, &report, &error), "verify", &error);
+    ck_assert_uint_eq(report.violations, 0);
+    for (int k = 0; k < 3; k++)
+        observer.eye[k] = 0.9; /* in the box */
+    options.observer = &observer;
+    options.pixels = 12;
+    must(take_view(file, &options, &whole, &error), "view", &error);
+    must(take_view(part, &options, &kept, &error), "view of the part", &error);
+    ck_assert_uint_gt(kept.patches, 1);
+    ck_assert_uint_le(kept.patches, whole.patches);
+    weld(&kept.mesh);
+    ck_assert(is_closed(&kept.mesh));
+    ebpo_surface_mesh_free(&whole);
+    ebpo_surface_mesh_free(&kept);
+    ebpo_close(part);
+    ebpo_close(file);
+}
+END_TEST
+
 TEST_SUITE(surface)
 {
     Suite *suite = suite_create("surface");
@@ -254,6 +434,10 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_hostile_codes);
+    tcase_add_test(tests, test_views_are_closed);
+    tcase_add_test(tests, test_views_end_at_faces);
+    tcase_add_test(tests, test_views_within_bytes);
+    tcase_add_test(tests, test_boxes_keep_patches);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -477,3 +477,12 @@ void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_sto
         json_level(j, info, stored, &solid, i);
     json_end(j);
 }
+
+const char *facts_no_surface(const ebpo_info *info)
+{
+    enum { LEAST_FACES = 2048 }; /* format-spec/surface.md */
+    return info->pruned                      ? "subsets get none"
+           : !(info->parts & EBPO_PART_MESH) ? "files without their mesh get none"
+           : info->face_count < LEAST_FACES  ? "models with fewer than 2,048 faces get none"
+                                             : "its faces are too small beside the model";
+}

@@ -31,4 +31,7 @@ void facts_arrays_json(json *j, const ebpo_file *file);
 void facts_attributes(FILE *out, const ebpo_file *file);
 void facts_attributes_json(json *j, const ebpo_file *file);
 
+/* Returns why a file without a simplified surface gets none. */
+const char *facts_no_surface(const ebpo_info *info);
+
 #endif

@@ -159,7 +159,7 @@ build_package() {
     core="object.c model.c queries.c levels.c view_stream.c subtrees.c attributes.c check.c no_encoders.c"
     # shellcheck disable=SC2086
     link_module ebpo.wasm "" $core
-    link_module ebpo-view.wasm -small object.c view.c view_faces.c no_encoders.c
+    link_module ebpo-view.wasm -small object.c view.c view_faces.c surface.c no_encoders.c
     # shellcheck disable=SC2086
     link_module ebpo-collide.wasm "" $core collide.c
     version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
@@ -174,5 +174,5 @@ mkdir -p "$deps/include"
 [ -f "$deps/.complete" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.complete"; }
 folders='core|geometry|io|hdf5_read|hdf5_write|mesh|format'
 build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
-build_library -small "$folders" -Os # for the viewers' module, whose size delays the first picture
+build_library -small "$folders|levels" -Os # for the viewers' module, whose size delays the first picture
 build_package

@@ -1,6 +1,6 @@
 // Controls the page: requests, the picture, and messages to and from the worker.
 import { cutOf } from './address.js';
-import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from './statistics.js';
+import { frameMs, frameTook, isDeeper, makeLevels, showLevel, showLevels, showStats } from './statistics.js';
 import { busy, bytes, showError, showLine, showOpening } from './line.js';
 import { probeAt, probeShown, probeWith } from './probe.js';
 import { listSamples } from './samples.js';
@@ -154,7 +154,7 @@ const handlers = {
     $('facts').textContent = `${count(i.face_count)} faces · ${i.solid ? 'solid' : 'surface'} · levels 0–${i.level_count - 1} · ${bytes(m.size)}`;
     for (const id of ['panel', 'bar', 'tools'])
       $(id).hidden = id === 'panel' && innerWidth <= 760;
-    const stops = i.level_count - 1 + (i.parts.has('mesh') ? 1 : 0);
+    const stops = i.level_count - 1 + (isDeeper(i) ? 1 : 0);
     $('level').max = stops;
     makeLevels(chooseLevel);
     layout();
@@ -240,27 +240,36 @@ function cameraMoved() {
 function frameDrawn(ms, info) {
   frameTook(ms, info.calls);
   emit('frame');
+  if (state.idle && state.frames.length <= AUTO.frames && !state.together)
+    refineMore();
 }
 
 function requestCut() {
   clearTimeout(timer);
   timer = undefined;
-  const mesh = state.info?.parts.has('mesh') && Number($('level').value) === state.info.level_count;
-  const level = mesh ? 99 : state.info ? Number($('level').value) : state.levelAsked ?? 99; // while the file is being opened, the level of the address
+  const top = state.info ? Number($('level').value) === state.info.level_count : state.levelAsked === undefined; // while the file is being opened, the level of the address counts
+  const mesh = top && state.info?.parts.has('mesh'), level = top ? 99 : state.info ? Number($('level').value) : state.levelAsked;
+  const surface = top && document.querySelector('input[name=colouring]:checked').value === 'plain' && !$('cells').checked;
   state.idle = false;
   if (state.info)
     busy(true);
   worker.postMessage({ type: 'view', view: scene.view(), want: {
-    number: ++state.want, level, mesh: Boolean(mesh), pixels: detail(), triangles: detail() === 0 ? Infinity : TRIANGLES_MOST,
+    number: ++state.want, level, mesh: Boolean(mesh), surface, pixels: detail(), triangles: detail() === 0 ? Infinity : TRIANGLES_MOST,
     black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked } });
 }
 
 // Automatic detail begins with 16 pixels. When this detail is complete, it changes to 8 pixels if frames are fast, and to 32 pixels if frames are slow.
-const AUTO = { first: 16, fast: 8, fastMs: 30, slow: 32, slowMs: 150 };
+const AUTO = { first: 16, fast: 8, fastMs: 30, slow: 32, slowMs: 150, frames: 4 };
 const detail = () => ($('detail').value === 'auto' ? state.auto : Number($('detail').value));
 
 function refineMore() {
-  if ($('detail').value !== 'auto' || state.auto !== AUTO.first || !state.frames.length || (frameMs() > AUTO.fastMs && frameMs() < AUTO.slowMs))
+  if ($('detail').value !== 'auto' || state.auto !== AUTO.first)
+    return;
+  if (state.frames.length < AUTO.frames) { // draws the same picture again, to measure
+    scene.redraw();
+    return;
+  }
+  if (frameMs() > AUTO.fastMs && frameMs() < AUTO.slowMs)
     return;
   state.auto = frameMs() <= AUTO.fastMs ? AUTO.fast : AUTO.slow;
   requestCut();
@@ -282,6 +291,8 @@ function chooseLevel(level) {
 function colouringChanged() {
   const mode = document.querySelector('input[name=colouring]:checked').value;
   scene.setColouring(mode);
+  if (state.info?.parts.has('surface')) // other colours are those of envelopes
+    requestCut();
   changed();
   const key = (c, text) => {
     const span = document.createElement('span'), i = document.createElement('i');
@@ -386,6 +397,18 @@ $('toolPanel').onclick = () => {
   $('panel').hidden = !$('panel').hidden;
   layout();
 };
+$('ortho').onchange = () => scene.setOrthographic($('ortho').checked);
+$('zUp').onchange = () => {
+  scene.setUp($('zUp').checked);
+  setHomeView();
+};
+$('turn').onchange = () => scene.setTurntable($('turn').checked);
+$('toolFull').onclick = () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen())
+  .catch((e) => showError({ message: `no full screen: ${e.message}` }));
+const tool = (id) => () => more().then(() => $(id)?.click());
+$('toolMeasure').onclick = tool('measureOn');
+$('toolNote').onclick = tool('noteAdd');
+$('toolSection').onclick = () => choose('clip', 1);
 $('toolHelp').onclick = () => $('help').showModal();
 let down;
 $('canvas').addEventListener('pointerdown', (e) => (down = e.button === 0 ? [e.clientX, e.clientY] : undefined));
@@ -433,7 +456,7 @@ const slide = (id, step, then) => () => {
 const KEYS = {
   arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('cellFaces'), w: click('wire'), c: click('cells'), m: click('own'),
   k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, cutChanged), ']': slide('clipAt', 15, cutChanged), '/': click('clipFlip'),
-  f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
+  v: click('ortho'), z: click('zUp'), s: click('turn'), f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
   ',': slide('level', -1, levelChanged), '.': slide('level', 1, levelChanged),
   escape: () => {
     emit('escape');

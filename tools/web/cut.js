@@ -3,6 +3,7 @@
 //
 // Coordinates of the scene: the model's box is centred on the origin and scaled so that half its diagonal is 1. They are computed in double precision and then rounded.
 import { Field } from './field.js';
+import { Heap } from './heap.js';
 import { Hidden } from './hidden.js';
 import { MeshStore } from './mesh.js';
 import { BLACK, GRAY, LEAF, WHITE } from './tree.js';
@@ -30,37 +31,6 @@ const FACES_KEPT = 1.5e6;      // in addition to the faces of the cut
 export function sceneOf(info) {
   const center = info.box_origin.map((o, k) => o + info.box_size[k] / 2);
   return { center, scale: 2 / Math.hypot(...info.box_size) };
-}
-
-// A priority queue, largest first.
-class Heap {
-  constructor() {
-    this.items = [];
-  }
-
-  push(item) {
-    const a = this.items;
-    let i = a.push(item) - 1;
-    for (let up; i > 0 && a[up = (i - 1) >> 1].px < item.px; i = up)
-      a[i] = a[up];
-    a[i] = item;
-  }
-
-  pop() {
-    const a = this.items, top = a[0], last = a.pop();
-    if (a.length) {
-      let i = 0;
-      for (let c; (c = 2 * i + 1) < a.length; i = c) {
-        if (c + 1 < a.length && a[c + 1].px > a[c].px)
-          c++;
-        if (a[c].px <= last.px)
-          break;
-        a[i] = a[c];
-      }
-      a[i] = last;
-    }
-    return top;
-  }
 }
 
 export class Cut {
@@ -201,6 +171,13 @@ export class Cut {
   #vectorOf(node) {
     this.made += node.polytope ? 0 : 1.4; // the excess is for ancestors, which get polytopes too
     return planeVector(this.tree.polytope(node), this.half[node.level]);
+  }
+
+  /** Removes all tiles, because something else is drawn instead. Returns their keys. */
+  clear() {
+    const keys = [...this.tiles.keys()];
+    this.tiles.clear();
+    return keys;
   }
 
   #stats() {

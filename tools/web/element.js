@@ -162,7 +162,8 @@ export class EbpoViewerElement extends HTMLElement {
     this.#several?.moved();
     if (this.#several || !this.#client)
       return;
-    this.#client.look(this.#scene.view(), { level, mesh: Boolean(info?.parts.has('mesh')) && level >= info.level_count, pixels, triangles: pixels === 0 ? Infinity : TRIANGLES_MOST,
+    this.#client.look(this.#scene.view(), { level, mesh: Boolean(info?.parts.has('mesh')) && level >= info.level_count,
+      surface: Boolean(info) && level >= info.level_count && !['level', 'type'].includes(this.getAttribute('colour')), pixels, triangles: pixels === 0 ? Infinity : TRIANGLES_MOST,
       black: this.#scene.cut !== undefined, lines: false, cells: false });
   }
 

@@ -1,5 +1,6 @@
 // Stores the received real faces, with shared vertices for smooth shading. A face that several leaves list is stored once.
-const CREASE = 0.866;        // cosine of 30 degrees: an edge between faces with a greater angle is drawn sharp
+const SMOOTH = 0.766;        // cosine of 40 degrees: greatest angle between a face and the mean of the faces at a corner that is drawn smooth
+const CREASE = 0.866;        // cosine of 30 degrees: at other corners, an edge between faces with a greater angle is drawn sharp
 const NONE = 0xffffffff;
 const EMPTY = new Uint32Array(0);
 
@@ -143,13 +144,24 @@ export class MeshStore {
     sum[3] += Math.hypot(...n);
   }
 
-  /** Computes the normal at a corner into `out`: the mean, by angles, of the faces around the vertex whose normals differ by at most 30 degrees from this face's. */
+  /**
+   * Computes the normal at a corner into `out`: the mean, by angles, of the faces around the vertex. If it differs by more than 40 degrees from this face's normal,
+   * only faces whose normals differ by at most 30 degrees count.
+   */
   cornerNormal(c, out) {
+    const { normal } = this, own = 3 * Math.floor(c / 3);
+    this.#meanNormal(c, -1, out);
+    const dot = normal[own] * out[0] + normal[own + 1] * out[1] + normal[own + 2] * out[2];
+    if (dot < SMOOTH * Math.hypot(out[0], out[1], out[2]))
+      this.#meanNormal(c, CREASE, out);
+  }
+
+  #meanNormal(c, least, out) {
     const { normal, next, angle } = this, own = 3 * Math.floor(c / 3);
     out[0] = out[1] = out[2] = 0;
     for (let other = this.last[this.corner[c]]; other !== NONE; other = next[other]) {
       const f = 3 * Math.floor(other / 3);
-      if (normal[f] * normal[own] + normal[f + 1] * normal[own + 1] + normal[f + 2] * normal[own + 2] < CREASE)
+      if (normal[f] * normal[own] + normal[f + 1] * normal[own + 1] + normal[f + 2] * normal[own + 2] < least)
         continue;
       for (let k = 0; k < 3; k++)
         out[k] += angle[other] * normal[f + k];

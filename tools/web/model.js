@@ -113,7 +113,8 @@ export class EbpoModel extends Object3D {
     const height = heightOf(renderer), { level, mesh, detail, triangles, info } = this;
     const faces = mesh && level >= info.level_count && info.parts.has('mesh');
     this.client.look(lookOf(camera, height, this.content.matrixWorld),
-      { level: Math.min(level, 99), mesh: faces, pixels: detail, triangles: detail === 0 ? Infinity : triangles, black: this.cut !== undefined, lines: false, cells: false });
+      { level: Math.min(level, 99), mesh: faces, surface: level >= info.level_count, pixels: detail,
+        triangles: detail === 0 ? Infinity : triangles, black: this.cut !== undefined, lines: false, cells: false });
   }
 
   /** Shows only the part of the model inside a Box3, in this object's coordinates; undefined shows the whole model. */

@@ -39,8 +39,18 @@ export async function openModel(what, { module = viewModule(), cacheBytes = 64 <
     const kept = new KeptSource(source);
     return new ModelFile(source, kept, await openWith(module, kept, { memory: cacheBytes }, View));
   } catch (error) {
-    throw errorOf(error, source.name);
+    const known = errorOf(error, source.name);
+    throw known.code === 'FORMAT' ? await otherFormat(source) ?? known : known;
   }
+}
+
+const BEGINNINGS = { PLY: /^ply\s/, OFF: /^(ST|C|N)*OFF\s/, STL: /^solid\s/, OBJ: /^(#[^\n]*\n\s*)*(mtllib|o|g|v|vn|vt)\s/, glTF: /^(glTF|\s*\{)/ };
+
+// Returns the error of a mesh file that was opened instead of a model, or undefined.
+async function otherFormat(source) {
+  const bytes = await source.read(0, Math.min(source.size, 400)).catch(() => new Uint8Array(0)), text = String.fromCharCode(...bytes);
+  const found = Object.keys(BEGINNINGS).find((name) => BEGINNINGS[name].test(text)) ?? (/\.stl$/i.test(source.name) && 'STL');
+  return found ? new EbpoError('FORMAT', `${source.name}: this is a mesh file (${found}); convert it: ebpo convert MESH MODEL.ebpo.h5`) : undefined;
 }
 
 class ModelFile {
@@ -79,6 +89,16 @@ class ModelFile {
     if (!this.info.parts.has('mesh'))
       throw new EbpoError('ABSENT', `${this.source.name}: the file has no mesh; convert the model again with its mesh`);
     return this.#named(this.view.leafFaces(leaves.map(({ level, parent, octant, subtree = -1 }) => ({ level, group: parent?.rank ?? 0, octant, subtree }))));
+  }
+
+  /** Reads the table of patches, as View.patches(). */
+  patches() {
+    return this.#named(this.view.patches());
+  }
+
+  /** Reads patches as one mesh, as View.surface(). */
+  surface(wanted, place) {
+    return this.#named(this.view.surface(wanted, place));
   }
 
   close() {

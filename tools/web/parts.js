@@ -1,14 +1,14 @@
 // Components of the page's tools: folding sections of the panel, marks over the picture, opening and saving files.
 import { $, emit, on, state } from './state.js';
 
-/** Adds a folding section to the panel, before the statistics. `html` must be trusted; texts of users are set only as text content. */
+/** Adds a folding section to the panel, before the octree's structure. `html` must be trusted; texts of users are set only as text content. */
 export function section(title, html, { open = false } = {}) {
   const details = document.createElement('details'), part = document.createElement('section'), summary = document.createElement('summary');
   summary.textContent = title;
   details.open = open;
   details.append(summary, Object.assign(document.createElement('div'), { innerHTML: html }));
   part.append(details);
-  $('stats').closest('section').before(part);
+  $('structure').closest('section').before(part);
   return details;
 }
 

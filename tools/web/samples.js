@@ -6,7 +6,7 @@ import { $, count } from './state.js';
 export async function listSamples(address, open) {
   const list = await (await fetch(address)).json();
   $('samples').hidden = list.length === 0;
-  $('samples').querySelector('ul').replaceChildren(...list.map(({ name, file, scene, instances, faces, bytes: size }) => {
+  $('samples').querySelector('ul').replaceChildren(...list.map(({ name, file, scene, picture, instances, faces, bytes: size }) => {
     const li = document.createElement('li'), a = document.createElement('a'), small = document.createElement('small');
     const url = new URL(scene ?? file, new URL(address, location.href)).href;
     a.href = `?${scene ? 'scene' : 'file'}=${encodeURIComponent(url)}`;
@@ -16,6 +16,8 @@ export async function listSamples(address, open) {
         open(url);
       };
     small.textContent = [instances && `${count(instances)} instances`, faces && `${count(faces)} faces`, size && bytes(size)].filter(Boolean).join(' · ');
+    if (picture)
+      a.append(Object.assign(document.createElement('img'), { src: new URL(picture, new URL(address, location.href)).href, alt: '', loading: 'lazy' }));
     a.append(name, small);
     li.append(a);
     return li;

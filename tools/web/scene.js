@@ -14,12 +14,13 @@ export const kit = {
 };
 
 const PICK_ROUNDING = 1e-6; // of a picked point: drawn triangles have coordinates in single precision
+const PAUSE_MS = 30; // a frame that is requested later after the last one does not measure the interval of frames
 const TURN = Math.PI / 24, MOVE = 0.06; // steps of the keys: radians, and shares of the distance
 
 export class Scene {
   /**
-   * Calls `changed()` when the camera has moved, `drawn(ms)` after each frame, and `lost(true)` when the browser takes the graphics context away and `lost(false)`
-   * when the context is restored.
+   * Calls `changed()` when the camera has moved, `drawn(ms)` after each frame, with the interval since the last frame (undefined: after a pause), and `lost(true)`
+   * when the browser takes the graphics context away and `lost(false)` when the context is restored.
    */
   constructor(canvas, { context, contextOptions, fieldOfView }, { changed, drawn, lost = () => {} }) {
     this.canvas = canvas;
@@ -28,13 +29,8 @@ export class Scene {
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(fieldOfView, 1, 0.001, 100);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
-    this.controls.dampingFactor = 0.12;
-    this.controls.zoomToCursor = true;
-    this.controls.minDistance = 0.002;
-    this.controls.maxDistance = 12;
-    this.controls.addEventListener('change', () => {
+    this.fieldOfView = fieldOfView;
+    this.#control(() => {
       this.redraw();
       changed();
     });
@@ -54,6 +50,57 @@ export class Scene {
     this.observer.observe(canvas.parentElement);
     this.resize();
     this.home();
+  }
+
+  // Makes the controls of the camera. They keep the upward direction with which they are made.
+  #control(changed) {
+    this.controls?.dispose();
+    const controls = this.controls = new OrbitControls(this.camera, this.canvas);
+    controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    controls.dampingFactor = 0.12;
+    controls.zoomToCursor = true;
+    controls.autoRotateSpeed = 4;
+    this.moved = changed;
+    controls.addEventListener('change', changed);
+    this.#limit();
+  }
+
+  // A camera with a narrow lens is far away.
+  get #away() {
+    return Math.tan(this.fieldOfView * Math.PI / 360) / Math.tan(this.camera.fov * Math.PI / 360);
+  }
+
+  #limit() {
+    this.controls.minDistance = 0.002 * this.#away;
+    this.controls.maxDistance = 12 * this.#away;
+  }
+
+  /** Draws without perspective, by a lens of 0.1 degrees; keeps the size of the model in the picture. */
+  setOrthographic(on) {
+    const { target } = this.controls, before = this.#away;
+    this.camera.fov = on ? 0.1 : this.fieldOfView;
+    this.#limit();
+    this.camera.position.sub(target).multiplyScalar(this.#away / before).add(target);
+    this.controls.update();
+    this.#offset();
+    this.redraw();
+    this.moved();
+  }
+
+  /** Turns the picture so that the model's z axis, or its y axis, points upwards. */
+  setUp(z) {
+    const { target, autoRotate } = this.controls;
+    this.camera.up.set(0, z ? 0 : 1, z ? 1 : 0);
+    this.#control(this.moved);
+    this.controls.target.copy(target);
+    this.controls.autoRotate = autoRotate;
+    this.home();
+    this.moved();
+  }
+
+  setTurntable(on) {
+    this.controls.autoRotate = on;
+    this.redraw();
   }
 
   // Draws a triangle without area, so that the shaders are compiled while the model is being fetched.
@@ -128,7 +175,9 @@ export class Scene {
     const { clientWidth: w, clientHeight: h } = this.canvas.parentElement, [right, bottom] = this.insets ?? [0, 0];
     const narrow = Math.min(h - bottom, w - right) / Math.max(h, 1), distance = 0.98 / Math.sin(this.camera.fov * Math.PI / 360) / Math.max(narrow, 0.25);
     this.controls.target.set(0, 0, 0);
-    this.camera.position.set(0.42, 0.32, 0.85).setLength(Math.min(distance, 11));
+    this.camera.position.set(0.42, 0.32, 0.85).setLength(Math.min(distance, 11 * this.#away));
+    if (this.camera.up.z)
+      this.camera.position.set(this.camera.position.x, -this.camera.position.z, this.camera.position.y);
     this.controls.update();
     this.redraw();
   }
@@ -149,10 +198,11 @@ export class Scene {
       const step = new THREE.Vector3(by[0], by[1], 0).multiplyScalar(distance * MOVE).applyQuaternion(this.camera.quaternion);
       target.add(step);
     } else {
-      const around = new THREE.Spherical().setFromVector3(offset);
+      const upright = new THREE.Quaternion().setFromUnitVectors(this.camera.up, new THREE.Vector3(0, 1, 0));
+      const around = new THREE.Spherical().setFromVector3(offset.applyQuaternion(upright));
       around.theta += by[0] * TURN;
       around.phi = Math.min(Math.PI - 0.01, Math.max(0.01, around.phi - by[1] * TURN));
-      offset.setFromSpherical(around);
+      offset.setFromSpherical(around).applyQuaternion(upright.invert());
     }
     this.place = { eye: offset.add(target).toArray(), target: target.toArray() };
   }
@@ -267,13 +317,17 @@ export class Scene {
   }
 
   redraw() {
-    if (!this.requested)
+    if (!this.requested) {
+      this.asked = performance.now();
       this.requested = requestAnimationFrame(() => this.#draw());
+    }
   }
 
   #draw() {
+    const began = performance.now(), interval = this.asked - this.ended < PAUSE_MS ? began - this.began : undefined; // the browser begins a frame when the last one is on its way to the screen
+    this.began = began;
     this.requested = undefined;
-    this.controls.update(); // damping requests the next frame
+    this.controls.update(); // damping and the turntable request the next frame
     const distance = this.camera.position.length();
     this.camera.near = Math.max(0.0005, (distance - 1.05) * 0.5);
     this.camera.far = distance + 1.5;
@@ -283,12 +337,12 @@ export class Scene {
       for (const ball of [this.probeBall, this.probeCore, this.nearBall])
         ball.scale.setScalar(size);
     }
-    const began = performance.now();
     if (this.pipeline)
       this.pipeline.render(this);
     else
       this.renderer.render(this.scene, this.camera);
-    this.drawn(performance.now() - began, this.renderer.info.render);
+    this.ended = performance.now();
+    this.drawn(interval, this.renderer.info.render);
   }
 }
 

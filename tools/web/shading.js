@@ -9,7 +9,7 @@ export const styled = () => new Promise((done) => {
 
 /** Adds the switches for shading by depth and ambient occlusion, which `pipeline` draws. `changed()`: called after a change. */
 export function addShading(scene, pipeline, changed) {
-  let last = $('cells').closest('label');
+  let last = $('wire').closest('label');
   for (const [id, name, key, member] of [['dome', 'Shade by depth', 'E', 'dome'], ['ambient', 'Ambient occlusion', 'A', 'surroundings']]) {
     const label = Object.assign(document.createElement('label'), { className: 'switch', innerHTML: `<input type="checkbox" id="${id}"><span>${name}</span><kbd>${key}</kbd>` });
     last.after(label);
@@ -24,8 +24,8 @@ export function addShading(scene, pipeline, changed) {
   applyShown(wordsOf(new URLSearchParams(location.search)));
 }
 
-// Identifiers of the panel's switches, by their words in the address: show=depth,occlusion,wireframe,cells.
-const SWITCHES = { depth: 'dome', occlusion: 'ambient', wireframe: 'wire', cells: 'cells' };
+// Identifiers of the panel's switches, by their words in the address: show=depth,occlusion,wireframe,cells,orthographic,z-up.
+const SWITCHES = { depth: 'dome', occlusion: 'ambient', wireframe: 'wire', cells: 'cells', orthographic: 'ortho', 'z-up': 'zUp' };
 /** Returns the words of the parameter `show`. */
 export const wordsOf = (query) => (query.get('show') ?? '').split(',');
 

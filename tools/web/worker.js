@@ -9,6 +9,7 @@ import { addLevels, growForView } from './grow.js';
 import { openModel } from './model_file.js';
 import { viewModule } from './ebpo/view.js'; // workers have no import maps
 import { UrlSource, sourceOf } from './source.js';
+import { KEY, Surface } from './surface.js';
 import { Tree } from './tree.js';
 
 const LINE_MS = 250;                      // interval between reports of progress to the page
@@ -103,6 +104,11 @@ class OpenFile {
     let result;
     do {
       this.again = false;
+      if (this.slot.want.surface && this.file.info.parts.has('surface')) {
+        result = await this.#refineSurface();
+        continue;
+      }
+      this.#dropSurface();
       result = this.cut.update(this.slot.view, this.slot.want);
       this.#send(result);
       if (result.deeper && !this.busy.nodes && !this.busy.level)
@@ -113,6 +119,36 @@ class OpenFile {
     } while (!this.ended && (this.again || result.more));
     if (!this.ended && !this.busy.level && !this.busy.nodes && !this.busy.mesh)
       post(this.slot, { type: 'idle', opening: this.number, want: this.slot.want.number, traffic: this.file.traffic, deeper: result.deeper });
+  }
+
+  // Draws the simplified surface instead of envelopes. Returns { more } as Cut.update() does.
+  async #refineSurface() {
+    const { view, want } = this.slot;
+    this.busy.mesh = true; // what the page reports while it waits
+    try {
+      this.surface ??= new Surface(this.file.info, this.cut.scene, await this.file.patches(), this.cut.small);
+      const next = this.surface.next(view, want), name = `${next.name} ${want.lines}`;
+      if (name !== this.drawn) {
+        const mesh = await this.file.surface(next.chosen, this.cut.scene), tile = this.surface.tileOf(mesh, want.lines);
+        if (this.ended)
+          return { more: false };
+        this.surface.read(next);
+        this.drawn = name;
+        const stats = { nodes: next.chosen.length, triangles: tile.triangles, meshTriangles: tile.meshTriangles, cellFaceTriangles: 0, tiles: 1, levels: [] };
+        this.#send({ set: [tile], removed: this.cut.clear(), stats: { ...stats, surface: { pixels: next.pixels, error: next.error } } });
+      }
+      return { more: !next.last };
+    } finally {
+      this.busy.mesh = false;
+    }
+  }
+
+  // Removes the surface's tile, if it is drawn, before envelopes are drawn.
+  #dropSurface() {
+    if (this.drawn === undefined)
+      return;
+    this.drawn = undefined;
+    this.leaving = true;
   }
 
   #meshAllowed() {
@@ -153,6 +189,9 @@ class OpenFile {
   }
 
   #send({ set, removed, stats }) {
+    if (this.leaving) // the surface's tile goes with the first envelopes
+      removed = [...removed, KEY];
+    this.leaving = false;
     const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.normal.buffer, t.hue?.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
     post(this.slot, { type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: this.slot.want.number }, transfer);
   }

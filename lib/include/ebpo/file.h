@@ -1104,6 +1104,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_surface(const ebpo_file *file,
                                                           ebpo_error *error);
 
 /*
+ * Reads only the table of all patches: out->patch, and the counts. Free it with ebpo_surface_free.
+ * Errors and threads are those of ebpo_file_read_surface.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_patches(const ebpo_file *file, ebpo_surface *out,
+                                                          ebpo_error *error);
+
+/*
  * Decodes patch `index`, to be freed by ebpo_patch_free. `info`: of the file or tree.
  *
  * EBPO_E_ARGUMENT: there is no such patch. EBPO_E_FORMAT: its code is wrong. EBPO_E_MEMORY.

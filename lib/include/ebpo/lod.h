@@ -171,6 +171,15 @@ typedef struct ebpo_surface_mesh {
      * cracks are within the error of the coarser patch.
      */
     double error;
+
+    /*
+     * Greatest error of the patches in the image, in pixels; see ebpo_view_stream_surface. NAN
+     * without an observer.
+     */
+    double pixels;
+
+    /* Number of patches, and of faces of the model that replace other patches. */
+    uint64_t patches, faces;
 } ebpo_surface_mesh;
 
 /* Frees the arrays and clears the struct. Threads: one at a time per struct. */

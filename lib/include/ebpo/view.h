@@ -23,6 +23,7 @@
 #ifndef EBPO_VIEW_H
 #define EBPO_VIEW_H
 
+#include <ebpo/lod.h>
 #include <ebpo/stream.h>
 
 #ifdef __cplusplus
@@ -321,6 +322,35 @@ typedef struct ebpo_view_stats {
  */
 EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
                                                 ebpo_view_stats *out);
+
+/*
+ * Makes a mesh for the observer from patches of the simplified surface (EBPO_PART_SURFACE), without
+ * cracks. Independent of the delivered nodes; reads the patches that it uses, and the table of all
+ * patches.
+ *
+ * The patch of the root is replaced by the patches of the node's children, and so on: first the
+ * visible patch with the greatest error in the image. Members of the options apply to patches as to
+ * nodes: unseen, distance, level, bytes and memory. With `faces`, patches without patches below are
+ * replaced by the model's faces. `priority` is ignored.
+ *
+ * pixels: no visible patch with a greater error in the image is used, unless another option
+ * prevents its replacement. The error in the image is the size in pixels of ebpo_patch.error, at
+ * the distance from the eye to the nearest point of the node's cell and in the middle of the image.
+ * 0: there is no limit, so the finest patches are used.
+ *
+ * out     freed by ebpo_surface_mesh_free; cleared on failure. `error` is the greatest error of
+ *         the patches that were used, `pixels` the greatest error in the image of the visible
+ *         ones. Both are bounds for the patches as they are stored; a vertex that was replaced to
+ *         close a crack is on a coarser patch.
+ *
+ * EBPO_E_ABSENT: the file does not have the part; or `faces`, and it has no mesh. EBPO_E_LIMIT:
+ * options.bytes is too small for the patch of the root. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: one at a time per stream. Source: format-spec/surface.md.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_surface(ebpo_view_stream *stream,
+                                                            ebpo_surface_mesh *out,
+                                                            ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -33,6 +33,7 @@ typedef struct convert_reported {
     const char *in, *out; /* `in`: name for messages */
     bool piped;           /* the mesh came from standard input */
     bool json, quiet, timings;
+    bool wants_surface;    /* --parts names the simplified surface */
     bool repair_requested; /* --repair was given */
     bool chosen;           /* the parts were chosen by size */
     bool by_groups;        /* warnings are reported for each group, not here */
@@ -193,6 +194,9 @@ static ebpo_status convert_report_file(const convert_reported *t, const mesh_inp
         print_levels(info, &solid);
         print_next(t, info, p);
     }
+    if (status == EBPO_OK && t->wants_surface && !(ebpo_file_info(file)->parts & EBPO_PART_SURFACE))
+        fprintf(stderr, "ebpo convert: %s: note: no simplified surface was added: %s\n", t->out,
+                facts_no_surface(ebpo_file_info(file)));
     ebpo_close(file);
     return status;
 }
@@ -321,6 +325,8 @@ static convert_reported reported_of(const values *v, const char *in, const char 
                                .out = out,
                                .json = v->json,
                                .quiet = v->quiet,
+                               .wants_surface = v->parts && v->parts[0] != '-' &&
+                                                listed_parts(v->parts) & EBPO_PART_SURFACE,
                                .timings = v->timings,
                                .repair_requested = v->repairs_wanted.repair,
                                .chosen = chooses_parts(v),

@@ -3,7 +3,9 @@
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 
+#include <ebpo/lod.h>
 #include <ebpo/stream.h>
 
 #include "cli/command.h"
@@ -173,6 +175,65 @@ static void print_legend(const ebpo_info *info)
         table_beyond(stdout);
 }
 
+/* --- the simplified surface --- */
+
+/* Prints the patches that make the picture of a level, as ebpo_surface_select. */
+static void print_patches(printer *p, const ebpo_surface *s, int level, const uint64_t *patches,
+                          uint64_t count)
+{
+    uint64_t triangles = 0, error = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        const uint64_t *row = s->patch + EBPO_PATCH_COLUMNS * patches[i];
+        triangles += row[EBPO_PATCH_TRIANGLES];
+        error = row[EBPO_PATCH_ERROR] > error ? row[EBPO_PATCH_ERROR] : error;
+    }
+    const double *size = p->info->box_size;
+    double bound = ldexp((double)error, -32) * fmax(size[0], fmax(size[1], size[2]));
+    if (p->v->json) {
+        json_object(&p->j, NULL);
+        json_int(&p->j, "level", level);
+        json_uint(&p->j, "patches", count);
+        json_uint(&p->j, "triangles", triangles);
+        json_real(&p->j, "error", bound);
+        json_end(&p->j);
+    } else {
+        printf("%5d %9" PRIu64 " %9" PRIu64 " %12.4g\n", level, count, triangles, bound);
+    }
+}
+
+static int level_of(uint64_t octcode)
+{
+    int level = 0;
+    for (; octcode > 1; octcode >>= 3)
+        level++;
+    return level;
+}
+
+static ebpo_status print_surface(printer *p, const ebpo_file *file, int to, ebpo_error *error)
+{
+    ebpo_surface s;
+    ebpo_status status = ebpo_file_read_patches(file, &s, error);
+    if (status != EBPO_OK)
+        return status;
+    int last = level_of(s.patch[EBPO_PATCH_COLUMNS * (s.patch_count - 1) + EBPO_PATCH_OCTCODE]);
+    if (p->v->json)
+        json_array(&p->j, "surface");
+    else
+        puts("simplified surface; error: largest distance from the model, in its unit\n"
+             "level   patches triangles        error");
+    for (int level = 0; level <= last && level <= to && status == EBPO_OK; level++) {
+        uint64_t *patches = NULL, count = 0;
+        status = ebpo_surface_select(&s, level, &patches, &count, error);
+        if (status == EBPO_OK)
+            print_patches(p, &s, level, patches, count);
+        free(patches);
+    }
+    if (p->v->json)
+        json_end(&p->j);
+    ebpo_surface_free(&s);
+    return status;
+}
+
 static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, bool *arrived,
                                  ebpo_error *error)
 {
@@ -195,14 +256,17 @@ static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, 
     int to = p->v->max_level >= 0 ? (int)p->v->max_level : last;
     ebpo_stream_prefetch(stream, to);
     status = report_levels(p, stream, to, arrived, error);
+    if (p->v->json)
+        json_end(&p->j);
+    else if (status == EBPO_OK && *arrived)
+        print_legend(p->info);
+    if (status == EBPO_OK && *arrived && !p->v->nodes && p->info->parts & EBPO_PART_SURFACE)
+        status = print_surface(p, file, to, error);
     traffic t = traffic_of(file);
     if (p->v->json) {
-        json_end(&p->j);
         remote_json(&p->j, &t, &p->v->remote);
         json_finish(&p->j);
     } else {
-        if (status == EBPO_OK && *arrived)
-            print_legend(p->info);
         remote_report(&t, &p->v->remote, false);
     }
     ebpo_stream_free(stream);

@@ -52,8 +52,8 @@ static ebpo_status choose_codec(const values *v, const ebpo_info *info, ebpo_wri
     return error->status = EBPO_E_ARGUMENT;
 }
 
-static void print_words(const ebpo_info *info, const char *out, const ebpo_info *from,
-                        double seconds)
+static void print_words(const values *v, const ebpo_info *info, const char *out,
+                        const ebpo_info *from, double seconds)
 {
     char before[32], after[32], hex[65], subtrees[40];
     words_hex(info->content_sha256, hex);
@@ -64,6 +64,8 @@ static void print_words(const ebpo_info *info, const char *out, const ebpo_info 
         fputs(", with the border of the surface", stdout);
     if (info->parts & ~from->parts & EBPO_PART_SURFACE)
         fputs(", with the simplified surface", stdout);
+    if (v->parts && !(info->parts & EBPO_PART_SURFACE))
+        printf(", without a simplified surface: %s", facts_no_surface(info));
     if (info->subtree_level)
         printf(", %s below level %d",
                words_plural(subtrees, sizeof subtrees, info->level[info->subtree_level].gray_count,
@@ -100,7 +102,7 @@ static ebpo_status report_sizes(const values *v, const char *out, const ebpo_fil
     if (status == EBPO_OK && v->json)
         print_json(v, ebpo_file_info(file), &stored, out, ebpo_file_info(from), &t, seconds);
     else if (status == EBPO_OK)
-        print_words(ebpo_file_info(file), out, ebpo_file_info(from), seconds);
+        print_words(v, ebpo_file_info(file), out, ebpo_file_info(from), seconds);
     if (status == EBPO_OK && !v->json)
         remote_report(&t, &v->remote, false);
     ebpo_close(file);

@@ -190,6 +190,8 @@ static void print_summary(const subset_values *v, const char *out_path, const eb
     if (info->parts & EBPO_PART_MESH && info->face_count < from->face_count)
         printf(", %" PRIu64 " of %" PRIu64 " faces", info->face_count, from->face_count);
     subset_print_target(info, v->target_size && !v->parts && v->profile < 0 && !v->levels);
+    if (info->kept_error > 0 && from->parts & ~info->parts & EBPO_PART_SURFACE)
+        printf(", without the simplified surface, which has the faces of pruned nodes");
     if (t->remote)
         printf(", %s in %" PRIu64 " requests", words_bytes(got, sizeof got, t->http.bytes),
                t->http.requests);

@@ -176,6 +176,13 @@ export interface ViewNodes extends StreamNodes {
   faceCount?: Uint32Array; faceCorners?: Float64Array; faceNumber?: Uint32Array; faceRepeated?: Uint8Array;
 }
 
+/** A mesh of the simplified surface; members as in ebpo_surface_mesh (ebpo/lod.h): 3 numbers of each vertex, normal and triangle,
+ * 4 bytes of each vertex's colour; `faces`: number of faces of the model. `pixels` is NaN without an observer. */
+export interface SurfaceMesh {
+  vertices: Float64Array; normals: Float32Array; triangles: Uint32Array; colours?: Uint8Array;
+  error: number; pixels: number; patches: number; faces: number;
+}
+
 /** Nodes in the order of their importance to an observer. */
 export class ViewStream {
   private constructor();
@@ -189,6 +196,8 @@ export class ViewStream {
   change(options: ViewOptions): void;
   /** Returns the nodes that are not replaced, without faces. */
   cut(): ViewNodes;
+  /** Makes a mesh for the observer from the part `surface`, as ebpo_view_stream_surface (ebpo/view.h); independent of next(). */
+  surface(options?: QueryOptions): Promise<SurfaceMesh>;
   readonly stats: { nodes: number; cut: { white: number; black: number; leaves: number; gray: number }; waiting: number;
     pixels: number; bytesRead: number };
   dispose(): void;

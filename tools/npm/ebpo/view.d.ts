@@ -13,6 +13,14 @@ export interface LeafAddress { level: number; group: number; octant: number; sub
 /** Faces of a leaf: file indices (Model.maps() gives the source indices of queries), corners (9 numbers each), colours (red, green and blue of each corner). */
 export interface LeafFaces { numbers: Uint32Array; corners: Float32Array | Float64Array; colours?: Uint8Array }
 
+/** A patch of the simplified surface: position of its cell, error in the model's unit, number of triangles, and of faces that it
+ * replaces; the patches of the node's children have the indices from `child` to `end`, exclusive. */
+export interface SurfacePatch { level: number; at: number[]; error: number; triangles: number; faces: number; child: number; end: number }
+
+/** Patches as one mesh: number of triangles, and of faces of the model among them; (coordinate - center) * scale; octahedral normals;
+ * red, green, blue and 0 (255: no colour) of each vertex. */
+export interface DrawnSurface { triangles: number; faces: number; position: Float32Array; normal: Int16Array; hue?: Uint8Array; index: Uint32Array }
+
 /** A file opened for drawing. It has `info` and dispose() as Model has, and none of Model's queries. */
 export class View {
   private constructor();
@@ -23,6 +31,8 @@ export class View {
   readonly sums?: Promise<void>;
   nodes(wanted: { level: number; part: number }[], options?: QueryOptions & { bytes?: number }): Promise<NodePart[]>;
   leafFaces(leaves: LeafAddress[], options?: QueryOptions): Promise<LeafFaces[]>;
+  patches(options?: QueryOptions): Promise<SurfacePatch[]>;
+  surface(wanted: { patch: number; faces: boolean }[], options: QueryOptions & { center: number[]; scale: number }): Promise<DrawnSurface>;
   levelBytes(options?: QueryOptions): Promise<Float64Array>;
   dispose(): void;
 }

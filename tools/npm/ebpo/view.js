@@ -41,11 +41,11 @@ export class View extends Model {
       await this.#read(...call); // compares the chunks
   }
 
-  /** Evaluates a call with numbers as its first arguments, and returns its result arrays. */
-  async #read(name, numbers, columns, args, signal) {
-    this.#early?.push([name, numbers, columns, args, signal]);
+  /** Evaluates a call with numbers as its first arguments, after the first `skipped` ones in rows, and returns its result arrays. */
+  async #read(name, numbers, columns, args, signal, skipped = 0) {
+    this.#early?.push([name, numbers, columns, args, signal, skipped]);
     const { heap, object } = Model.parts(this), values = Float64Array.from(numbers);
-    await Model.repeat([this], () => heap.lend(values, (at) => heap.call(name, object, at, values.length / columns, ...args)), object, signal);
+    await Model.repeat([this], () => heap.lend(values, (at) => heap.call(name, object, at, (values.length - skipped) / columns, ...args)), object, signal);
     return (n, Type) => heap.result(object, n, Type);
   }
 
@@ -80,6 +80,27 @@ export class View extends Model {
       const from = at, to = at += count;
       return { numbers: numbers.subarray(from, to), corners: corners.subarray(9 * from, 9 * to), colours: this.coloured ? colours.subarray(9 * from, 9 * to) : undefined };
     });
+  }
+
+  /** Returns the table of patches of the part `surface`: [{ level, at, error, triangles, faces, child, end }]. */
+  async patches({ signal } = {}) {
+    const array = await this.#read('ebpo_js_patches', [], 1, [], signal), facts = array(0, Float64Array), out = [];
+    for (let i = 0; i < facts.length; i += 9) {
+      const [level, x, y, z, error, triangles, faces, child, end] = facts.subarray(i, i + 9);
+      out.push({ level, at: [x, y, z], error, triangles, faces, child, end });
+    }
+    return out;
+  }
+
+  /**
+   * Reads patches as one mesh without cracks: `wanted` is [{ patch, faces }], with ascending indices in the table. With `faces`, the model's faces replace the
+   * patch. Positions are (coordinate - center) * scale; normals are octahedral.
+   */
+  async surface(wanted, { center, scale, signal }) {
+    const numbers = [...center, scale, ...wanted.flatMap(({ patch, faces }) => [patch, +faces])];
+    const array = await this.#read('ebpo_js_surface', numbers, 2, [], signal, 4);
+    const [triangles, faces] = array(0, Float64Array), hue = array(3, Uint8Array);
+    return { triangles, faces, position: array(1, Float32Array), normal: array(2, Int16Array), hue: hue.length ? hue : undefined, index: array(4, Uint32Array) };
   }
 
   /** Returns the number of bytes of the file for levels 0 to i. */

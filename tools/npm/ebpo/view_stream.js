@@ -98,6 +98,13 @@ export class ViewStream {
     return { nodes, cut: { white, black, leaves, gray }, waiting, pixels, bytesRead };
   }
 
+  async surface({ signal } = {}) {
+    await this.#access.repeat(['ebpo_js_view_surface'], this.#object, signal);
+    const array = this.#access.array(this.#object), [error, pixels, patches, faces] = array(4, Float64Array), colours = array(2, Uint8Array);
+    return { vertices: array(0, Float64Array), normals: array(1, Float32Array), triangles: array(3, Uint32Array), ...(colours.length ? { colours } : {}),
+      error, pixels, patches, faces };
+  }
+
   dispose() {
     if (this.#query)
       this.#access.end(this.#query);

@@ -28,7 +28,8 @@ typedef struct ebpo_js_object {
     ebpo_stream *stream;
     ebpo_view_stream *view;
     ebpo_sampler *sampler;
-    struct ebpo_chunks *chunks; /* of a view */
+    struct ebpo_chunks *chunks;       /* of a view */
+    struct ebpo_patch_table *patches; /* of a view */
     uint64_t chunk_memory;
     bool within_level; /* the stream has begun a level whose nodes are not all read */
     ebpo_js_array array[EBPO_JS_ARRAYS];

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/error.h"
-#include "format/chunks.h"
+#include "format/patch_table.h"
 #include "module.h"
 
 /* ---- results ---- */
@@ -103,6 +103,9 @@ ebpo_js_object *EBPO_JS(ebpo_js_new)(double size, const char *name, const char *
 void EBPO_JS(ebpo_js_free)(ebpo_js_object *object)
 {
     ebpo_chunks_free(object->chunks);
+    if (object->patches)
+        ebpo_patch_table_free(object->patches);
+    free(object->patches);
     ebpo_close(object->file);
     ebpo_async_free(object->async);
     ebpo_js_free_arrays(object);

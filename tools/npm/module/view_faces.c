@@ -5,12 +5,12 @@
 
 #include <ebpo/file.h>
 
+#include "format/face_colours.h"
 #include "format/file_in.h"
 #include "format/pick_rows.h"
 #include "format/schema.h"
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
-#include "mesh/attributes.h"
 #include "module.h"
 
 enum { LISTS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
@@ -183,64 +183,13 @@ static ebpo_status find_faces(ebpo_js_object *object, const wanted_leaf *wanted,
 
 /* ---- colours of faces ---- */
 
-/* The columns of a file's colours. */
-typedef struct colour_source {
-    ebpo_attributes *arrays; /* those without colours have no element */
-    ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
-    const char *element; /* NULL: the file has no colours */
-} colour_source;
-
-/* Returns true if the file states that all values of the columns are equal. */
-static bool is_constant(const ebpo_file *file, const ebpo_attributes *arrays,
-                        const ebpo_colour_column *column)
-{
-    for (int k = 0; k < 3; k++) {
-        const ebpo_attribute_in *in = &file->attributes.head[column[k].of - arrays->array];
-        if (!in->has_range || in->range[0] != in->range[1])
-            return false;
-    }
-    return true;
-}
-
-/* Finds the colours: those of vertices, unless only faces have colours or all vertices have the
- * same colour. Returns false if there is not enough memory. */
-static bool find_colours(const ebpo_file *file, colour_source *out)
-{
-    uint8_t none;
-    ebpo_colour_column of_faces[EBPO_COLOUR_CHANNELS];
-    out->arrays = ebpo_attributes_make(NULL);
-    out->element = NULL;
-    for (uint64_t n = 0; out->arrays && n < file->attributes.count; n++) {
-        ebpo_attribute *a = ebpo_attributes_add(out->arrays, &file->attributes.head[n].head);
-        if (!a)
-            return false;
-        a->values = &none; /* arrays without values are not searched */
-    }
-    if (!out->arrays)
-        return false;
-    if (ebpo_colour_columns(out->arrays, "vertex", out->column))
-        out->element = "vertex";
-    if (ebpo_colour_columns(out->arrays, "face", of_faces) &&
-        (!out->element || is_constant(file, out->arrays, out->column))) {
-        out->element = "face";
-        memcpy(out->column, of_faces, sizeof of_faces);
-    }
-    for (uint64_t n = 0; n < out->arrays->count; n++) {
-        ebpo_attribute *a = &out->arrays->array[n];
-        a->values = NULL;
-        if (!out->element ||
-            (out->column[0].of != a && out->column[1].of != a && out->column[2].of != a))
-            *a->element = 0;
-    }
-    return true;
-}
-
 /* Returns 1 if faces or vertices have colours. */
 int EBPO_JS(ebpo_js_coloured)(ebpo_js_object *object)
 {
-    colour_source colours;
-    bool coloured = find_colours(object->file, &colours) && colours.element;
-    ebpo_attributes_free(colours.arrays);
+    ebpo_face_colours colours;
+    bool coloured = ebpo_face_colours_find(object->file, &colours, &object->error) == EBPO_OK &&
+                    colours.element;
+    ebpo_face_colours_free(&colours);
     return coloured;
 }
 
@@ -248,21 +197,15 @@ int EBPO_JS(ebpo_js_coloured)(ebpo_js_object *object)
 static ebpo_status put_colours(ebpo_js_object *object, const uint32_t *faces,
                                const uint32_t *vertices, uint32_t count)
 {
-    colour_source colours;
-    ebpo_status status = find_colours(object->file, &colours) ? EBPO_OK : EBPO_E_MEMORY;
-    bool by_face = status == EBPO_OK && colours.element && *colours.element == 'f';
-    uint64_t rows = by_face ? count : 3 * (uint64_t)count;
-    uint8_t *to = NULL;
+    ebpo_face_colours colours;
+    ebpo_status status = ebpo_face_colours_find(object->file, &colours, &object->error);
     if (status == EBPO_OK && colours.element && count) {
-        status = ebpo_pick_attributes(object->chunks, colours.arrays, colours.element,
-                                      by_face ? faces : vertices, rows, 1, &object->error);
-        to = status == EBPO_OK ? ebpo_js_extend(object, FACE_COLOURS, count, 9) : NULL;
-        status = status == EBPO_OK && !to ? EBPO_E_MEMORY : status;
+        uint8_t *to = ebpo_js_extend(object, FACE_COLOURS, count, 9);
+        status = to ? ebpo_face_colours_read(&colours, object->chunks, faces, vertices, count, to,
+                                             &object->error)
+                    : EBPO_E_MEMORY;
     }
-    for (uint64_t i = 0; to && i < 3 * (uint64_t)count; i++)
-        for (int k = 0; k < 3; k++)
-            to[3 * i + (unsigned)k] = ebpo_colour_byte(&colours.column[k], by_face ? i / 3 : i);
-    ebpo_attributes_free(colours.arrays);
+    ebpo_face_colours_free(&colours);
     return status;
 }
 

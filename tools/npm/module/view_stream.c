@@ -166,3 +166,26 @@ int EBPO_JS(ebpo_js_view_stats)(ebpo_js_object *object)
                       (double)s.bytes_read };
     return status == EBPO_OK ? ebpo_js_put(object, 0, out, sizeof out) : status;
 }
+
+/* Puts the mesh of ebpo_view_stream_surface. Arrays: 0: double [3], vertices; 1: float [3],
+ * normals; 2: uint8 [4], colours, or none; 3: uint32 [3], triangles; 4: double [4]: error, pixels,
+ * number of patches, number of faces of the model. */
+int EBPO_JS(ebpo_js_view_surface)(ebpo_js_object *object)
+{
+    ebpo_surface_mesh mesh;
+    ebpo_js_clear(object);
+    ebpo_status status = ebpo_view_stream_surface(object->view, &mesh, &object->error);
+    if (status != EBPO_OK)
+        return status;
+    size_t count = (size_t)mesh.mesh.vertex_count;
+    double facts[4] = { mesh.error, mesh.pixels, (double)mesh.patches, (double)mesh.faces };
+    bool ok =
+        ebpo_js_put(object, 0, mesh.mesh.xyz64, count * 24) == EBPO_OK &&
+        ebpo_js_put(object, 1, mesh.normals, count * 12) == EBPO_OK &&
+        ebpo_js_put(object, 2, mesh.colours.vertex, mesh.colours.vertex ? count * 4 : 0) ==
+            EBPO_OK &&
+        ebpo_js_put(object, 3, mesh.mesh.faces, (size_t)mesh.mesh.face_count * 12) == EBPO_OK &&
+        ebpo_js_put(object, 4, facts, sizeof facts) == EBPO_OK;
+    ebpo_surface_mesh_free(&mesh);
+    return ok ? EBPO_OK : EBPO_E_MEMORY;
+}

@@ -23,7 +23,7 @@ from .errors import (AbsentError, ArgumentError, Cancelled, Error, ExistingFileE
 from .model import Model, open
 from .results import AllHits, Bounds, Hits, Located, Nearest
 from .paint import Areas, Paint, Stroke
-from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, half_spaces
+from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, Surface, half_spaces
 from .scene import Scene, open_scene
 from .haptic import Haptic, HapticResult, ProbeResult
 
@@ -42,7 +42,7 @@ def library() -> str:
 
 __all__ = [
     "open", "Model", "open_async", "AsyncModel", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
-    "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
+    "Mesh", "Maps", "Level", "Subtree", "Surface", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
     "Catalogue", "Collider", "pose", "boolean", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
     "Haptic", "HapticResult", "ProbeResult", "Paint", "Stroke", "Areas", "PaintKind",
     "convert", "bar", "library",

@@ -16,7 +16,8 @@ from ._library import Handle, Reporter, call, copied, lib, made, size_in_bytes
 from .automatic import Automatic
 from .errors import IOFailure, LimitError, NoMemory
 from .forks import renew_after_fork
-from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, read_level, read_maps, read_mesh
+from .parts import (Attributes, Info, Level, Maps, Mass, Mesh, Subtree, Surface, observer_of, read_level, read_maps,
+                    read_mesh, read_surface)
 from .point_queries import PointQueries
 from .queries import Rows
 from .signatures import ArrayLike, Doubles, Path, Progress, Size, Source
@@ -404,6 +405,26 @@ class Model(PointQueries):
         """
         with Reporter(progress) as reported:
             return read_level(self.file, level, cell_faces, self._threads, reported)
+
+    def surface(self, *, eye: ArrayLike | None = None, pixels: float = 0, level: int | None = None,
+                direction: ArrayLike = (0, 0, 0), up: ArrayLike = (0, 1, 0), fov: float = 45,
+                size: tuple[int, int] = (1280, 720), bytes: Size | None = None, faces: bool = False) -> Surface:
+        """Return a mesh of the simplified surface (the file's part `surface`), without cracks.
+
+        eye, direction, up, fov, size: the observer, as in ebpo_observer (ebpo/view.h); fov in degrees, size in
+            pixels. Without an eye, all patches are equally fine; without a direction, all are visible.
+        pixels: the allowed error in the image. 0: the finest patches.
+        level: the deepest level of patches. bytes: limit of bytes read from the file since it was opened.
+        faces: read faces of the model where the finest patches are too coarse.
+
+        Raises AbsentError if the file has no part `surface`.
+        """
+        observer = None if eye is None else observer_of(eye, direction, up, fov, size)
+        if observer is None and pixels:
+            raise ValueError("pixels needs an eye")
+        return read_surface(self.file, observer, priority=c.EBPO_PRIORITY_LEVEL, pixels=float(pixels), faces=faces,
+                            level=-1 if level is None else within(index_of(level, "level"), 0, c.EBPO_LEVELS_MAX - 1, "level"),
+                            bytes=size_in_bytes(bytes))
 
     def octcode(self, point: ArrayLike, level: int) -> int:
         """Return the octcode of the cell of a level that contains a point. Returns 0 for a point outside the root cell.

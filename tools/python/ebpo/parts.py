@@ -8,7 +8,7 @@ from typing import Any, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._checked import integers, members_of
+from ._checked import doubles, index_of, integers, members_of, within
 from ._library import Handle, Struct, array, call, copied, lib, made, text
 from .signatures import ArrayLike, Doubles, Int8s, Int32s, Int64s, Uint8s, Uint32s, Uint64s, Vertices
 
@@ -57,6 +57,26 @@ class Level(NamedTuple):
     winding: Int32s
     volume: Doubles
     colour: Uint8s | None
+
+
+class Surface(NamedTuple):
+    """A mesh of the simplified surface, for pictures.
+
+    vertices: (v, 3) float64, in the model's unit. faces: (f, 3) uint32. normals: (v, 3) float32.
+    colours: (v, 3) uint8, sRGB, or None when the file has none.
+    error: float, the greatest distance of a patch from the model, in the model's unit.
+    pixels: float, the greatest error of a visible patch in the image; nan without an eye.
+    patches: int, the number of patches. model_faces: int, the number of faces of the model among `faces`.
+    """
+
+    vertices: Doubles
+    faces: Uint32s
+    normals: Vertices
+    colours: Uint8s | None
+    error: float
+    pixels: float
+    patches: int
+    model_faces: int
 
 
 class Mass(NamedTuple):
@@ -194,6 +214,29 @@ def read_level(file: Handle, level: int, cell_faces: bool, threads: int, progres
         colour = np.stack([rows["colour"] >> shift & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
     return Level(vertices, faces, np.repeat(whose, corners - 2), rows["octcode"].copy(),
                  rows["type"].astype(np.int8), rows["winding"].copy(), rows["volume"].copy(), colour)
+
+
+def observer_of(eye: ArrayLike, direction: ArrayLike, up: ArrayLike, fov: float, size: tuple[int, int]) -> Any:
+    given = {name: doubles(value, name) for name, value in (("eye", eye), ("direction", direction), ("up", up))}
+    for name, value in given.items():
+        if value.shape != (3,):
+            raise ValueError(f"{name} must be three numbers")
+    width, height = (within(index_of(n, "size"), 1, 2**31 - 1, "size") for n in size)
+    return made(c.ebpo_observer, **{name: tuple(value) for name, value in given.items()}, fov=float(fov), width=width,
+                height=height)
+
+
+def read_surface(file: Handle, observer: Any, **members: Any) -> Surface:
+    options = made(c.ebpo_view_options, planes=False, observer=ctypes.pointer(observer) if observer else None, **members)
+    stream = Handle.made("ebpo_view_stream_new", file, ctypes.byref(options), free="ebpo_view_stream_free", keep=(file,))
+    mesh = Struct(c.ebpo_surface_mesh, "ebpo_surface_mesh_free")
+    call("ebpo_view_stream_surface", stream, mesh)
+    inner = mesh.c.mesh
+    count = inner.vertex_count
+    colours = array(mesh, mesh.c.colours.vertex, (count, 4), np.uint8)
+    return Surface(array(mesh, inner.xyz64, (count, 3), np.float64),
+                   array(mesh, inner.faces, (inner.face_count, 3), np.uint32), array(mesh, mesh.c.normals, (count, 3), np.float32),
+                   None if colours is None else colours[:, :3], mesh.c.error, mesh.c.pixels, mesh.c.patches, mesh.c.faces)
 
 
 TYPES = [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.float32, np.float64]

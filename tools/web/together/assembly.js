@@ -215,7 +215,8 @@ export class Assembly {
     const shares = sharesOf(triangles, seen.map(({ view, shown, info }) => ({ weight: shown.length / (1 + view.also.length) * [view, ...view.also].reduce((sum, v) => sum + weightOf(v), 0),
       copies: shown.length, faces: 2 * info.face_count })));
     seen.forEach((model, i) => {
-      const wanted = { level: 99, mesh: mesh && model.info.parts.has('mesh'), pixels, triangles: pixels === 0 ? Infinity : shares[i], black: this.cut !== undefined, lines: false, cells: false };
+      const wanted = { level: 99, mesh: mesh && model.info.parts.has('mesh'), surface: model.look.uniforms.colouring.value === 0,
+        pixels, triangles: pixels === 0 ? Infinity : shares[i], black: this.cut !== undefined, lines: false, cells: false };
       if (model.client.look(model.view, wanted))
         model.idle = false;
     });
