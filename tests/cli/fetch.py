@@ -267,6 +267,34 @@ def attributes(tool, plain, url):
                                                                                  same_ply.compare))
 
 
+def surface(tool, ply, url):
+    """Patches of the simplified surface are fetched, kept, or reported as omitted. Coarse levels do not read the mesh."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, out, near, mesh = (os.path.join(folder, name) for name in ("s.ebpo.h5", "o.ebpo.h5", "n.ebpo.h5", "m.ply"))
+        run(tool, "convert", "-q", "--parts=+surface", ply, path)
+        Handler.data, Handler.etag = content(path), '"surface"'
+        for options, holds in (([], True), (["--levels", "0-2"], True), (["--box", "0,0,-1,2,2,1"], True),
+                               (["--profile", "collision"], False)):
+            Handler.reset()
+            done = run(tool, "fetch", *options, url, out)
+            run(tool, "subset", "-q", *options, path, near)
+            found = json.loads(run(tool, "info", "--json", out).stdout)
+            expect(f"surface, {options}", done.returncode == 0 and content(out) == content(near)
+                   and ("surface" in found["parts"]) == holds, (done.stderr, found["parts"]))
+            expect(f"surface, {options}: verify", run(tool, "verify", "-q", out).returncode == 0)
+        done = run(tool, "subset", "--max-error", "0.05", path, near)
+        expect("an omitted surface is reported", "without the simplified surface" in done.stdout, done.stdout)
+        facts = json.loads(run(tool, "info", "--json", path).stdout)
+        for level in ("2", "3"):
+            Handler.reset()
+            run(tool, "extract", "-q", "--level", level, url, mesh)
+            remote = content(mesh)
+            run(tool, "extract", "-q", "--level", level, path, mesh)
+            expect(f"level {level} by its URL", remote == content(mesh) and Handler.sent < 0.3 * facts["bytes"]["file"],
+                   (Handler.sent, facts["bytes"]))
+        expect("levels by URL", run(tool, "levels", url).stdout.count("simplified surface") == 1)
+
+
 def main():
     tool, generate = sys.argv[1:3]
     with tempfile.TemporaryDirectory() as folder:
@@ -290,6 +318,7 @@ def main():
         small = os.path.join(folder, "small.ply")
         subprocess.run([generate, "--base", "torus", "--faces", "40000", small], check=True, capture_output=True)
         attributes(tool, small, url)
+        surface(tool, ply, url)
         done = run(tool, "fetch", url + "/nothing", "/proc/nowhere/x.ebpo.h5")
         expect("no folder", done.returncode in (1, 2)
                and done.stderr.startswith("ebpo fetch: /proc/nowhere/x.ebpo.h5"), done.stderr)

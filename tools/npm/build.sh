@@ -174,5 +174,5 @@ mkdir -p "$deps/include"
 [ -f "$deps/.complete" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.complete"; }
 folders='core|geometry|io|hdf5_read|hdf5_write|mesh|format'
 build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
-build_library -small "$folders|levels" -Os # for the viewers' module, whose size delays the first picture
+build_library -small "$folders|levels_surface" -Os # for the viewers' module, whose size delays the first picture
 build_package

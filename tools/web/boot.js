@@ -90,5 +90,5 @@
   const a = azimuth * Math.PI / 180, h = height * Math.PI / 180, away = [Math.sin(a) * Math.cos(h), Math.sin(h), Math.cos(a) * Math.cos(h)];
   worker.postMessage({ type: 'open', opening: 1, what: boot.url, ahead: boot.ahead });
   worker.postMessage({ type: 'view', view: { eye: away.map((x, k) => (at[k] ?? 0) + x * distance), planes: [], pixels: innerHeight / (2 * Math.tan(FIELD_OF_VIEW * Math.PI / 360)) },
-    want: { number: 0, level: boot.level ?? 99, mesh: false, pixels: boot.detail ?? 16, triangles: 2_000_000 } });
+    want: { number: 0, level: boot.level ?? 99, mesh: false, surface: boot.level === undefined && !query.has('colour'), pixels: boot.detail ?? 16, triangles: 2_000_000 } });
 })();

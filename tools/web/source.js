@@ -157,6 +157,16 @@ export class UrlSource {
     return have === offset ? rest.data : joined([first.data.subarray(offset, have), rest.data]);
   }
 
+  /** Ends the first response early, because most of its remaining bytes are not needed. Bytes that are needed later are requested again. */
+  stop() {
+    const { first } = this, abort = this.running.get(first);
+    if (!abort || this.whole)
+      return;
+    first.to = first.end;
+    first.finish();
+    abort.abort();
+  }
+
   /** The number of the file's first bytes that the first response has or will have. Reading them needs no further request. */
   get coming() {
     return this.whole ? this.whole.length : this.first ? (this.running.has(this.first) ? Math.min(this.first.to, this.size ?? 0) : this.first.end) : 0;

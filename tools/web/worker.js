@@ -15,6 +15,7 @@ import { Tree } from './tree.js';
 const LINE_MS = 250;                      // interval between reports of progress to the page
 const TIMEOUT_MS = 20000;                 // longest time without a byte
 const FIRST_LEVELS = 5;                   // normally contained in the response to the first request
+const LARGE_FILE = 2 * 1024 * 1024;       // files of more bytes are not read beyond the first levels, if their surface is drawn
 const SMALL_FILE = 8 * 1024 * 1024;       // files of fewer bytes are small
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // for larger meshes: limit of fetched bytes until the camera moves
 const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same limit for files with subtrees, where few fetched bytes are unused
@@ -62,6 +63,8 @@ class OpenFile {
     this.file.sums?.catch((error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     this.root();
+    if (this.#drawsSurface() && source.size > LARGE_FILE)
+      source.stop?.(); // most of the response would be envelopes
     await this.file.locate();
     if (!this.ended)
       post(this.slot, { type: 'located', opening: this.number, bytesTo: this.file.levelBytes, traffic: this.file.traffic });
@@ -104,7 +107,7 @@ class OpenFile {
     let result;
     do {
       this.again = false;
-      if (this.slot.want.surface && this.file.info.parts.has('surface')) {
+      if (this.#drawsSurface()) {
         result = await this.#refineSurface();
         continue;
       }
@@ -121,9 +124,15 @@ class OpenFile {
       post(this.slot, { type: 'idle', opening: this.number, want: this.slot.want.number, traffic: this.file.traffic, deeper: result.deeper });
   }
 
+  #drawsSurface() {
+    return Boolean(this.slot.want?.surface) && this.file.info.parts.has('surface');
+  }
+
   // Draws the simplified surface instead of envelopes. Returns { more } as Cut.update() does.
   async #refineSurface() {
     const { view, want } = this.slot;
+    if (this.drawn === undefined && !this.cut.tiles.size) // the first picture: envelopes that have already come
+      this.#send(this.cut.update(view, { ...want, level: this.tree.depth, mesh: false }));
     this.busy.mesh = true; // what the page reports while it waits
     try {
       this.surface ??= new Surface(this.file.info, this.cut.scene, await this.file.patches(), this.cut.small);
