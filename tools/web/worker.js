@@ -131,7 +131,7 @@ class OpenFile {
   // Draws the simplified surface instead of envelopes. Returns { more } as Cut.update() does.
   async #refineSurface() {
     const { view, want } = this.slot;
-    if (this.drawn === undefined && !this.cut.tiles.size) // the first picture: envelopes that have already come
+    if (this.drawn === undefined && !this.cut.tiles.size && this.file.info.parts.has('planes')) // the first picture: envelopes that have already come
       this.#send(this.cut.update(view, { ...want, level: this.tree.depth, mesh: false }));
     this.busy.mesh = true; // what the page reports while it waits
     try {

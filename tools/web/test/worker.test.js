@@ -55,3 +55,25 @@ test('a failed query is reported to its sender, and a closed file sends no more 
   await going;
   assert.deepEqual(late, []);
 });
+
+test('a view with a surface sends one tile, and a view without it sends envelopes again', async () => {
+  const blob = new Blob([readFileSync(fileURLToPath(new URL('../../../format-spec/vectors/passed/70_surface_with_subtrees.ebpo.h5', import.meta.url)))]);
+  const want = { level: 99, mesh: false, surface: true, pixels: 16, triangles: 2e6 }, view = { eye: [0, 0, 2], planes: [], pixels: 800 }, shown = new Set();
+  listeners.push((m) => {
+    if (m.file === 3 && m.type === 'tiles') {
+      m.removed.forEach((key) => shown.delete(key));
+      m.set.forEach(({ key }) => shown.add(key));
+    }
+  });
+  const idle = (number) => heard((m) => m.file === 3 && m.type === 'idle' && m.want === number), located = heard((m) => m.file === 3 && m.type === 'located');
+  emit({ file: 3, type: 'open', opening: 1, what: blob, ahead: 1 << 16 });
+  await located;
+  for (const [number, surface] of [[1, true], [2, false], [3, true]]) {
+    const settled = idle(number);
+    emit({ file: 3, type: 'view', view, want: { ...want, number, surface } });
+    await settled;
+    await new Promise((done) => setTimeout(done)); // a page's message arrives later
+    assert.equal(shown.has('surface'), surface);
+    assert.ok(surface ? shown.size === 1 : shown.size > 0, [...shown].join());
+  }
+});

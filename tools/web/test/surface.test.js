@@ -1,0 +1,71 @@
+// Tests the choice of patches of the simplified surface, and their mesh: the patches replace all faces once, within the allowed error.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import test from 'node:test';
+import { sceneOf } from '../cut.js';
+import { openModel } from '../model_file.js';
+import { Surface } from '../surface.js';
+
+const view = { eye: [0.3, 0.4, 2], planes: [], pixels: 800 }, want = { pixels: 16, triangles: 2e6 };
+
+async function load(name, small = false) {
+  const file = await openModel(readFileSync(new URL(`../../../format-spec/vectors/passed/${name}.ebpo.h5`, import.meta.url))), scene = sceneOf(file.info);
+  return { file, scene, surface: new Surface(file.info, scene, await file.patches(), small) };
+}
+
+const sum = (list, of) => list.reduce((total, item) => total + of(item), 0);
+
+test('patches of any error replace all faces, each once', async () => {
+  for (const name of ['69_surface', '70_surface_with_subtrees', '71_surface_without_mesh']) {
+    const { file, surface } = await load(name), { patches } = surface;
+    let before = 0;
+    for (const pixels of [800, 160, 32, 16, 4, 1]) {
+      const { chosen, triangles, pixels: error } = surface.choose(view, { ...want, pixels });
+      assert.equal(sum(chosen, ({ patch }) => patches[patch].faces), file.info.face_count);
+      assert.equal(triangles, sum(chosen, ({ patch, faces }) => (faces ? patches[patch].faces : patches[patch].triangles)));
+      assert.ok(triangles >= before, `${pixels}: ${triangles} after ${before}`);
+      assert.ok(error <= pixels / 8 || chosen.every(({ patch, faces }) => faces || patches[patch].end === patches[patch].child), `${error} px`);
+      assert.ok(chosen.every(({ faces }) => !faces || file.info.parts.has('mesh')));
+      before = triangles;
+    }
+  }
+});
+
+test('a limit of triangles is kept, and cells out of sight stay coarse', async () => {
+  const { surface } = await load('70_surface_with_subtrees'), all = surface.choose(view, { ...want, pixels: 1 });
+  const few = surface.choose(view, { ...want, pixels: 1, triangles: 900 }), away = surface.choose({ ...view, planes: [[1, 0, 0, -9]] }, { ...want, pixels: 1 });
+  assert.ok(few.triangles <= 900 && all.triangles > 900);
+  assert.deepEqual(away.chosen.map(({ patch }) => patch), [0]);
+});
+
+test('small models are drawn by their faces; the first picture comes in stages', async () => {
+  const { file, scene, surface } = await load('70_surface_with_subtrees', true), { chosen } = surface.choose(view, want);
+  assert.ok(chosen.every(({ faces }) => faces));
+  const { triangles, faces, index } = await file.surface(chosen, scene);
+  assert.deepEqual([triangles, faces, index.length], [8448, 8448, 3 * 8448]);
+  const seen = [];
+  for (let next; !next?.last; surface.read(next))
+    seen.push(next = surface.next(view, want));
+  assert.ok(seen.every(({ triangles: n }, i) => i === 0 || n >= seen[i - 1].triangles));
+});
+
+test('a mesh has unit coordinates of the scene, colours and closed edges', async () => {
+  for (const faces of [false, true]) {
+    const { file, scene, surface } = await load('70_surface_with_subtrees'), wanted = surface.patches.map((_, patch) => ({ patch, faces: faces && patch % 2 === 0 })).slice(1);
+    const mesh = await file.surface(wanted, scene), { position, normal, hue, index } = mesh, count = position.length / 3;
+    assert.ok(mesh.triangles > 2000 && index.length === 3 * mesh.triangles && index.every((v) => v < count));
+    assert.equal(mesh.faces, sum(wanted, (w) => (w.faces ? surface.patches[w.patch].faces : 0)));
+    assert.deepEqual([normal.length, hue.length], [2 * count, 4 * count]);
+    assert.ok(position.every((x) => Math.abs(x) <= 1.01));
+    const edges = new Map(), place = (v) => position.subarray(3 * v, 3 * v + 3).join();
+    for (let i = 0; i < index.length; i++) {
+      const a = place(index[i]), b = place(index[i % 3 === 2 ? i - 2 : i + 1]);
+      edges.set(`${a} ${b}`, (edges.get(`${a} ${b}`) ?? 0) + 1);
+      edges.set(`${b} ${a}`, (edges.get(`${b} ${a}`) ?? 0) - 1);
+    }
+    assert.ok([...edges.values()].every((n) => n === 0), 'each edge has an opposite one');
+    const tile = surface.tileOf(mesh, true);
+    assert.equal(tile.tag.length, 4 * count);
+    assert.ok(tile.lines.length > mesh.triangles && tile.lines.length % 2 === 0);
+  }
+});
