@@ -96,6 +96,25 @@ class Parts(Case):
         with self.assertRaises(ebpo.AbsentError):
             m.sample("nothing", hit.point, hit.face)
 
+    def test_surface(self):
+        m = ebpo.open(pathlib.Path(__file__).parents[2] / "format-spec/vectors/passed/70_surface_with_subtrees.ebpo.h5")
+        eye = m.info.box_origin + 1.5 * m.info.box_size
+        whole, coarse = m.surface(), m.surface(level=0)
+        near, far = (m.surface(eye=eye, pixels=pixels, faces=True) for pixels in (0.01, 100))
+        self.assertEqual((coarse.patches, far.patches, near.patches), (1, 1, 0))
+        self.assertEqual(near.model_faces, m.info.face_count)
+        self.assertTrue(0 < whole.error < coarse.error and 0 < far.pixels <= 100 and near.pixels == 0)
+        self.assertTrue(np.isnan(whole.pixels) and whole.colours.shape == whole.vertices.shape)
+        for s in (whole, coarse, near, far):  # closed: each directed edge has an opposite one
+            _, same = np.unique(s.vertices, axis=0, return_inverse=True)
+            a, b = same[s.faces].ravel(), same[np.roll(s.faces, -1, axis=1)].ravel()
+            np.testing.assert_array_equal(np.sort(a * len(same) + b), np.sort(b * len(same) + a))
+            np.testing.assert_allclose(np.linalg.norm(s.normals, axis=1), 1, atol=1e-6)
+        with self.assertRaises(ebpo.AbsentError):
+            model("scan").surface()
+        with self.assertRaises(ValueError):
+            m.surface(pixels=1)
+
     def test_levels(self):
         m = model("scan")
         for number in range(4):

@@ -42,6 +42,7 @@ function makeModels() {
   damaged[damaged.length >> 1] ^= 1;
   writeFileSync(join(models, 'damaged.ebpo.h5'), damaged);
   const at = (name) => join(models, name);
+  copyFileSync(join(work, 'red.ply'), at('mesh.ply'));
   plates(join(work, 'plates.ply'));
   run(ebpo, ['convert', '-q', join(work, 'plates.ply'), at('plates.ebpo.h5')]);
   run(ebpo, ['paint', at('plates.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', '-', '--radius', '0.4'], '-0.2 0.5 0.05\n');
@@ -280,7 +281,8 @@ async function errors(browser, address) {
   const quiet = complaints.length;
   for (const [query, expected] of [['file=models/damaged.ebpo.h5&detail=0', /damaged\.ebpo\.h5.*(damaged|checksum)/],
     ['file=models/none.ebpo.h5', /404/],
-    ['file=icon.svg', /not a whole HDF5 file|does not serve ranges/]]) {
+    ['file=icon.svg', /not a whole HDF5 file|does not serve ranges/],
+    ['file=models/mesh.ply', /mesh\.ply: this is a mesh file \(PLY\)/]]) {
     const page = await show(browser, `${address}?${query}`);
     await page.waitForSelector('#error:not([hidden])', { timeout: 60000 });
     assert.match(await page.textContent('#errorWhat'), expected);
@@ -897,7 +899,7 @@ async function pointsWithoutMouse(browser, address) {
   await page.keyboard.press('Tab');
   await answered();
   assert.deepEqual([await page.textContent('#where'), await page.textContent('#distance')], ['Inside', '0.25']);
-  assert.match(await page.getAttribute('#level', 'aria-valuetext'), /^all levels, and the mesh$/);
+  assert.match(await page.getAttribute('#level', 'aria-valuetext'), /^the surface$/);
   assert.ok(await page.isHidden('#pointCard'));
   await page.setViewportSize({ width: 390, height: 700 });
   await page.keyboard.press('Escape');
@@ -990,6 +992,64 @@ async function servesOrSays() {
   assert.deepEqual(readdirSync(empty), []);
 }
 
+// Returns a screenshot's pixels as brightness, 0 where the model is not drawn; without panels.
+async function brightness(page) {
+  const hide = await page.addStyleTag({ content: '#panel, #bar, #tools, #progress, #compass, #scale { visibility: hidden; } #stage { background: #f0f !important; }' });
+  const png = (await page.screenshot()).toString('base64');
+  await hide.evaluate((node) => node.remove());
+  return page.evaluate(async (picture) => {
+    const image = await createImageBitmap(await (await fetch('data:image/png;base64,' + picture)).blob()), context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height), out = [];
+    for (let i = 0; i < data.length; i += 4)
+      out.push(data[i] > 240 && data[i + 1] < 15 && data[i + 2] > 240 ? 0 : 1 + data[i + 1]);
+    return out;
+  }, png);
+}
+
+// The simplified surface of a large model looks like all of its faces. No background is visible within the silhouette. The label states what is drawn.
+async function drawsSurface(browser, address) {
+  run(generate, ['--base', 'torus', '--faces', '280000', join(work, 'large.ply')]);
+  run(ebpo, ['convert', '-q', '--parts=+surface', join(work, 'large.ply'), join(models, 'large.ebpo.h5')]);
+  const page = await show(browser, `${address}?file=models/large.ebpo.h5&detail=16`), { stats, calls } = await settled(page), bytes = sum(requests('large'), (b) => b);
+  assert.ok(stats.surface && stats.triangles > 5000 && stats.triangles <= 300000 && calls <= 3, JSON.stringify({ stats, calls }));
+  assert.ok(stats.surface.pixels > 0 && stats.surface.pixels < 16, `${stats.surface.pixels}`);
+  assert.match(await page.textContent('#shown'), /^Surface within [\d.]+ px \([\d.e-]+\)/);
+  assert.ok(bytes < 0.8 * statSync(join(models, 'large.ebpo.h5')).size, `${bytes}`);
+  const drawn = await brightness(page);
+  await page.selectOption('#detail', '0');
+  assert.equal((await settled(page)).stats.meshTriangles, 280140);
+  assert.equal(await page.textContent('#shown'), 'The faces of the model');
+  const faces = await brightness(page), { width, height } = SIZE, inside = (i) => [0, 1, -1, 2, -2].every((x) => [0, 1, -1, 2, -2].every((y) => faces[i + x + y * width] > 0));
+  let holes = 0, count = 0, difference = 0;
+  for (let i = 2 * width + 2; i < width * (height - 2) - 2; i++)
+    if (faces[i] && inside(i)) {
+      count++;
+      holes += drawn[i] === 0;
+      difference += Math.abs(drawn[i] - faces[i]);
+    }
+  assert.ok(count > 20000, `${count} pixels`);
+  assert.equal(holes, 0, 'no background within the silhouette');
+  assert.ok(difference / count < 4, `mean difference of brightness: ${difference / count} of 255`);
+  // Levels and their colours show envelopes; the surface returns.
+  await page.keyboard.press('k');
+  assert.equal((await settled(page)).stats.surface, undefined);
+  await page.selectOption('#detail', '16');
+  for (const key of ['k', 'k', 'v', 'z', 'w'])
+    await page.keyboard.press(key);
+  assert.ok((await settled(page)).stats.surface);
+  await page.waitForFunction(() => /show=wireframe,orthographic,z-up/.test(location.search));
+  const size = Math.hypot(...(await look(page)).box);
+  await page.keyboard.press('v');
+  await settled(page);
+  assert.ok(Math.abs(Math.hypot(...(await look(page)).box) / size - 1) < 0.1, 'the size of the model remains without perspective');
+  await page.keyboard.press('s'); // turntable
+  const eye = () => page.evaluate(() => window.ebpoViewer.scene.place.eye.join()), before = await eye();
+  await page.waitForTimeout(500);
+  assert.notEqual(await eye(), before);
+  await page.close();
+}
+
 async function main() {
   makeModels();
   const address = await serve(), browser = await browse(), page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=4&detail=0`);
@@ -1020,6 +1080,7 @@ async function main() {
   await step('paint is visible only on connected faces', () => paintsByReach(browser, address));
   await step('several models and scenes are shown together', () => together(browser, address));
   await step('intersecting faces of two models are shown', () => contacts(browser, address));
+  await step('the simplified surface looks like the faces', () => drawsSurface(browser, address));
   await step('links contain the theme and the switches', () => sharesSwitches(browser, address));
   await step('points need neither a mouse nor the panel', () => pointsWithoutMouse(browser, address));
   await step('a missing or lost graphics context is explained', () => graphics(browser, address));

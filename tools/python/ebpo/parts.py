@@ -227,7 +227,8 @@ def observer_of(eye: ArrayLike, direction: ArrayLike, up: ArrayLike, fov: float,
 
 
 def read_surface(file: Handle, observer: Any, **members: Any) -> Surface:
-    options = made(c.ebpo_view_options, planes=False, observer=ctypes.pointer(observer) if observer else None, **members)
+    options = made(c.ebpo_view_options, planes=False, observer=ctypes.addressof(observer) if observer else None,
+                   **members)
     stream = Handle.made("ebpo_view_stream_new", file, ctypes.byref(options), free="ebpo_view_stream_free", keep=(file,))
     mesh = Struct(c.ebpo_surface_mesh, "ebpo_surface_mesh_free")
     call("ebpo_view_stream_surface", stream, mesh)
