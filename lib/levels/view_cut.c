@@ -147,7 +147,7 @@ double ebpo_viewpoint_distance(const ebpo_viewpoint *s, double distance2)
 
 double ebpo_viewpoint_length(const ebpo_viewpoint *s, double length, double distance2)
 {
-    return s->given ? s->focal * (length / s->unit / sqrt(distance2)) : NAN;
+    return s->has_observer ? s->focal * (length / s->unit / sqrt(distance2)) : NAN;
 }
 
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *s, int level, double distance2)

@@ -43,7 +43,7 @@ static ebpo_seen see_patch(const choosing *c, uint64_t patch)
 static double pixels_of(const choosing *c, uint64_t patch, ebpo_seen sight)
 {
     double error = ebpo_patch_table_error(c->table, c->info, patch);
-    return error > 0 || !c->viewpoint->given
+    return error > 0 || !c->viewpoint->has_observer
                ? ebpo_viewpoint_length(c->viewpoint, error, sight.distance2)
                : 0;
 }
@@ -68,9 +68,9 @@ static ebpo_status offer_patch(choosing *c, uint64_t patch, ebpo_error *error)
 {
     ebpo_seen sight = see_patch(c, patch);
     ebpo_waiting w = { .octcode = octcode_of(c, patch),
-                       .below = patch,
+                       .child_group = patch,
                        .turn = (uint8_t)turn_of(c, patch, sight) };
-    if (c->viewpoint->given) {
+    if (c->viewpoint->has_observer) {
         double pixels = pixels_of(c, patch, sight);
         memcpy(&w.key, &pixels, sizeof w.key); /* bits of nonnegative doubles have their order */
         w.key = ~w.key;
@@ -97,7 +97,7 @@ static ebpo_status choose_patches(choosing *c, ebpo_error *error)
 {
     ebpo_status status = offer_patch(c, 0, error);
     while (status == EBPO_OK && c->frontier.count && c->frontier.at[0].turn != EBPO_TURN_NEVER) {
-        uint64_t patch = c->frontier.at[0].below, child = c->table->child[patch],
+        uint64_t patch = c->frontier.at[0].child_group, child = c->table->child[patch],
                  end = c->table->child_end[patch];
         if (!is_affordable(c, child, end))
             break;
@@ -108,7 +108,7 @@ static ebpo_status choose_patches(choosing *c, ebpo_error *error)
             status = offer_patch(c, child, error);
     }
     for (uint64_t i = 0; i < c->frontier.count; i++)
-        c->chosen[c->chosen_count++] = c->frontier.at[i].below;
+        c->chosen[c->chosen_count++] = c->frontier.at[i].child_group;
     return status;
 }
 
@@ -183,7 +183,7 @@ static ebpo_status read_faces(choosing *c, ebpo_patch *faces, ebpo_error *error)
 
 static double greatest_pixels(const choosing *c)
 {
-    double pixels = c->viewpoint->given ? 0 : NAN;
+    double pixels = c->viewpoint->has_observer ? 0 : NAN;
     for (uint64_t i = 0; i < c->chosen_count; i++) {
         ebpo_seen sight = see_patch(c, c->chosen[i]);
         if (sight.seen)
