@@ -275,7 +275,8 @@ static ebpo_status cut_surface(ebpo_cutting *c)
     ebpo_surface *surface = &c->out->surface;
     ebpo_patch_table table = { 0 };
     ebpo_hints hints = EBPO_HINTS_INIT(c->file);
-    ebpo_status status = c->tolerance ? EBPO_OK : ebpo_patch_table_read(&table, c->chunks, c->error);
+    ebpo_status status =
+        c->tolerance ? EBPO_OK : ebpo_patch_table_read(&table, c->chunks, c->error);
     uint64_t *list = ebpo_alloc(table.count, sizeof *list), count = 0;
     bool *kept = ebpo_alloc_zero(table.count, sizeof *kept);
     if (status == EBPO_OK && !(list && kept))
