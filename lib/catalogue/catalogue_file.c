@@ -27,6 +27,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/hash.h"
+#include "core/os.h"
 
 /* Maximum length of a file. This is sufficient for some millions of models; a larger file would
  * need many times as much memory. */
@@ -46,7 +47,7 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
  * Returns NULL when memory is short. */
 static char *joined_path(const char *folder, const char *path)
 {
-    bool whole = *path == '/' || strstr(path, "://");
+    bool whole = ebpo_path_is_absolute(path) || strstr(path, "://");
     size_t before = whole ? 0 : strlen(folder), size = strlen(path) + 1;
     char *joined = malloc(before + size);
     if (joined) {
@@ -458,7 +459,7 @@ static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 static ebpo_status read_file(ebpo_catalogue *c, const char *path, ebpo_error *error)
 {
     char *text = NULL;
-    const char *slash = strrchr(path, '/');
+    const char *slash = ebpo_last_separator(path);
     reader r = { .c = c, .error = error };
     c->path = strdup(path);
     r.folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup("");

@@ -21,6 +21,7 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "core/os.h"
 #include "core/text.h"
 #include "io/publish.h"
 
@@ -180,7 +181,7 @@ ebpo_status ebpo_catalogue_save(const ebpo_catalogue *c, const char *path, ebpo_
 {
     EBPO_DEFAULT_FP;
     ebpo_publish out = EBPO_PUBLISH_INIT;
-    const char *slash = strrchr(path, '/');
+    const char *slash = ebpo_last_separator(path);
     char *folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup("");
     ebpo_status status = folder ? check_texts(c, error) : ebpo_fail_memory(error, strlen(path) + 1);
     if (status == EBPO_OK)

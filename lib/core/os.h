@@ -1,10 +1,13 @@
 /* Functions that depend on the operating system: clock, cores, memory, pages, and unnamed files
- * (os_machine.c, os_files.c). */
+ * (os_machine.c, os_files.c). All other code is written for POSIX; os_windows.h declares what
+ * Windows lacks of it. */
 #ifndef EBPO_CORE_OS_H
 #define EBPO_CORE_OS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 #include <time.h>
 
 /* Returns nanoseconds since an arbitrary time, from a clock that never goes back. */
@@ -30,6 +33,28 @@ void ebpo_prefer_huge_pages(void *array, size_t bytes);
 /* Returns the bytes of memory: the machine's, or the lowest limit of a control group of this
  * process. */
 uint64_t ebpo_machine_memory(void);
+
+/* Returns the last separator of a path, '/' (on Windows also '\\'); NULL if there is none. */
+static inline char *ebpo_last_separator(const char *path)
+{
+    char *last = strrchr(path, '/');
+#ifdef _WIN32
+    char *other = strrchr(last ? last : path, '\\');
+    last = other ? other : last;
+#endif
+    return last;
+}
+
+/* Returns true for a path that does not depend on the current folder; on Windows also for one with
+ * a drive ("C:"). */
+static inline bool ebpo_path_is_absolute(const char *path)
+{
+#ifdef _WIN32
+    if (*path == '\\' || (*path && path[1] == ':'))
+        return true;
+#endif
+    return *path == '/';
+}
 
 /* Creates an unnamed temporary file. Returns its descriptor, or -1 with errno. */
 int ebpo_open_unnamed(const char *folder);

@@ -18,6 +18,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/os.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/workspace.h"
@@ -179,8 +180,8 @@ void ebpo_whole_file_close(ebpo_whole_file *file)
 
 const char *ebpo_path_name(const char *path)
 {
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
+    const char *last = ebpo_last_separator(path);
+    return last ? last + 1 : path;
 }
 
 ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)

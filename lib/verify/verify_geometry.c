@@ -131,7 +131,8 @@ static bool corner_satisfies(mpq_t at[3], const int32_t n[3], int32_t d)
     mpq_t sum, part;
     mpq_inits(sum, part, NULL);
     for (int k = 0; k < 3; k++) {
-        mpq_set_si(part, 4096L * n[k], 1);
+        mpq_set_si(part, n[k], 1);
+        mpq_mul_2exp(part, part, 12);
         mpq_mul(part, part, at[k]);
         mpq_add(sum, sum, part);
     }

@@ -11,10 +11,10 @@
 #include "cli/command.h"
 #include "cli/signals.h"
 
-enum { PATH_MAX = 4096, BUFFER_BYTES = 1 << 16 };
+enum { PATH_BYTES = 4096, BUFFER_BYTES = 1 << 16 };
 
 /* Names of temporary files, which a signal handler also reads; "": the file does not exist. */
-static char folder[PATH_MAX], input[PATH_MAX], output[PATH_MAX];
+static char folder[PATH_BYTES], input[PATH_BYTES], output[PATH_BYTES];
 static int saved_stdout = -1; /* copy of standard output while it is redirected */
 
 /* Occupies closed descriptors 0 to 2. An opened file gets the lowest free descriptor, so it could
@@ -75,7 +75,7 @@ static int make_folder(const char *command)
     const char *where = getenv("TMPDIR");
     if (*folder)
         return EXIT_OK;
-    char made[PATH_MAX - 32];
+    char made[PATH_BYTES - 32];
     int length =
         snprintf(made, sizeof made, "%s/ebpo-XXXXXX", where && *where ? where : "/var/tmp");
     if (length >= (int)sizeof made || !mkdtemp(made))
@@ -93,7 +93,7 @@ static int copy_input(const char *command, const char **operand)
     int code = make_folder(command);
     if (code != EXIT_OK)
         return code;
-    snprintf(input, sizeof input, "%.*s/standard-input", PATH_MAX - 32, folder);
+    snprintf(input, sizeof input, "%.*s/standard-input", PATH_BYTES - 32, folder);
     int to = open(input, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     bool success = to >= 0 && copy_stream(STDIN_FILENO, to);
     if (to >= 0 && close(to) != 0)
@@ -110,7 +110,7 @@ static int redirect_output(const char *command, const char **operand)
     int code = make_folder(command);
     if (code != EXIT_OK)
         return code;
-    snprintf(output, sizeof output, "%.*s/standard-output", PATH_MAX - 32, folder);
+    snprintf(output, sizeof output, "%.*s/standard-output", PATH_BYTES - 32, folder);
     fflush(stdout);
     saved_stdout = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
     if (saved_stdout < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)

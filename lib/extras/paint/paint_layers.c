@@ -19,6 +19,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/os.h"
 #include "core/text.h"
 #include "extras/paint/paint_parts.h"
 #include "format/file_in.h"
@@ -435,7 +436,7 @@ ebpo_status ebpo_paint_new(const ebpo_file *model, ebpo_paint **out, ebpo_error 
     ebpo_paint *p = ebpo_paint_begin();
     if (!p)
         return ebpo_fail_memory(error, sizeof *p);
-    const char *name = strrchr(model->in.shown, '/');
+    const char *name = ebpo_last_separator(model->in.shown);
     name_model(&model->info, p->model_sha256);
     p->source_numbers = model->info.parts & EBPO_PART_MAPS;
     snprintf(p->generator, sizeof p->generator, "ebpo %s", ebpo_version());

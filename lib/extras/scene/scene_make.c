@@ -19,6 +19,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "core/os.h"
 #include "extras/scene/scene_parts.h"
 #include "geometry/pose.h"
 
@@ -125,7 +126,7 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
         return "is on a server, which must be allowed (ebpo scene --remote)";
     if (ebpo_is_url(path) && !has_digest)
         return "is on a server; the scene must have its content_sha256 beside the path";
-    if (!ebpo_is_url(path) && !options->outside && (*path == '/' || goes_up(path)))
+    if (!ebpo_is_url(path) && !options->outside && (ebpo_path_is_absolute(path) || goes_up(path)))
         return "is outside the scene's folder, which must be allowed (ebpo scene "
                "--allow-outside)";
     return NULL;
@@ -133,7 +134,7 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
 
 char *ebpo_scene_join_path(const char *folder, const char *path)
 {
-    bool alone = *path == '/' || ebpo_is_url(path);
+    bool alone = ebpo_path_is_absolute(path) || ebpo_is_url(path);
     size_t begin = alone ? 0 : strlen(folder), size = strlen(path);
     char *joined = malloc(begin + size + 1);
     if (joined) {
@@ -181,7 +182,7 @@ ebpo_status ebpo_scene_stays_within(const char *folder, const char *path, ebpo_e
 
 char *ebpo_scene_folder_of(const char *path)
 {
-    const char *last = strrchr(path, '/');
+    const char *last = ebpo_last_separator(path);
     return strndup(path, last ? (size_t)(last - path) + 1 : 0);
 }
 

@@ -94,12 +94,18 @@ template <class T> inline T ebpo_sized()
 extern "C" {
 #endif
 
+#if defined(_WIN32)
+#define EBPO_API __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EBPO_API __attribute__((visibility("default")))
+#else
+#define EBPO_API
+#endif
+
 #if defined(__GNUC__)
-#define EBPO_API               __attribute__((visibility("default")))
 #define EBPO_MUST_USE          __attribute__((warn_unused_result))
 #define EBPO_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
 #else
-#define EBPO_API
 #define EBPO_MUST_USE
 #define EBPO_PRINTF(fmt, args)
 #endif

@@ -1,0 +1,156 @@
+#!/usr/bin/env python3
+"""Compares the command for Windows, run by wine, with the command of this system.
+
+    windows.py EBPO GENERATE SOURCE FOLDER [MODELS]
+
+tools/packaging/windows.sh builds the command in FOLDER; the test is skipped where mingw-w64 or wine is missing. Both
+commands must write equal bytes of files and equal text, and end with equal exit codes: conversions, vectors, queries,
+exports, names that are not ASCII, and long paths.
+"""
+import os
+import pathlib
+import random
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+
+EBPO, GENERATE, SOURCE, FOLDER = map(pathlib.Path, sys.argv[1:5])
+MODELS = pathlib.Path(sys.argv[5]) if len(sys.argv) > 5 else None
+SKIPPED = 77
+WINE = shutil.which("wine64") or "/usr/lib/wine/wine64"
+VECTORS = SOURCE / "format-spec/vectors"
+problems = []
+count = 0
+
+
+def missing():
+    for name in ("x86_64-w64-mingw32-gcc-posix", "cmake", "meson", WINE):
+        if not shutil.which(name):
+            return name
+    return None
+
+
+def run(program, arguments, data=None):
+    """Run a command. Return exit code, standard output and standard error with its own temporary names removed."""
+    environment = dict(os.environ, WINEPREFIX=str(FOLDER / "wine"), WINEDEBUG="-all", TMPDIR=str(FOLDER))
+    done = subprocess.run([*program, *map(str, arguments)], input=data, capture_output=True, env=environment,
+                          timeout=900, check=False)
+    return done.returncode, done.stdout, re.sub(rb"(?m)^it looks like wine32[^$]*?wine32:i386\"\n", b"", done.stderr)
+
+
+def compare(what, arguments, data=None, outputs=(), ignore=rb"$^"):
+    """Run both commands with the same arguments, in which OUT names the folder of the results."""
+    global count
+    count += 1
+    results = []
+    for name, program in (("linux", [EBPO]), ("windows", WINDOWS)):
+        out = FOLDER / name
+        shutil.rmtree(out, ignore_errors=True)
+        out.mkdir()
+        code, text, errors = run(program, [str(word).replace("OUT", str(out)) for word in arguments], data)
+        neutral = [re.sub(ignore, b"", re.sub(rb"[A-Za-z]?:?" + re.escape(str(out).encode()), b"OUT", stream))
+                   for stream in (text, errors)]
+        results.append((code, *neutral, *[(out / path).read_bytes() if (out / path).exists() else None
+                                          for path in outputs]))
+    for part, linux, windows in zip(("exit code", "output", "messages", *outputs), *results):
+        if linux != windows:
+            shown = [repr(value[:300]) if isinstance(value, bytes) else value for value in (linux, windows)]
+            problems.append(f"{what}: {part} differs: {shown[0]} and {shown[1]}")
+            print(problems[-1], flush=True)
+
+
+def conversions():
+    inputs = {}
+    for name, options in {"torus": ["--base", "torus", "--faces", "30000", "--seed", "7"],
+                          "sphere": ["--base", "sphere", "--subdivide", "4", "--seed", "3"]}.items():
+        inputs[name] = FOLDER / f"{name}.ply"
+        subprocess.run([GENERATE, *options, inputs[name]], check=True)
+    for name in ("bunny_closed", "office_chair") if MODELS else ():
+        inputs[name] = MODELS / f"{name}.ply"
+    for name, path in inputs.items():
+        for variant, options in {"default": [], "full": ["--profile", "full"], "threads": ["--threads", "3"],
+                                 "memory": ["--memory", "100M"], "attributes": ["--parts=+surface"]}.items():
+            compare(f"convert {name} {variant}", ["convert", "-q", *options, path, "OUT/a.ebpo.h5"],
+                    outputs=["a.ebpo.h5"])
+    compare("convert from and to pipes", ["convert", "-q", "-", "-"], data=inputs["sphere"].read_bytes())
+    return inputs
+
+
+def vectors():
+    for path in sorted(VECTORS.glob("passed/*.ebpo.h5")):
+        compare(f"verify {path.name}", ["verify", path])
+        compare(f"info {path.name}", ["info", "--json", path])
+        compare(f"mesh of {path.name}", ["extract", "--mesh", path, "OUT/a.ply"], outputs=["a.ply"])
+    for path in sorted(VECTORS.glob("failed/*.ebpo.h5")):
+        compare(f"verify {path.name}", ["verify", path])
+
+
+def queries(models):
+    numbers = random.Random(42)
+    for model in models:
+        low, high = (-1.2, 1.2) if model.name.startswith(("torus", "sphere")) else (-0.1, 0.2)
+        points = "".join("%.17g %.17g %.17g\n" % tuple(numbers.uniform(low, high) for _ in range(3))
+                         for _ in range(2000)).encode()
+        rays = "".join("%.17g %.17g %.17g %.17g %.17g %.17g\n" % tuple(numbers.uniform(low, high) for _ in range(6))
+                       for _ in range(2000)).encode()
+        for name, data in (("inside", points), ("distance", points), ("ray", rays), ("box", None)):
+            if name == "box":
+                data = b"".join(b"%s %s\n" % (line, line) for line in points.splitlines()[:50])
+            compare(f"{name} {model.name}", [name, model], data)
+            compare(f"{name} {model.name} in JSON", [name, "--json", model], data)
+            compare(f"{name} {model.name} in little memory", [name, "--memory", "4M", model], data)
+        compare(f"raw distances {model.name}", ["distance", "--raw", model],
+                b"".join(numbers.randbytes(0) + __import__("struct").pack("<3d", *(numbers.uniform(low, high)
+                         for _ in range(3))) for _ in range(500)))
+        compare(f"npy {model.name}", ["distance", "--max-level", "3", model], points)
+        compare(f"measure {model.name}", ["measure", model])
+        compare(f"subset {model.name}", ["subset", "--levels", "0-3", model, "OUT/a.ebpo.h5"], outputs=["a.ebpo.h5"])
+        compare(f"repack {model.name}", ["repack", "--codec", "deflate", model, "OUT/a.ebpo.h5"], outputs=["a.ebpo.h5"])
+        compare(f"glTF {model.name}", ["export", "--level", "3", model, "OUT/a.glb"], outputs=["a.glb"])
+    compare("collide", ["collide", *models[:2]])
+    compare("collide in JSON", ["collide", "--json", "--distance", *models[:2]])
+    compare("boolean", ["boolean", "A - B", *models[:2], "-o", "OUT/a.ply"], outputs=["a.ply"])
+
+
+def names(mesh):
+    for name in ("näh € 模型.ebpo.h5", "a" * 200 + ".ebpo.h5", "/".join(["b" * 100] * 6) + "/c.ebpo.h5"):
+        place = FOLDER / "names" / name
+        shutil.rmtree(FOLDER / "names", ignore_errors=True)
+        place.parent.mkdir(parents=True)
+        code, text, errors = run(WINDOWS, ["convert", "-q", mesh, place])
+        if code or not place.exists() or list(place.parent.iterdir()) != [place]:
+            problems.append(f"convert to {name[:40]}: {code} {text} {errors}")
+        else:
+            compare(f"info of {name[:40]}", ["info", "--json", place])
+    compare("a mesh that does not exist", ["convert", FOLDER / "none.ply", "OUT/a.ebpo.h5"])
+    compare("a folder that does not exist", ["convert", "-q", mesh, "OUT/none/a.ebpo.h5"])
+
+
+def main():
+    global WINDOWS
+    absent = missing()
+    if absent:
+        print(f"skipped: {absent} is missing (apt install mingw-w64 wine64 cmake meson)")
+        return SKIPPED
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    subprocess.run(["sh", SOURCE / "tools/packaging/windows.sh", FOLDER], check=True, stdout=subprocess.DEVNULL)
+    archive = max(FOLDER.glob("ebpo-*-windows-x86_64.zip"), key=os.path.getmtime)
+    shutil.rmtree(FOLDER / "unpacked", ignore_errors=True)
+    zipfile.ZipFile(archive).extractall(FOLDER / "unpacked")
+    WINDOWS = [WINE, str(next(FOLDER.glob("unpacked/*/bin/ebpo.exe")))]
+    inputs = conversions()
+    models = []
+    for name, path in inputs.items():
+        models.append(FOLDER / f"{name}.ebpo.h5")
+        subprocess.run([EBPO, "convert", "-q", path, models[-1]], check=True)
+    vectors()
+    queries(models)
+    names(inputs["sphere"])
+    print(f"{count} comparisons, {len(problems)} differ")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
