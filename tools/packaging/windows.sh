@@ -55,6 +55,8 @@ installed = next((folder / "installed").rglob("ebpo.exe")).parents[1]
 entries = {f"{path.relative_to(installed)}": path for path in installed.rglob("*")
            if path.suffix in (".exe", ".dll", ".h") or path.name.endswith(".dll.a")}
 entries["licences/ebpo.txt"] = root / "LICENSE"
+for package in ("mingw-w64-common", "gcc-mingw-w64-base"):  # parts of their libraries are in the programs
+    entries[f"licences/{package}.txt"] = pathlib.Path(f"/usr/share/doc/{package}/copyright")
 entries.update({f"licences/{path.name}": path for path in (folder / "libraries/licences").iterdir()})
 with zipfile.ZipFile(folder / f"{name}.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
     for place, path in sorted(entries.items()):
