@@ -12,11 +12,13 @@
 
 #include <direct.h>
 #include <dirent.h>
+#include <emmintrin.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <io.h>
 #include <limits.h>
 #include <locale.h>
+#include <math.h>
 #include <process.h>
 #include <pthread.h>
 #include <signal.h>
@@ -307,6 +309,16 @@ void *dlopen(const char *name, int flags);
 void *dlsym(void *library, const char *name);
 int dladdr(const void *address, Dl_info *out);
 const char *dlerror(void);
+
+/* --- numbers --- */
+
+/* Returns the root rounded once. The function of mingw-w64, which is called where the compiler
+ * generates no instruction, rounds twice. */
+static inline double ebpo_windows_sqrt(double x)
+{
+    return _mm_cvtsd_f64(_mm_sqrt_sd(_mm_setzero_pd(), _mm_set_sd(x)));
+}
+#define sqrt ebpo_windows_sqrt
 
 /* --- texts --- */
 

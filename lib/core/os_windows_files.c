@@ -139,24 +139,31 @@ static WCHAR *wide_path(const char *path)
     return out;
 }
 
-/* Returns the path of an open file without the prefix, with '/'; NULL with errno. The caller frees
- * it. */
+/* Converts a path with the prefix to one without it and with '/'; NULL: no memory. The caller frees
+ * it.
+ */
+static char *plain_path(WCHAR *wide)
+{
+    bool is_network = wcsncmp(wide, L"\\\\?\\UNC\\", 8) == 0;
+    WCHAR *from = is_network ? wide + 6 : wcsncmp(wide, L"\\\\?\\", 4) == 0 ? wide + 4 : wide;
+    if (is_network)
+        *from = L'\\';
+    char *path = ebpo_windows_narrow(from);
+    for (char *c = path; c && *c; c++)
+        *c = *c == '\\' ? '/' : *c;
+    return path;
+}
+
+/* Returns the path of an open file without links; NULL with errno. The caller frees it. */
 static char *path_of(HANDLE file)
 {
     WCHAR *wide = malloc(WIDE_MAX * sizeof *wide);
     DWORD size = wide ? GetFinalPathNameByHandleW(file, wide, WIDE_MAX, 0) : 0;
     char *path = NULL;
-    if (wide && (size == 0 || size >= WIDE_MAX)) {
+    if (wide && size > 0 && size < WIDE_MAX)
+        path = plain_path(wide);
+    else if (wide)
         errno = size ? ENAMETOOLONG : (ebpo_windows_fail(), errno);
-    } else if (wide) {
-        bool is_network = wcsncmp(wide, L"\\\\?\\UNC\\", 8) == 0;
-        WCHAR *from = is_network ? wide + 6 : wcsncmp(wide, L"\\\\?\\", 4) == 0 ? wide + 4 : wide;
-        if (is_network)
-            *from = L'\\';
-        path = ebpo_windows_narrow(from);
-    }
-    for (char *c = path; c && *c; c++)
-        *c = *c == '\\' ? '/' : *c;
     free(wide);
     return path;
 }
@@ -431,13 +438,16 @@ char *realpath(const char *path, char *out)
     if (!wide)
         return NULL;
     HANDLE file = open_handle(wide, FILE_READ_ATTRIBUTES, OPEN_EXISTING, 0);
-    free(wide);
     if (file == INVALID_HANDLE_VALUE) {
+        free(wide);
         (void)ebpo_windows_fail();
         return NULL;
     }
     char *found = path_of(file);
+    if (!found && wcslen(wide) > MAX_PATH) /* wine 8 knows the paths of short names only */
+        found = plain_path(wide);
     CloseHandle(file);
+    free(wide);
     size_t size = found ? strlen(found) : 0;
     if (size && found[size - 1] == '/') /* "C:", to which a name can be added */
         found[--size] = 0;
@@ -663,14 +673,12 @@ int fsync(int fd)
         return 0;
     if (GetLastError() != ERROR_ACCESS_DENIED)
         return ebpo_windows_fail();
-    char *path = path_of(file);
-    int again = path ? open(path, O_WRONLY) : -1, result = again < 0 ? -1
-                                                           : FlushFileBuffers(handle_of(again))
-                                                               ? 0
-                                                               : ebpo_windows_fail();
-    if (again >= 0)
-        close(again);
-    free(path);
+    HANDLE again =
+        ReOpenFile(file, GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, 0);
+    if (again == INVALID_HANDLE_VALUE)
+        return ebpo_windows_fail();
+    int result = FlushFileBuffers(again) ? 0 : ebpo_windows_fail();
+    CloseHandle(again);
     return result;
 }
 

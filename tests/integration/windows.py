@@ -43,8 +43,8 @@ def run(program, arguments, data=None):
     return done.returncode, done.stdout, done.stderr
 
 
-def compare(what, arguments, data=None, outputs=(), ignore=rb"$^"):
-    """Run both commands with the same arguments, in which OUT names the folder of the results."""
+def compare(what, arguments, data=None, outputs=()):
+    """Run both commands with the same arguments, in which OUT names the folder of the results. Ignore times."""
     global count
     count += 1
     results = []
@@ -53,8 +53,8 @@ def compare(what, arguments, data=None, outputs=(), ignore=rb"$^"):
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir()
         code, text, errors = run(program, [str(word).replace("OUT", str(out)) for word in arguments], data)
-        neutral = [re.sub(ignore, b"", re.sub(rb"[A-Za-z]?:?" + re.escape(str(out).encode()), b"OUT", stream))
-                   for stream in (text, errors)]
+        folders = rb"[A-Za-z]?:?" + re.escape(str(out).encode())
+        neutral = [re.sub(rb", in [\d.]+ s", b"", re.sub(folders, b"OUT", stream)) for stream in (text, errors)]
         results.append((code, *neutral, *[(out / path).read_bytes() if (out / path).exists() else None
                                           for path in outputs]))
     for part, linux, windows in zip(("exit code", "output", "messages", *outputs), *results):
@@ -126,6 +126,7 @@ def names(mesh):
         code, text, errors = run(WINDOWS, ["convert", "-q", mesh, place])
         if code or not place.exists() or list(place.parent.iterdir()) != [place]:
             problems.append(f"convert to {name[:40]}: {code} {text} {errors}")
+            print(problems[-1], flush=True)
         else:
             compare(f"info of {name[:40]}", ["info", "--json", place])
     compare("a mesh that does not exist", ["convert", FOLDER / "none.ply", "OUT/a.ebpo.h5"])
