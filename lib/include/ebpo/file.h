@@ -1105,7 +1105,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_surface(const ebpo_file *file,
 
 /*
  * Reads only the table of all patches: out->patch, and the counts. Free it with ebpo_surface_free.
- * Errors and threads are those of ebpo_file_read_surface.
+ * The errors are those of ebpo_file_read_surface.
+ *
+ * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_patches(const ebpo_file *file, ebpo_surface *out,
                                                           ebpo_error *error);
