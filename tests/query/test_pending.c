@@ -491,9 +491,22 @@ static void run_batch(int number, subject *s, pending_source *p, double (*points
     ck_assert_uint_eq(count_done(done, count), count);
 }
 
+static two_layouts large; /* one for all batches */
+
+static void make_large(void)
+{
+    scratch_enter();
+    two_layouts_build(&large, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+}
+
+static void free_large(void)
+{
+    two_layouts_close(&large);
+    scratch_leave();
+}
+
 START_TEST(test_batches_resume)
 {
-    two_layouts l;
     pending_source p;
     static double points[MANY][3];
     uint64_t bytes = batches[_i].count * batches[_i].size, state = 3;
@@ -502,11 +515,10 @@ START_TEST(test_batches_resume)
         for (int k = 0; k < 3; k++)
             points[i][k] =
                 (k == 2 ? 1.5 : 6) * ((double)(ebpo_test_random(&state) % 100000) / 100000 - 0.5);
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
-    subject near = { .file = l.without }, far;
+    subject near = { .file = large.without }, far;
     make_model(&near, NULL, 64 << 20);
     ck_assert(batches[_i].batch(&near, points, NULL, expected) == EBPO_OK);
-    pending_begin(&p, l.packed, 0);
+    pending_begin(&p, large.packed, 0);
     far = (subject){ .file = pending_open(&p, HEAD) };
     make_model(&far, &p, 4 << 20);
     run_batch(_i, &far, &p, points, found);
@@ -518,7 +530,6 @@ START_TEST(test_batches_resume)
     free_model(&far);
     ebpo_close(far.file);
     pending_end(&p);
-    two_layouts_close(&l);
     free(expected);
     free(found);
 }
@@ -599,15 +610,19 @@ END_TEST
 TEST_SUITE(pending)
 {
     Suite *suite = suite_create("pending");
-    TCase *tests = tcase_create("single"), *many = tcase_create("many");
+    TCase *tests = tcase_create("single"), *batch = tcase_create("batches"),
+          *many = tcase_create("many");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_loop_test(tests, test_query_round_trips, 0, QUERIES);
     tcase_add_loop_test(tests, test_queries_within_smallest_budget, 0, QUERIES);
     suite_add_tcase(suite, tests);
+    tcase_set_timeout(batch, 900);
+    tcase_add_unchecked_fixture(batch, make_large, free_large);
+    tcase_add_loop_test(batch, test_batches_resume, 0, sizeof batches / sizeof *batches);
+    suite_add_tcase(suite, batch);
     tcase_set_timeout(many, 900);
     tcase_add_checked_fixture(many, scratch_enter, scratch_leave);
-    tcase_add_loop_test(many, test_batches_resume, 0, sizeof batches / sizeof *batches);
     tcase_add_test(many, test_threads_share_a_source);
     suite_add_tcase(suite, many);
     return suite;

@@ -369,23 +369,30 @@ static void take_all(const query_model *m, ebpo_context *context)
 
 /* All triangles together exceed the budget. The callback can end the query. The file is large
  * enough for separate subtrees, of which a remote file requests many at a time. */
+static query_model large; /* one for all ways of loading */
+
+static void make_large(void)
+{
+    query_model_make(&large, "torus", ebpo_test_torus(2, 0.7, 400, 250), &query_variants[0]);
+}
+
+static void free_large(void) { query_model_free(&large); }
+
 START_TEST(test_triangles_of_whole_model_keep_budget)
 {
-    query_model m;
     counted_source c;
-    query_model_make(&m, "torus", ebpo_test_torus(2, 0.7, 400, 250), &query_variants[0]);
-    int level = ebpo_file_info(m.file)->subtree_level;
+    int level = ebpo_file_info(large.file)->subtree_level;
     ck_assert_int_gt(level, 0);
-    ebpo_file *far = _i ? counted_open(&c, m.path, true) : NULL;
+    ebpo_file *far = _i ? counted_open(&c, large.path, true) : NULL;
     ebpo_model *model;
     ebpo_context *context;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     options.memory = 12 << 20;
     options.cut_level = _i == 2 ? level : -1;
-    ASSERT_OK(ebpo_model_new(far ? far : m.file, &options, &model, error));
+    ASSERT_OK(ebpo_model_new(far ? far : large.file, &options, &model, error));
     ASSERT_OK(ebpo_context_new(model, &context, error));
-    take_all(&m, context);
+    take_all(&large, context);
     ck_assert_int_eq(ebpo_model_get_stats(model, &stats), EBPO_OK);
     ck_assert(!stats.resident && stats.evicted > 0 && stats.memory_peak <= options.memory);
     if (far)
@@ -396,16 +403,18 @@ START_TEST(test_triangles_of_whole_model_keep_budget)
     ebpo_model_free(model);
     if (far)
         counted_close(&c, far);
-    query_model_free(&m);
 }
 END_TEST
 
 TEST_SUITE(query_rays)
 {
     Suite *suite = suite_create("query_rays");
-    TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
+    TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes"),
+          *whole = tcase_create("whole");
     tcase_set_timeout(rays, 600);
     tcase_set_timeout(boxes, 600);
+    tcase_set_timeout(whole, 600);
+    tcase_add_unchecked_fixture(whole, make_large, free_large);
     tcase_add_loop_test(rays, test_rays_match_brute_force, 0, query_solid_count());
     tcase_add_loop_test(rays, test_rays_same_in_all_load_modes, 0, 3);
     tcase_add_test(rays, test_invalid_rays_are_refused);
@@ -413,8 +422,9 @@ TEST_SUITE(query_rays)
     tcase_add_test(boxes, test_invalid_boxes_are_refused);
     tcase_add_loop_test(boxes, test_box_query_returns_each_triangle_once, 0, query_solid_count());
     tcase_add_test(boxes, test_triangle_beside_cell_is_returned_once);
-    tcase_add_loop_test(boxes, test_triangles_of_whole_model_keep_budget, 0, 3);
+    tcase_add_loop_test(whole, test_triangles_of_whole_model_keep_budget, 0, 3);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
+    suite_add_tcase(suite, whole);
     return suite;
 }

@@ -66,21 +66,34 @@ START_TEST(test_remote_query_round_trips)
 }
 END_TEST
 
+/* --- one large model, which the tests below share --- */
+
+static two_layouts l;
+
+static void make_large(void)
+{
+    scratch_enter();
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+}
+
+static void free_large(void)
+{
+    two_layouts_close(&l);
+    scratch_leave();
+}
+
 /* A query that needs many subtrees requests several of them together. */
 START_TEST(test_remote_deep_query_round_trips)
 {
     enum { WAVES = 16 }; /* 23 when each subtree is requested alone */
     static const double p[3] = { 2.1, 0.1, 0.05 };
-    two_layouts l;
     counted_source c;
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     ebpo_file *far = counted_open(&c, l.packed, true);
     result a = run_query(far, &c, p, false), b = run_query(l.without, NULL, p, false);
     counted_close(&c, far);
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
     ck_assert_msg(c.requested < c.size / 3, "%d of %d bytes", (int)c.requested, (int)c.size);
     ck_assert(a.distance == b.distance);
-    two_layouts_close(&l);
 }
 END_TEST
 
@@ -98,9 +111,7 @@ START_TEST(test_false_top_bytes_changes_no_result)
 {
     static const uint64_t false_bytes[] = { 0, 1, 1 << 16, INT64_MAX, UINT64_MAX };
     static const double p[3] = { 2.71, 0, 0.01 };
-    two_layouts l;
     counted_source c;
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     result right = run_query(l.without, NULL, p, true);
     for (size_t i = 0; i < sizeof false_bytes / sizeof *false_bytes; i++) {
         set_top_bytes(l.packed, false_bytes[i]);
@@ -110,7 +121,6 @@ START_TEST(test_false_top_bytes_changes_no_result)
         ck_assert(found.distance == right.distance && found.where == right.where);
         ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
     }
-    two_layouts_close(&l);
 }
 END_TEST
 
@@ -144,16 +154,13 @@ START_TEST(test_remote_radius_query_round_trips)
 {
     enum { WAVES = 4 };
     static const double p[3] = { 2.71, 0, 0.01 };
-    two_layouts l;
     counted_source c;
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     ebpo_file *far = counted_open(&c, l.packed, true);
     uint64_t opened = c.batches + c.alone;
     ck_assert(sum_within(far, p, 1) == sum_within(l.without, p, 1));
     ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
                   (int)(c.batches + c.alone - opened));
     counted_close(&c, far);
-    two_layouts_close(&l);
 }
 END_TEST
 
@@ -164,10 +171,8 @@ END_TEST
 START_TEST(test_remote_box_query_round_trips)
 {
     enum { WAVES = 4 };
-    two_layouts l;
     counted_source c;
     ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     box.boxed = true;
     for (int k = 0; k < 3; k++) {
         box.min[k] = k ? -0.3 : 2.2;
@@ -180,7 +185,6 @@ START_TEST(test_remote_box_query_round_trips)
                   (int)(c.batches + c.alone - opened));
     ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
     counted_close(&c, far);
-    two_layouts_close(&l);
 }
 END_TEST
 
@@ -217,16 +221,12 @@ static ebpo_view_options look(ebpo_observer *observer, ebpo_priority order)
 /* For each order, all subtrees that a view will visit are requested together. */
 START_TEST(test_remote_view_round_trips)
 {
-    if (!ebpo_test_wanted(_i))
-        return;
     enum { WAVES = 4 };
     static const ebpo_priority order[] = { EBPO_PRIORITY_LEVEL, EBPO_PRIORITY_PIXELS,
                                            EBPO_PRIORITY_FRONT_TO_BACK };
-    two_layouts l;
     counted_source c;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
     ebpo_view_options view = look(&observer, order[_i]);
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     view.pixels = 8;
     ebpo_file *far = counted_open(&c, l.packed, true);
     uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view);
@@ -234,7 +234,6 @@ START_TEST(test_remote_view_round_trips)
                   (int)(c.batches + c.alone - opened));
     ck_assert(nodes == count_nodes(l.without, &view) && nodes > 1000);
     counted_close(&c, far);
-    two_layouts_close(&l);
 }
 END_TEST
 
@@ -260,10 +259,8 @@ START_TEST(test_remote_limited_view_round_trips)
                  { EBPO_PRIORITY_PIXELS, 0, 30000, 6 },
                  { EBPO_PRIORITY_LEVEL, 400000, 0, 60 },
                  { EBPO_PRIORITY_PIXELS, 400000, 0, 30 } };
-    two_layouts l;
     counted_source c;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     const char *path = by_number(l.with);
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
         ebpo_view_options view = look(&observer, ends[i].order);
@@ -277,23 +274,26 @@ START_TEST(test_remote_limited_view_round_trips)
         ck_assert(view.bytes || nodes == count_nodes(l.without, &view));
         counted_close(&c, far);
     }
-    two_layouts_close(&l);
 }
 END_TEST
 
 TEST_SUITE(round_trips)
 {
     Suite *suite = suite_create("far_waves");
-    TCase *tests = tcase_create("far_waves");
-    tcase_set_timeout(tests, 900);
-    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_test(tests, test_remote_query_round_trips);
-    tcase_add_test(tests, test_remote_deep_query_round_trips);
-    tcase_add_test(tests, test_false_top_bytes_changes_no_result);
-    tcase_add_test(tests, test_remote_radius_query_round_trips);
-    tcase_add_test(tests, test_remote_box_query_round_trips);
-    tcase_add_loop_test(tests, test_remote_view_round_trips, 0, 3);
-    tcase_add_test(tests, test_remote_limited_view_round_trips);
-    suite_add_tcase(suite, tests);
+    TCase *small = tcase_create("small"), *large = tcase_create("large");
+    tcase_set_timeout(small, 900);
+    tcase_add_checked_fixture(small, scratch_enter, scratch_leave);
+    tcase_add_test(small, test_remote_query_round_trips);
+    suite_add_tcase(suite, small);
+    tcase_set_timeout(large, 900);
+    tcase_add_unchecked_fixture(large, make_large, free_large);
+    tcase_add_test(large, test_remote_deep_query_round_trips);
+    tcase_add_test(large, test_remote_radius_query_round_trips);
+    tcase_add_test(large, test_remote_box_query_round_trips);
+    tcase_add_loop_test(large, test_remote_view_round_trips, 0, 3);
+    tcase_add_test(large, test_remote_limited_view_round_trips);
+    tcase_add_test(large,
+                   test_false_top_bytes_changes_no_result); /* last, as it changes the file */
+    suite_add_tcase(suite, large);
     return suite;
 }
