@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""fetch.py TOOL GENERATE: tests ebpo fetch with parts of a file, interruptions, and files that change."""
+"""fetch.py TOOL GENERATE: tests ebpo fetch with parts of a file, interruptions, and files that change.
+
+EBPO_TEST_SCALE below 1: smaller models.
+"""
 import http.server
 import json
 import os
@@ -14,6 +17,7 @@ import time
 
 import same_ply
 
+FACES, FEWER_FACES = (150000, 40000) if float(os.environ.get("EBPO_TEST_SCALE", "1")) < 1 else (250000, 40000)
 failures = []
 
 
@@ -300,7 +304,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         path, other, ply = (os.path.join(folder, name)
                             for name in ("m.ebpo.h5", "other.ebpo.h5", "m.ply"))
-        subprocess.run([generate, "--base", "torus", "--faces", "250000", ply], check=True,
+        subprocess.run([generate, "--base", "torus", "--faces", str(FACES), ply], check=True,
                        capture_output=True)
         subprocess.run([tool, "convert", "-q", "--codec", "none", "--profile", "full", ply, path],
                        check=True)
@@ -316,7 +320,7 @@ def main():
         change(tool, folder, path, url)
         interrupt(tool, folder, path, url)
         small = os.path.join(folder, "small.ply")
-        subprocess.run([generate, "--base", "torus", "--faces", "40000", small], check=True, capture_output=True)
+        subprocess.run([generate, "--base", "torus", "--faces", str(FEWER_FACES), small], check=True, capture_output=True)
         attributes(tool, small, url)
         surface(tool, ply, url)
         done = run(tool, "fetch", url + "/nothing", "/proc/nowhere/x.ebpo.h5")

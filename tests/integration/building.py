@@ -268,10 +268,10 @@ def interrupted(root, model):
     if not has_terminal():
         print("skipped: interruptions, as there is no pseudo-terminal to show the stages")
         return
+    cases += [(s, signal.SIGKILL) for s in ("ordering faces", "envelopes", "writing")]
     if FEW:
-        cases = [c for c in cases if c[0] in ("ordering faces", "envelopes")]
-    for stage, number in cases + [("ordering faces", signal.SIGKILL), ("envelopes", signal.SIGKILL),
-                                  ("writing", signal.SIGKILL)]:
+        cases = [("ordering faces", signal.SIGTERM), ("envelopes", signal.SIGINT), ("envelopes", signal.SIGKILL)]
+    for stage, number in cases:
         place = Place(root, f"{stage} {number}")
         code, seen = run_until(place.command(model, "--memory", "128MiB"), stage, number)
         name = f"{signal.Signals(number).name} while {stage}"

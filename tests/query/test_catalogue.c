@@ -15,10 +15,13 @@
 
 enum { MODELS = 32, POINTS = 1440, RAYS = 800 };
 
+/* Numbers of points and rays: a quarter, unless all inputs are wanted. */
+static uint64_t point_count = POINTS, ray_count = RAYS;
+
 static query_model model[MODELS];
 static ebpo_catalogue_entry entry[MODELS];
-static double *points; /* [POINTS][3] */
-static ebpo_ray *rays; /* [RAYS] */
+static double *points; /* [point_count][3] */
+static ebpo_ray *rays; /* [ray_count] */
 
 static ebpo_mesh box_mesh(double x, double y, double z, double size)
 {
@@ -41,16 +44,20 @@ static ebpo_mesh mesh_of(int i)
 static void make_models(void)
 {
     uint64_t seed = 7;
+    if (ebpo_test_scale() < 1) {
+        point_count = POINTS / 4;
+        ray_count = RAYS / 4;
+    }
     for (int i = 0; i < MODELS; i++) {
         query_model_make(&model[i], "catalogue", mesh_of(i), &query_variants[0]);
         ebpo_catalogue_entry_of(model[i].file, model[i].path, &entry[i]);
     }
-    points = query_alloc(POINTS, 3 * sizeof *points);
-    rays = query_alloc(RAYS, sizeof *rays);
+    points = query_alloc(point_count, 3 * sizeof *points);
+    rays = query_alloc(ray_count, sizeof *rays);
     for (int i = 0; i < MODELS; i++)
-        query_make_points(&model[i], POINTS / MODELS, seed + (uint64_t)i,
-                          points + 3 * (POINTS / MODELS) * i);
-    for (int i = 0; i < RAYS; i++) {
+        query_make_points(&model[i], point_count / MODELS, seed + (uint64_t)i,
+                          points + 3 * (point_count / MODELS) * (uint64_t)i);
+    for (uint64_t i = 0; i < ray_count; i++) {
         ebpo_ray *r = &rays[i];
         query_make_ray(&model[i % MODELS], &seed, r->origin, r->direction, &r->t_max);
         for (int k = 0; k < 3; k++)
@@ -101,7 +108,7 @@ static ebpo_catalogue_query_options on_threads(unsigned threads)
 
 static void judge_inside(const ebpo_inside_result *got)
 {
-    for (int p = 0; p < POINTS; p++) {
+    for (uint64_t p = 0; p < point_count; p++) {
         int32_t winding = 0;
         bool in = false, on = false;
         for (int i = 0; i < MODELS; i++) {
@@ -121,7 +128,7 @@ static void judge_distance(const ebpo_distance_result *got, const uint64_t *near
 {
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
     o.unsigned_distance = true;
-    for (int p = 0; p < POINTS; p++) {
+    for (uint64_t p = 0; p < point_count; p++) {
         ebpo_distance_result best = { .distance = INFINITY, .face = EBPO_NO_FACE };
         uint64_t first = EBPO_CATALOGUE_NO_MODEL;
         for (int i = 0; i < MODELS; i++) {
@@ -143,7 +150,7 @@ static void judge_distance(const ebpo_distance_result *got, const uint64_t *near
 
 static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
 {
-    for (int r = 0; r < RAYS; r++) {
+    for (uint64_t r = 0; r < ray_count; r++) {
         ebpo_ray_hit best = { INFINITY, EBPO_NO_FACE, 0 };
         uint64_t first = EBPO_CATALOGUE_NO_MODEL;
         for (int i = 0; i < MODELS; i++) {
@@ -168,21 +175,23 @@ static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
 static void query_everything(open_catalogue *a, unsigned threads)
 {
     ebpo_catalogue_query_options o = on_threads(threads);
-    ebpo_inside_result *inside = query_alloc(POINTS, sizeof *inside);
-    ebpo_distance_result *distance = query_alloc(POINTS, sizeof *distance);
-    ebpo_ray_hit *hits = query_alloc(RAYS, sizeof *hits);
-    uint64_t *number = query_alloc(POINTS, sizeof *number);
-    ASSERT_OK(ebpo_catalogue_inside(a->catalogue, a->models, points, POINTS, &o, inside, error));
+    ebpo_inside_result *inside = query_alloc(point_count, sizeof *inside);
+    ebpo_distance_result *distance = query_alloc(point_count, sizeof *distance);
+    ebpo_ray_hit *hits = query_alloc(ray_count, sizeof *hits);
+    uint64_t *number = query_alloc(point_count, sizeof *number);
+    ASSERT_OK(
+        ebpo_catalogue_inside(a->catalogue, a->models, points, point_count, &o, inside, error));
     judge_inside(inside);
-    ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, POINTS, &o, distance, number,
-                                      error));
+    ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, point_count, &o, distance,
+                                      number, error));
     judge_distance(distance, number, INFINITY, inside);
     o.max_distance = 0.25;
     o.unsigned_distance = true;
-    ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, POINTS, &o, distance, number,
-                                      error));
+    ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, point_count, &o, distance,
+                                      number, error));
     judge_distance(distance, number, 0.25, NULL);
-    ASSERT_OK(ebpo_catalogue_ray(a->catalogue, a->models, rays, RAYS, &o, hits, number, error));
+    ASSERT_OK(
+        ebpo_catalogue_ray(a->catalogue, a->models, rays, ray_count, &o, hits, number, error));
     judge_rays(hits, number);
     free(inside);
     free(distance);
@@ -410,7 +419,7 @@ START_TEST(test_catalogue_uses_callers_open_function)
     opener o = { .fails = 3 };
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    ebpo_inside_result *out = query_alloc(POINTS, sizeof *out);
+    ebpo_inside_result *out = query_alloc(point_count, sizeof *out);
     open_catalogue a;
     how.open_file = open_counted;
     how.close_file = close_counted;
@@ -418,7 +427,7 @@ START_TEST(test_catalogue_uses_callers_open_function)
     few.memory = little_memory();
     ASSERT_OK(ebpo_catalogue_new(entry, MODELS, &how, &a.catalogue, error));
     ASSERT_OK(ebpo_catalogue_models_new(&few, &a.models, error));
-    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, NULL, out,
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, point_count, NULL, out,
                                            &reported),
                      EBPO_E_IO);
     ck_assert_str_eq(reported.message, "the source has failed");
@@ -468,10 +477,10 @@ START_TEST(test_catalogue_of_pending_files)
 {
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    ebpo_inside_result *where = query_alloc(POINTS, sizeof *where);
-    ebpo_distance_result *near = query_alloc(POINTS, sizeof *near);
-    ebpo_ray_hit *hit = query_alloc(RAYS, sizeof *hit);
-    uint64_t *number = query_alloc(POINTS, sizeof *number), rounds = 0;
+    ebpo_inside_result *where = query_alloc(point_count, sizeof *where);
+    ebpo_distance_result *near = query_alloc(point_count, sizeof *near);
+    ebpo_ray_hit *hit = query_alloc(ray_count, sizeof *hit);
+    uint64_t *number = query_alloc(point_count, sizeof *number), rounds = 0;
     ebpo_catalogue_query_options o = on_threads(_i ? 2 : 1);
     ebpo_error reported;
     open_catalogue a;
@@ -482,16 +491,16 @@ START_TEST(test_catalogue_of_pending_files)
     ASSERT_OK(ebpo_catalogue_new(entry, MODELS, &how, &a.catalogue, error));
     ASSERT_OK(ebpo_catalogue_models_new(&few, &a.models, error));
     while (supply_all(
-        ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, &o, where, &reported)))
+        ebpo_catalogue_inside(a.catalogue, a.models, points, point_count, &o, where, &reported)))
         rounds++;
     ck_assert_uint_gt(rounds, 1);
     judge_inside(where);
-    while (supply_all(ebpo_catalogue_distance(a.catalogue, a.models, points, POINTS, &o, near,
+    while (supply_all(ebpo_catalogue_distance(a.catalogue, a.models, points, point_count, &o, near,
                                               number, &reported)))
         rounds++;
     judge_distance(near, number, INFINITY, where);
     while (supply_all(
-        ebpo_catalogue_ray(a.catalogue, a.models, rays, RAYS, &o, hit, number, &reported)))
+        ebpo_catalogue_ray(a.catalogue, a.models, rays, ray_count, &o, hit, number, &reported)))
         rounds++;
     judge_rays(hit, number);
     ck_assert_uint_lt(rounds, 500);
@@ -518,7 +527,7 @@ START_TEST(test_catalogue_query_validation_and_cancel)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
     ebpo_catalogue_query_options o = on_threads(1);
-    ebpo_inside_result *out = query_alloc(POINTS, sizeof *out);
+    ebpo_inside_result *out = query_alloc(point_count, sizeof *out);
     ebpo_distance_result distance;
     ebpo_ray ray = { { 9, 9, 9 }, { 0, 0, 0 }, 1 };
     ebpo_ray_hit hit;
@@ -542,7 +551,7 @@ START_TEST(test_catalogue_query_validation_and_cancel)
     ck_assert_int_eq(out[0].where, EBPO_OUT);
     ck_assert_uint_eq(stats_of(&a, &sums).opened, 0);
     o.progress = (ebpo_progress){ stop_at_once, &calls };
-    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, &o, out,
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, point_count, &o, out,
                                            &reported),
                      EBPO_E_CANCELLED);
     ck_assert_int_eq(calls, 1);

@@ -1,5 +1,6 @@
 /* Queries small models of every kind with a million difficult points, and compares with the
- * oracle. EBPO_TEST_SCALE scales the number of points. */
+ * oracle. EBPO_TEST_SCALE scales the number of points; below 1, each solid has a third of the
+ * variants, and each variant a third of the solids. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,6 +22,8 @@ START_TEST(test_difficult_points_match_brute_force)
 {
     int solid = _i / query_variant_count, variant = _i % query_variant_count;
     query_model m;
+    if (ebpo_test_scale() < 1 && (solid + variant) % 3)
+        return;
     query_model_make(&m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
     query_check_points(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);

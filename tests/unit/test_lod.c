@@ -98,7 +98,8 @@ START_TEST(test_lod_volumes_of_real_model)
     const char *models = getenv("EBPO_MODELS");
     ebpo_mesh mesh;
     char name[4096];
-    snprintf(name, sizeof name, "%s/armadillo.ply", models ? models : "");
+    snprintf(name, sizeof name, "%s/%s.ply", models ? models : "",
+             ebpo_test_scale() < 1 ? "bunny_closed" : "armadillo");
     if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
     ebpo_file *file = build(mesh, DEFAULT | EBPO_PART_LEAF_PLANES, 16);
@@ -283,7 +284,7 @@ static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t 
 
 START_TEST(test_lod_cancel_leaves_nothing)
 {
-    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 300, 150), DEFAULT, 0);
+    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 120, 60), DEFAULT, 0);
     bool go_on = false;
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
     options.threads = 1;

@@ -10,6 +10,9 @@
 
 enum { MAX_VERTICES = 9, MAX_FACES = 24, ROUNDS = 20000 };
 
+/* Returns the scaled number of rounds, at least a fifth. */
+static uint64_t rounds(void) { return ROUNDS / 5 + ebpo_test_scaled(ROUNDS / 5 * 4); }
+
 static ebpo_mesh random_mesh(uint64_t *state)
 {
     ebpo_mesh mesh;
@@ -154,7 +157,7 @@ START_TEST(test_mesh_check_matches_reference)
 {
     static reference t;
     uint64_t state = 2017;
-    for (int round = 0; round < ROUNDS; round++) {
+    for (uint64_t round = 0; round < rounds(); round++) {
         ebpo_mesh mesh = random_mesh(&state);
         ebpo_mesh_report r = check(&mesh);
         memset(&t, 0, sizeof t);
@@ -183,7 +186,7 @@ END_TEST
 START_TEST(test_repair_random_meshes)
 {
     uint64_t state = 90;
-    for (int round = 0; round < ROUNDS; round++) {
+    for (uint64_t round = 0; round < rounds(); round++) {
         ebpo_mesh mesh = random_mesh(&state);
         ebpo_mesh_report before = check(&mesh);
         ebpo_repair_record record;

@@ -494,17 +494,19 @@ END_TEST
 
 /* ---- large outlines ---- */
 
-enum { TEETH = 8000, PETALS = 5000 };
+/* Returns a fifth of a number of corners, unless all inputs are wanted. */
+static int corners(int all) { return ebpo_test_scale() < 1 ? all / 5 : all; }
 
 static void make_comb(void)
 {
+    const int teeth = corners(8000);
     w.n = 0;
-    for (uint32_t i = 0; i < TEETH; i++) {
+    for (int i = 0; i < teeth; i++) {
         const int64_t ground[2] = { 2 * (int64_t)i, 0 }, tip[2] = { 2 * (int64_t)i + 1, 40000 };
         memcpy(w.at[w.n++], ground, sizeof ground);
         memcpy(w.at[w.n++], tip, sizeof tip);
     }
-    const int64_t end[2] = { 2 * TEETH, 0 }, under[2] = { TEETH, -1 };
+    const int64_t end[2] = { 2 * teeth, 0 }, under[2] = { teeth, -1 };
     memcpy(w.at[w.n++], end, sizeof end);
     memcpy(w.at[w.n++], under, sizeof under);
 }
@@ -512,10 +514,11 @@ static void make_comb(void)
 /* Makes a spiral of two arms side by side, inwards and out again. */
 static void make_spiral(void)
 {
+    const int steps = corners(50000);
     w.n = 0;
     for (int arm = 0; arm < 2; arm++)
-        for (int i = 0; i < 50000; i++) {
-            int step = arm ? 49999 - i : i;
+        for (int i = 0; i < steps; i++) {
+            int step = arm ? steps - 1 - i : i;
             double angle = step * 0.01, r = 400000 - 6 * step - arm * 1500;
             w.at[w.n][0] = (int64_t)(r * cos(angle));
             w.at[w.n++][1] = (int64_t)(r * sin(angle));
@@ -525,9 +528,10 @@ static void make_spiral(void)
 /* Makes triangles with one common corner. */
 static void make_petals(void)
 {
+    const int petals = corners(5000);
     w.n = 0;
-    for (int i = 0; i < PETALS; i++) {
-        double angle = i * (2 * M_PI / PETALS);
+    for (int i = 0; i < petals; i++) {
+        double angle = i * (2 * M_PI / petals);
         w.at[w.n][0] = w.at[w.n][1] = 0;
         w.n++;
         for (int k = 0; k < 2; k++, angle += 0.0001) {

@@ -122,6 +122,8 @@ START_TEST(test_repair_chooses_fewest_steps)
 {
     for (int i = 0; i < 32; i++) {
         int damage = i < 16 ? i : (16 + 16 * (i % 3)) | ((i - 16) & 13);
+        if (ebpo_test_scale() < 1 && (i + i / 4 + _i) % 4)
+            continue; /* a quarter of the damages, others for the next solid */
         ebpo_mesh mesh = damaged(_i, damage);
         ebpo_error error = EBPO_ERROR_INIT;
         if (mesh.face_count < (i < 16 ? 20000 : 1000)) {

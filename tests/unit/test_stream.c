@@ -653,6 +653,8 @@ START_TEST(test_real_models_are_inside_streamed_planes)
     ebpo_mesh mesh;
     char name[4096];
     snprintf(name, sizeof name, "%s/%s", models ? models : "", names[_i]);
+    if (ebpo_test_scale() < 1 && _i == 0)
+        return; /* only the smaller one */
     if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
     ebpo_file *file = build(mesh, DEFAULT | EBPO_PART_LEAF_PLANES, 16);

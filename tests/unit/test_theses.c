@@ -78,7 +78,7 @@ END_TEST
 
 START_TEST(test_kmedoids_of_many_candidates)
 {
-    enum { COUNT = 4200, WANTED = 60 };
+    enum { COUNT = 4200, WANTED = 20 };
     static ebpo_candidate c[COUNT];
     static bool chosen[COUNT];
     static const double unit_cell[3] = { 1, 1, 1 };

@@ -117,6 +117,8 @@ START_TEST(test_verify_built_solids)
     static const uint32_t limits[] = { 0, 1, 16, 1000000 };
     for (int i = 0; i < ebpo_test_solid_count; i++)
         for (int j = 0; j < 4; j++) {
+            if (ebpo_test_scale() < 1 && (i + j) % 2)
+                continue; /* two of the four trees of each solid */
             build(ebpo_test_solids[i].name, limits[j], (ebpo_rule)(j % 3));
             expect_fine(ebpo_test_solids[i].name);
             ebpo_tree_free(&tree);
