@@ -716,6 +716,21 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
     return write_tree(tree, path, shown, NULL, options, error);
 }
 
+ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *folder, const char *name,
+                            const ebpo_write_options *options, ebpo_file **out, ebpo_error *error)
+{
+    ebpo_publish named = EBPO_PUBLISH_INIT;
+    char path[EBPO_FOLDER_BYTES + 32];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    ebpo_status status = ebpo_publish_begin(&named, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_tree_write_into(tree, ebpo_publish_path(&named), folder, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_open_own(ebpo_publish_path(&named), out, error);
+    ebpo_publish_abort(&named);
+    return status;
+}
+
 /* --- repacking --- */
 
 /* Checks that the written file has the content checksums of `from`, the file that was read. If they

@@ -11,6 +11,12 @@ EBPO_MUST_USE ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char
                                                const char *shown, const ebpo_write_options *options,
                                                ebpo_error *error);
 
+/* Writes a tree to a temporary file in `folder`, opens it, and then removes its name, which libhdf5
+ * needs. The name begins with `name`. */
+EBPO_MUST_USE ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *folder,
+                                          const char *name, const ebpo_write_options *options,
+                                          ebpo_file **out, ebpo_error *error);
+
 /* Adds parts to the tree of ebpo_repack_with. The parts must have separate checksums (colours,
  * surface). */
 typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, unsigned threads, ebpo_error *error);

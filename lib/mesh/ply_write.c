@@ -258,6 +258,20 @@ static void end_element(making *m, ebpo_ply_kind kind)
         add_rest(m, "face");
 }
 
+/* Adds the elements of attributes other than vertices, faces and textures. */
+static void add_other_elements(making *m)
+{
+    for (uint64_t i = 0; i < array_count(m); i++) {
+        const ebpo_attribute *a = &m->mesh->attributes->array[i];
+        if (m->taken[i * EBPO_ATTRIBUTE_COLUMNS] || ebpo_attribute_is_of_mesh(a) ||
+            ebpo_attribute_is_of_textures(a))
+            continue;
+        fprintf(m->text, "element %s %" PRIu64 "\n", a->element, a->rows);
+        add_element(m, EBPO_PLY_KIND_OTHER, a->rows);
+        add_rest(m, a->element);
+    }
+}
+
 static const ebpo_ply_word default_corners = { "vertex_indices", 14 };
 
 static void make_plain(making *m)
@@ -272,6 +286,7 @@ static void make_plain(making *m)
     begin_faces(m);
     add_corners(m, EBPO_PLY_UINT8, m->index_type, default_corners, (ebpo_ply_word){ "", 0 });
     end_element(m, EBPO_PLY_KIND_FACE);
+    add_other_elements(m);
     fputs("end_header\n", m->text);
 }
 

@@ -17,6 +17,7 @@
 #include "format/file_in.h"
 #include "geometry/vec3.h"
 #include "mesh/attributes.h"
+#include "query/sample_attributes.h"
 
 /* A requested column of an attribute. */
 typedef struct sampled {
@@ -266,8 +267,7 @@ static void weigh_edge(const double e[3][3], double weight[3])
     weight[to[longest]] = t;
 }
 
-/* Computes the weights of the three corners at the point p: >= 0, with the sum 1. */
-static void weigh_corners(const double corner[3][3], const double p[3], double weight[3])
+void ebpo_weigh_corners(const double corner[3][3], const double p[3], double weight[3])
 {
     double e[3][3];
     edges_of(corner, p, e);
@@ -286,9 +286,7 @@ static void weigh_corners(const double corner[3][3], const double p[3], double w
     weight[2] = c / sum;
 }
 
-/* Returns the weighted mean of three values. The result is between the values, also after rounding.
- */
-static double blend_values(const double weight[3], const double value[3])
+double ebpo_blend_values(const double weight[3], const double value[3])
 {
     double sum = 0, least = INFINITY, most = -INFINITY;
     for (int k = 0; k < 3; k++) {
@@ -326,14 +324,14 @@ static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3]
     double corner[3][3], weight[3] = { 1, 0, 0 };
     if (face) {
         corners_of(&s->mesh, face, corner);
-        weigh_corners((const double(*)[3])corner, point, weight);
+        ebpo_weigh_corners((const double(*)[3])corner, point, weight);
     }
     for (unsigned i = 0; i < s->count; i++) {
         const sampled *item = &s->item[i];
         double value[3] = { 0, 0, 0 };
         for (int k = 0; k < 3 && item->of_vertices; k++)
             value[k] = value_of(item, face[k]);
-        out[i] = item->of_vertices ? blend_values(weight, value) : value_of(item, f);
+        out[i] = item->of_vertices ? ebpo_blend_values(weight, value) : value_of(item, f);
     }
 }
 

@@ -15,7 +15,7 @@
 #include "mesh/attributes.h"
 #include "query_support.h"
 
-enum { OPERANDS = 3, NODES = 9, SCENES = 200 };
+enum { OPERANDS = 3, NODES = 9, PLANES = 2, SCENES = 200 };
 
 typedef struct scene {
     query_model model[OPERANDS];
@@ -24,6 +24,10 @@ typedef struct scene {
     ebpo_boolean_node node[NODES];
     uint32_t operands, nodes;
     double low[3], high[3]; /* box of all operands */
+    double box[6];          /* if `boxed`: the result is cut to it */
+    bool boxed;
+    double plane[PLANES][4]; /* the result is cut to these half-spaces */
+    uint32_t planes;
 } scene;
 
 static uint32_t random_below(uint64_t *state, uint32_t n)
@@ -128,6 +132,34 @@ static void make_expression(scene *s, uint64_t *state)
     }
 }
 
+/* Cuts the scene: to a box whose sides may be in planes of faces, with a complement, and to
+ * half-spaces. */
+static void add_regions(scene *s, uint64_t *state)
+{
+    s->boxed = random_below(state, 3) > 0;
+    for (int k = 0; k < 3; k++) {
+        double step = (s->high[k] - s->low[k]) / 8;
+        s->box[k] = s->low[k] + step * (random_below(state, 5) - 1.0);
+        s->box[3 + k] = s->box[k] + step * (1 + random_below(state, 8));
+    }
+    if (s->boxed) {
+        s->node[s->nodes] = (ebpo_boolean_node){ EBPO_BOOLEAN_COMPLEMENT, s->nodes - 1, 7, 0 };
+        s->nodes += random_below(state, 2);
+    }
+    s->planes = random_below(state, PLANES + 1);
+    for (uint32_t i = 0; i < s->planes; i++) {
+        double *plane = s->plane[i];
+        bool axis_parallel = random_below(state, 2);
+        for (int k = 0; k < 3; k++)
+            plane[k] = axis_parallel ? 0 : ebpo_test_random_unit(state) - 0.5;
+        if (axis_parallel)
+            plane[random_below(state, 3)] = random_below(state, 2) ? 2 : -1;
+        for (int k = 0; k < 3; k++)
+            plane[3] += plane[k] * (s->low[k] +
+                                    (s->high[k] - s->low[k]) / 8 * (random_below(state, 11) - 1.0));
+    }
+}
+
 enum { KINDS = 11 };
 
 static void make_scene(scene *s, uint64_t seed)
@@ -162,6 +194,8 @@ static void make_scene(scene *s, uint64_t seed)
     if (kind == 9)
         add_operand(s, query_random_solid(seed + 2000, true), moved_pose(0.5, 0.5, 0), seed / 9);
     make_expression(s, &state);
+    if (seed / KINDS % 2)
+        add_regions(s, &state);
 }
 
 static void free_scene(scene *s)
@@ -178,6 +212,9 @@ static ebpo_boolean *make_boolean(const scene *s, unsigned threads)
     ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
     ebpo_boolean *boolean;
     options.threads = threads;
+    options.box = s->boxed ? s->box : NULL;
+    options.planes = s->plane[0];
+    options.plane_count = s->planes;
     for (uint32_t i = 0; i < s->operands; i++)
         operands[i] = (ebpo_boolean_operand){ s->model[i].model, s->pose[i] };
     ASSERT_OK(
@@ -248,16 +285,36 @@ static bool rule_inside(ebpo_rule rule, int32_t winding)
                                         : winding != 0;
 }
 
+/* Returns false if the point is near the border of a region; *in: the point is in all of them. */
+static bool test_regions(const scene *s, const double p[3], double margin, bool *in)
+{
+    bool clear = true;
+    *in = true;
+    for (int k = 0; k < 3 && s->boxed; k++) {
+        clear = clear && fabs(p[k] - s->box[k]) > margin && fabs(p[k] - s->box[3 + k]) > margin;
+        *in = *in && p[k] > s->box[k] && p[k] < s->box[3 + k];
+    }
+    for (uint32_t i = 0; i < s->planes; i++) {
+        const double *n = s->plane[i];
+        double value = n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - n[3];
+        double length = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
+        clear = clear && fabs(value) > margin * length;
+        *in = *in && value < 0;
+    }
+    return clear;
+}
+
 static bool evaluate(const scene *s, const bool in[OPERANDS])
 {
     bool value[NODES] = { false };
     for (uint32_t i = 0; i < s->nodes; i++) {
         const ebpo_boolean_node *n = &s->node[i];
-        bool left = value[n->left], right = value[n->right];
+        bool left = value[n->left], right = n->right < NODES && value[n->right];
         value[i] = n->operation == EBPO_BOOLEAN_OPERAND        ? in[n->left]
                    : n->operation == EBPO_BOOLEAN_UNION        ? left || right
                    : n->operation == EBPO_BOOLEAN_INTERSECTION ? left && right
                    : n->operation == EBPO_BOOLEAN_DIFFERENCE   ? left && !right
+                   : n->operation == EBPO_BOOLEAN_COMPLEMENT   ? !left
                                                                : left != right;
     }
     return value[s->nodes - 1];
@@ -293,11 +350,15 @@ static void make_point(const scene *s, const ebpo_mesh *mesh, uint64_t *state, d
 static uint64_t check_points(scene *s, const ebpo_mesh *mesh, double displacement, uint64_t seed)
 {
     uint64_t state = seed, tested = 0;
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, fmax(fabs(s->low[k]), fabs(s->high[k])));
     oracle *result = mesh->face_count ? oracle_make(mesh) : NULL;
     for (int i = 0; i < 60; i++) {
         double p[3];
-        bool in[OPERANDS] = { false }, clear = true;
+        bool in[OPERANDS] = { false }, clear, in_regions;
         make_point(s, mesh, &state, p);
+        clear = test_regions(s, p, fmax(4 * displacement, 0x1p-45 * size), &in_regions);
         for (uint32_t k = 0; k < s->operands && clear; k++) {
             clear = is_clear(s->posed[k], p, 4 * displacement);
             if (clear)
@@ -306,7 +367,7 @@ static uint64_t check_points(scene *s, const ebpo_mesh *mesh, double displacemen
         if (!clear || (result && !is_clear(result, p, 4 * displacement)))
             continue;
         int32_t winding = result ? oracle_winding(result, p) : 0;
-        ck_assert_msg(winding == (evaluate(s, in) ? 1 : 0),
+        ck_assert_msg(winding == (evaluate(s, in) && in_regions ? 1 : 0),
                       "seed %llu: winding number %d at %.17g %.17g %.17g; operands %d %d %d",
                       (unsigned long long)seed, winding, p[0], p[1], p[2], in[0], in[1], in[2]);
         tested++;
@@ -483,6 +544,202 @@ START_TEST(volumes)
 }
 END_TEST
 
+/* The exact volume of a cube that a plane cuts, on each side, and of a box minus the cube. */
+START_TEST(regions)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    static const struct {
+        bool boxed;
+        double box[6];
+        uint32_t planes;
+        double plane[4];
+        int32_t operation; /* EBPO_BOOLEAN_COMPLEMENT, or EBPO_BOOLEAN_OPERAND */
+        double volume;
+    } rows[] = {
+        { false, { 0 }, 1, { 0, 0, 1, 0.25 }, EBPO_BOOLEAN_OPERAND, 0.25 },
+        { false, { 0 }, 1, { 0, 0, -3, -0.75 }, EBPO_BOOLEAN_OPERAND, 0.75 },
+        { false, { 0 }, 1, { 1, 1, 0, 1 }, EBPO_BOOLEAN_OPERAND, 0.5 },
+        { false, { 0 }, 1, { 1, 1, 1, 1 }, EBPO_BOOLEAN_OPERAND, 1 / 6.0 },
+        { false, { 0 }, 1, { 1, 0, 0, 1 }, EBPO_BOOLEAN_OPERAND, 1 },
+        { false, { 0 }, 1, { 1, 0, 0, 1e300 }, EBPO_BOOLEAN_OPERAND, 1 },
+        { false, { 0 }, 1, { -1e-300, 0, 0, -1 }, EBPO_BOOLEAN_OPERAND, 0 },
+        { true, { 0.5, -1, -1, 3, 3, 0.5 }, 0, { 0 }, EBPO_BOOLEAN_OPERAND, 0.25 },
+        { true, { -1, -1, -1, 1, 1, 1 }, 0, { 0 }, EBPO_BOOLEAN_COMPLEMENT, 7 },
+        { true, { -1, -1, -1, 1, 1, 1 }, 1, { 0, 1, 0, 0 }, EBPO_BOOLEAN_COMPLEMENT, 4 },
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        scene s = { .boxed = rows[i].boxed, .planes = rows[i].planes };
+        ebpo_mesh mesh;
+        memcpy(s.box, rows[i].box, sizeof s.box);
+        memcpy(s.plane[0], rows[i].plane, sizeof s.plane[0]);
+        add_operand(&s, ebpo_test_box(low, high, 2), moved_pose(0, 0, 0), 0);
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+        if (rows[i].operation == EBPO_BOOLEAN_COMPLEMENT)
+            s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_COMPLEMENT, 0, 0, 0 };
+        ebpo_boolean_mesh_report report = make_mesh(&s, 1, &mesh);
+        ck_assert_uint_eq(count_open_edges(&mesh), 0);
+        ck_assert_double_eq(report.volume.lo, rows[i].volume);
+        ck_assert_double_eq(report.volume.hi, rows[i].volume);
+        ck_assert_double_eq(report.displacement, 0);
+        ebpo_mesh_free(&mesh);
+        free_scene(&s);
+    }
+}
+END_TEST
+
+START_TEST(refused_regions)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 }, flat[6] = { 0, 0, 0, 1, 0, 1 };
+    static const double planes[][4] = { { 0, 0, 0, 1 }, { 1, NAN, 0, 1 }, { 1, 0, 0, INFINITY } };
+    ebpo_boolean_node node[2] = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                                  { EBPO_BOOLEAN_COMPLEMENT, 0, 0, 0 } };
+    ebpo_boolean *boolean;
+    scene s = { .nodes = 0 };
+    add_operand(&s, ebpo_test_box(low, high, 1), moved_pose(0, 0, 0), 0);
+    ebpo_boolean_operand operand = { s.model[0].model, s.pose[0] };
+    for (uint32_t i = 0; i < 6; i++) {
+        ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
+        ebpo_error got = EBPO_ERROR_INIT;
+        options.box = i == 0 ? flat : NULL;
+        options.planes = i < 3 ? planes[i] : planes[0];
+        options.plane_count = i == 4 ? 64 : i < 3 && i > 0 ? 1 : i == 5 ? 1 : 0;
+        ebpo_status status =
+            ebpo_boolean_new(&operand, 1, node, i == 3 ? 2 : 1, &options, &boolean, &got);
+        ck_assert_int_eq(status, i == 4 ? EBPO_E_LIMIT : EBPO_E_ARGUMENT);
+        ck_assert_ptr_null(boolean);
+    }
+    free_scene(&s);
+}
+END_TEST
+
+/* --- changes --- */
+
+typedef struct corners {
+    double at[3][3];
+} corners;
+
+static int order_corners(const void *a, const void *b) { return memcmp(a, b, sizeof(corners)); }
+
+/* Gets the corners of a face of a mesh, the least one first. */
+static corners corners_of(const ebpo_mesh *mesh, uint64_t face, const ebpo_pose *pose)
+{
+    corners c, out;
+    int least = 0;
+    for (int i = 0; i < 3; i++) {
+        ebpo_test_point(mesh, mesh->faces[3 * face + (unsigned)i], c.at[i]);
+        for (int k = 0; k < 3 && pose; k++)
+            c.at[i][k] += pose->translation[k];
+        for (int k = 0; k < 3; k++)
+            c.at[i][k] += 0.0; /* no -0 */
+        if (memcmp(c.at[i], c.at[least], sizeof c.at[i]) < 0)
+            least = i;
+    }
+    for (int i = 0; i < 3; i++)
+        memcpy(out.at[i], c.at[(least + i) % 3], sizeof out.at[i]);
+    return out;
+}
+
+/* Lists the faces of the base that are not removed, and those of the changes. */
+static uint64_t list_changed(const scene *s, const ebpo_mesh *changes, corners *out)
+{
+    const ebpo_mesh *base = &s->model[0].mesh;
+    const ebpo_attribute *removed = &changes->attributes->array[0];
+    uint64_t count = 0, range = 0;
+    ck_assert_str_eq(removed->element, "removed");
+    for (uint64_t f = 0; f < base->face_count; f++) {
+        uint32_t row[2] = { UINT32_MAX, 0 };
+        if (range < removed->rows)
+            memcpy(row, removed->values + 8 * range, sizeof row);
+        if (f < row[0])
+            out[count++] = corners_of(base, f, &s->pose[0]);
+        else if (f + 1 == (uint64_t)row[0] + row[1])
+            range++;
+    }
+    ck_assert_uint_eq(range, removed->rows);
+    for (uint64_t f = 0; f < changes->face_count; f++)
+        out[count++] = corners_of(changes, f, NULL);
+    return count;
+}
+
+/* The faces that stay and the changes are the faces of the result. */
+START_TEST(changes)
+{
+    static const int32_t operations[] = { EBPO_BOOLEAN_UNION, EBPO_BOOLEAN_INTERSECTION,
+                                          EBPO_BOOLEAN_DIFFERENCE,
+                                          EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE };
+    const double centre[3] = { 0, 0, 0 };
+    uint64_t kept = 0, compared = 0;
+    for (uint32_t i = 0; i < 40; i++) {
+        uint64_t state = i + 1;
+        double small[3] = { 0.1, 0.2, 0.3 };
+        ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+        ebpo_boolean_mesh_report report = EBPO_BOOLEAN_MESH_REPORT_INIT;
+        ebpo_mesh whole, mesh;
+        scene s = { .nodes = 0 };
+        add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0.25 * (i % 3), 0, 0), 3 * i);
+        if (i % 5 == 0)
+            add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0, 0, 0), 3);
+        else
+            add_operand(&s, ebpo_test_sphere(small, 0.3, 1), turned_pose(&state), 3);
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
+        s.node[s.nodes++] = (ebpo_boolean_node){ operations[i % 4], 0, 1, 0 };
+        ebpo_boolean *boolean = make_boolean(&s, 2);
+        ASSERT_OK(ebpo_boolean_mesh(boolean, &options, &whole, NULL, error));
+        options.changed_only = true;
+        ASSERT_OK(ebpo_boolean_mesh(boolean, &options, &mesh, &report, error));
+        uint64_t most = s.model[0].mesh.face_count + mesh.face_count;
+        corners *expected = query_alloc(whole.face_count + 1, sizeof *expected),
+                *got = query_alloc(most, sizeof *got);
+        for (uint64_t f = 0; f < whole.face_count; f++)
+            expected[f] = corners_of(&whole, f, NULL);
+        ck_assert_uint_eq(list_changed(&s, &mesh, got), whole.face_count);
+        ck_assert_uint_eq(whole.face_count + report.removed_faces, most);
+        qsort(expected, whole.face_count, sizeof *expected, order_corners);
+        qsort(got, whole.face_count, sizeof *got, order_corners);
+        ck_assert_mem_eq(expected, got, whole.face_count * sizeof *got);
+        kept += s.model[0].mesh.face_count - report.removed_faces;
+        compared += whole.face_count;
+        free(expected);
+        free(got);
+        ebpo_mesh_free(&whole);
+        ebpo_mesh_free(&mesh);
+        ebpo_boolean_free(boolean);
+        free_scene(&s);
+    }
+    ck_assert_uint_gt(3 * kept, compared);
+}
+END_TEST
+
+/* Changes of a base that intersects itself, or of an unused one, are refused. */
+START_TEST(refused_changes)
+{
+    const double centre[3] = { 0, 0, 0 }, other[3] = { 0.9, 0, 0 };
+    ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    ebpo_error got = EBPO_ERROR_INIT;
+    ebpo_mesh mesh;
+    scene s = { .nodes = 0 };
+    add_operand(&s, join_meshes(ebpo_test_sphere(centre, 1, 2), ebpo_test_sphere(other, 1, 2)),
+                moved_pose(0, 0, 0), 0);
+    add_operand(&s, ebpo_test_sphere(other, 0.5, 1), moved_pose(-0.25, 0, 0), 0);
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 };
+    options.changed_only = true;
+    ebpo_boolean *boolean = make_boolean(&s, 1);
+    ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_UNSUPPORTED);
+    options.volume = true;
+    ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_ARGUMENT);
+    ebpo_boolean_free(boolean);
+    s.nodes = 2;
+    options.volume = false;
+    boolean = make_boolean(&s, 1);
+    ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_ARGUMENT);
+    ebpo_boolean_free(boolean);
+    free_scene(&s);
+}
+END_TEST
+
 START_TEST(equal_for_any_threads)
 {
     for (uint64_t seed = 1; seed < 1 + KINDS; seed++) {
@@ -514,6 +771,10 @@ TEST_SUITE(boolean_mesh)
     tcase_add_test(tests, signs_of_zero);
     tcase_add_test(tests, empty_result);
     tcase_add_test(tests, volumes);
+    tcase_add_test(tests, regions);
+    tcase_add_test(tests, refused_regions);
+    tcase_add_test(tests, changes);
+    tcase_add_test(tests, refused_changes);
     tcase_add_test(tests, equal_for_any_threads);
     suite_add_tcase(suite, tests);
     return suite;

@@ -366,3 +366,15 @@ void args_help_page(const arg_spec *spec, const char *page)
         if (o->page && strcmp(o->page, page) == 0)
             print_option(o);
 }
+
+bool args_read_reals(const char *text, int count, double *out)
+{
+    for (int i = 0; i < count; i++) {
+        char *end;
+        out[i] = strtod(text, &end);
+        if (end == text || !isfinite(out[i]) || *end != (i + 1 < count ? ',' : 0))
+            return false;
+        text = end + 1;
+    }
+    return true;
+}

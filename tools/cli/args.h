@@ -75,4 +75,7 @@ void args_help(const arg_spec *spec);
 /* Prints the options of the command that have this page. */
 void args_help_page(const arg_spec *spec, const char *page);
 
+/* Reads `count` finite numbers separated by commas. Returns false for any other text. */
+bool args_read_reals(const char *text, int count, double *out);
+
 #endif

@@ -37,9 +37,14 @@ static bool read_sum(parser *p, uint32_t *number);
 static bool read_atom(parser *p, uint32_t *number)
 {
     skip_blanks(p);
-    if (*p->at == '(') {
-        if (++p->depth > DEPTH_MAX)
-            return fail_here(p, "too many nested parentheses");
+    if ((*p->at == '(' || *p->at == '~') && ++p->depth > DEPTH_MAX)
+        return fail_here(p, "too many nested parentheses or complements");
+    if (*p->at == '~') {
+        p->at++;
+        if (!read_atom(p, number) || !add_node(p, EBPO_BOOLEAN_COMPLEMENT, *number, 0, number))
+            return false;
+        p->depth--;
+    } else if (*p->at == '(') {
         p->at++;
         if (!read_sum(p, number))
             return false;
@@ -55,7 +60,7 @@ static bool read_atom(parser *p, uint32_t *number)
         if (!add_node(p, EBPO_BOOLEAN_OPERAND, operand, 0, number))
             return false;
     } else {
-        return fail_here(p, "expected a model (A, B, ...) or '('");
+        return fail_here(p, "expected a model (A, B, ...), '~' or '('");
     }
     skip_blanks(p);
     return true;
@@ -131,4 +136,18 @@ bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operan
         if (!read_pose(name, texts->item[i], operands, pose))
             return false;
     return true;
+}
+
+/* --- planes --- */
+
+bool boolean_read_plane(const char *name, const char *text, double plane[4])
+{
+    int axis = text[0] - 'x';
+    for (int k = 0; k < 4; k++)
+        plane[k] = k == axis;
+    if (axis >= 0 && axis < 3 && text[1] == '=' ? args_read_reals(text + 2, 1, plane + 3)
+                                                : args_read_reals(text, 4, plane))
+        return true;
+    command_usage(name, "--section '%s': expected x=V, y=V, z=V or four numbers NX,NY,NZ,D", text);
+    return false;
 }

@@ -3,6 +3,8 @@
 #include <inttypes.h>
 #include <stdio.h>
 
+#include <ebpo/collide.h>
+
 #include "cli/words.h"
 
 static ebpo_status convert_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
@@ -34,6 +36,45 @@ ebpo_status boolean_write_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_pr
                                            : convert_mesh(o, mesh, progress, error);
 }
 
+/* Counts the intersecting faces of the mesh. Empties the mesh. */
+static ebpo_status count_crossings(boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
+                                   ebpo_error *error)
+{
+    ebpo_mesh_report report;
+    ebpo_self_intersections_options how = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
+    ebpo_self_intersections_summary sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT;
+    how.threads = o->threads;
+    how.progress = progress;
+    if (mesh->face_count == 0)
+        return EBPO_OK;
+    ebpo_status status = ebpo_mesh_check(mesh, o->threads, progress, &report, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_self_intersections(mesh, &report, &how, NULL, NULL, &sum, error);
+    for (int i = 0; i < 4; i++)
+        o->crossing_pairs += sum.pairs[i];
+    return status;
+}
+
+/* Writes the mesh, and then counts the intersecting faces of what was written. */
+static ebpo_status write_and_count(boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
+                                   ebpo_error *error)
+{
+    ebpo_file *file = NULL;
+    ebpo_read_options reading = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = boolean_write_mesh(o, mesh, progress, error);
+    if (status != EBPO_OK || !o->crossings)
+        return status;
+    if (!words_end_with(o->path, ".ply")) { /* the mesh has become the model */
+        reading.threads = o->threads;
+        reading.workspace = o->workspace;
+        status = ebpo_open(o->path, &file, error);
+        if (status == EBPO_OK)
+            status = ebpo_file_read_mesh(file, &reading, mesh, error);
+        ebpo_close(file);
+    }
+    return status == EBPO_OK ? count_crossings(o, mesh, progress, error) : status;
+}
+
 ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progress progress,
                                  ebpo_error *error)
 {
@@ -43,11 +84,17 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     how.doubles = o->doubles;
     how.origins = true;
     how.volume = o->volume;
+    how.changed_only = o->changed_only;
+    how.attributes = !o->changed_only;
+    how.colours = o->colours;
     how.workspace = o->workspace;
     o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
     ebpo_status status = ebpo_boolean_mesh(b, &how, &mesh, &o->report, error);
     if (status != EBPO_OK)
         return status;
+    if (ebpo_mesh_attributes_lost(&mesh))
+        fprintf(stderr, "ebpo boolean: %s: warning: attributes that are not carried over: %s\n",
+                o->path, ebpo_mesh_attributes_lost(&mesh));
     o->vertices = mesh.vertex_count;
     o->faces = mesh.face_count;
     if (mesh.face_count == 0 && !words_end_with(o->path, ".ply")) {
@@ -56,7 +103,7 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
                  "%s: the result is empty, and an .ebpo.h5 file cannot be; write a .ply file",
                  o->path);
     } else {
-        status = boolean_write_mesh(o, &mesh, progress, error);
+        status = write_and_count(o, &mesh, progress, error);
     }
     ebpo_mesh_free(&mesh);
     if (o->workspace) {
@@ -73,10 +120,15 @@ void boolean_print_result(const boolean_output *o)
     words_plural(faces, sizeof faces, o->faces, "face", "faces");
     words_plural(cut, sizeof cut, o->report.faces_cut, "face", "faces");
     words_plural(fresh, sizeof fresh, o->report.new_vertices, "new vertex", "new vertices");
-    printf("%s: %s, closed; %s cut, %s, displaced at most %s", o->path, faces, cut, fresh,
+    printf("%s: %s, %s; %s cut, %s, displaced at most %s", o->path, faces,
+           o->changed_only ? "the changes" : "closed", cut, fresh,
            words_real(o->report.displacement, real));
+    if (o->changed_only)
+        printf("; removed faces of A: %" PRIu64, o->report.removed_faces);
     if (o->workspace)
         printf("; temporary files: %s", words_bytes(real, sizeof real, o->temporary));
+    if (o->crossings)
+        printf("; pairs of faces that intersect: %" PRIu64, o->crossing_pairs);
     putchar('\n');
 }
 
@@ -89,5 +141,9 @@ void boolean_result_to_json(const boolean_output *o, json *j)
     json_uint(j, "new_vertices", o->report.new_vertices);
     json_uint(j, "patches", o->report.patches);
     json_real(j, "displacement", o->report.displacement);
+    if (o->changed_only)
+        json_uint(j, "removed_faces", o->report.removed_faces);
+    if (o->crossings)
+        json_uint(j, "crossings", o->crossing_pairs);
     json_uint(j, "temporary_bytes", o->temporary);
 }

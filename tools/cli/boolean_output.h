@@ -12,11 +12,14 @@ typedef struct boolean_output {
     const char *unit; /* recorded in an .ebpo.h5 file */
     unsigned threads;
     bool doubles;              /* write double coordinates */
-    bool volume;               /* compute the volume of the exact result */
+    bool changed_only;         /* write only the changes of the first operand */
+    bool colours;              /* colour faces by their operand */
+    bool volume, crossings;    /* compute these facts of the exact result */
     ebpo_workspace *workspace; /* of the exact result; NULL: no limit of memory */
     uint64_t vertices, faces;  /* of the exact result that was written */
     ebpo_boolean_mesh_report report;
-    uint64_t temporary; /* largest size of the temporary files */
+    uint64_t temporary;      /* largest size of the temporary files */
+    uint64_t crossing_pairs; /* with `crossings`: pairs of faces that intersect, by rounding */
 } boolean_output;
 
 /* Writes a mesh to OUT.ply or OUT.ebpo.h5. */

@@ -22,11 +22,15 @@
 #include "geometry/level_nodes.h"
 #include "query/query_model.h"
 
+/* --- expressions --- */
+
+static bool has_one_node(int32_t operation) { return operation == EBPO_BOOLEAN_COMPLEMENT; }
+
 static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, uint32_t operands,
-                              ebpo_error *error)
+                              bool has_box, ebpo_error *error)
 {
-    bool operand = node->operation == EBPO_BOOLEAN_OPERAND;
-    if (node->operation < 0 || node->operation > EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE)
+    bool operand = node->operation == EBPO_BOOLEAN_OPERAND, one = has_one_node(node->operation);
+    if (node->operation < 0 || node->operation > EBPO_BOOLEAN_COMPLEMENT)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "node %" PRIu32 " of the expression: unknown operation %" PRId32, number,
                          node->operation);
@@ -35,28 +39,58 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
                          "node %" PRIu32 " of the expression: left is %" PRIu32
                          ", but operands are numbered from 0 and there are %" PRIu32,
                          number, node->left, operands);
-    if (!operand && (node->left >= number || node->right >= number))
+    if (!operand && (node->left >= number || (!one && node->right >= number)))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "node %" PRIu32 " of the expression names node %" PRIu32
                          ", which is not before it",
                          number, node->left >= number ? node->left : node->right);
+    if (one && !has_box)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "node %" PRIu32 " of the expression is a complement; give a box to which "
+                         "the result is cut",
+                         number);
     return EBPO_OK;
 }
 
-/* Fails with EBPO_E_LIMIT and EBPO_E_ARGUMENT, as documented at ebpo_boolean_new. */
-static ebpo_status make_expression(ebpo_expression *out, const ebpo_boolean_node *nodes,
-                                   uint32_t count, uint32_t operands, ebpo_error *error)
+static void add_node(ebpo_expression *e, int32_t operation, uint32_t left, uint32_t right)
 {
+    e->node[e->count++] = (ebpo_boolean_node){ operation, left, right, 0 };
+}
+
+/* Cuts the expression to an operand. */
+static void cut_expression(ebpo_expression *e, uint32_t operand)
+{
+    add_node(e, EBPO_BOOLEAN_OPERAND, operand, 0);
+    add_node(e, EBPO_BOOLEAN_INTERSECTION, e->count - 2, e->count - 1);
+}
+
+/* Copies the nodes. With a box, the first node is the box, and complements are differences from
+ * the box: in it, both are equal. Fails with EBPO_E_LIMIT and EBPO_E_ARGUMENT, as documented at
+ * ebpo_boolean_new. */
+static ebpo_status make_expression(ebpo_boolean *b, const ebpo_boolean_node *nodes, uint32_t count,
+                                   bool has_box, ebpo_error *error)
+{
+    ebpo_expression *e = &b->expression;
+    uint32_t shift = has_box ? 1 : 0;
     if (count == 0 || count > EBPO_BOOLEAN_NODES_MAX)
         return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu32 " nodes; give 1 to %d",
                          count, EBPO_BOOLEAN_NODES_MAX);
-    ebpo_status status = EBPO_OK;
-    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
-        status = check_node(&nodes[i], i, operands, error);
-    if (status != EBPO_OK)
-        return status;
-    memcpy(out->node, nodes, count * sizeof *nodes);
-    out->count = count;
+    if (has_box)
+        add_node(e, EBPO_BOOLEAN_OPERAND, b->given, 0);
+    for (uint32_t i = 0; i < count; i++) {
+        ebpo_boolean_node n = nodes[i];
+        ebpo_status status = check_node(&n, i, b->given, has_box, error);
+        if (status != EBPO_OK)
+            return status;
+        if (n.operation == EBPO_BOOLEAN_OPERAND)
+            add_node(e, n.operation, n.left, 0);
+        else if (has_one_node(n.operation))
+            add_node(e, EBPO_BOOLEAN_DIFFERENCE, 0, n.left + shift);
+        else
+            add_node(e, n.operation, n.left + shift, n.right + shift);
+    }
+    if (has_box)
+        add_node(e, EBPO_BOOLEAN_INTERSECTION, 0, e->count - 1);
     return EBPO_OK;
 }
 
@@ -87,7 +121,7 @@ static unsigned combine_values(int32_t operation, unsigned a, unsigned b)
 
 unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_t in)
 {
-    uint8_t may[EBPO_BOOLEAN_NODES_MAX];
+    uint8_t may[EBPO_EXPRESSION_NODES];
     for (uint32_t i = 0; i < e->count; i++) {
         const ebpo_boolean_node *n = &e->node[i];
         if (n->operation != EBPO_BOOLEAN_OPERAND)
@@ -102,7 +136,7 @@ unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_
 
 uint64_t ebpo_expression_operands(const ebpo_expression *e)
 {
-    bool used[EBPO_BOOLEAN_NODES_MAX] = { false };
+    bool used[EBPO_EXPRESSION_NODES] = { false };
     uint64_t operands = 0;
     used[e->count - 1] = true;
     for (uint32_t i = e->count; i-- > 0;) {
@@ -131,13 +165,14 @@ static void combine_boxes(int32_t operation, const double a[6], const double b[6
         }
 }
 
-void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], double out[6])
+void ebpo_boolean_box(const ebpo_boolean *b, double out[6])
 {
-    double of[EBPO_BOOLEAN_NODES_MAX][6];
+    const ebpo_expression *e = &b->expression;
+    double of[EBPO_EXPRESSION_NODES][6];
     for (uint32_t i = 0; i < e->count; i++) {
         const ebpo_boolean_node *n = &e->node[i];
         if (n->operation == EBPO_BOOLEAN_OPERAND)
-            memcpy(of[i], box[n->left], sizeof of[i]);
+            memcpy(of[i], b->solid[n->left].box, sizeof of[i]);
         else
             combine_boxes(n->operation, (const double *)of[n->left], (const double *)of[n->right],
                           of[i]);
@@ -180,18 +215,39 @@ ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const eb
                           reported);
 }
 
-static ebpo_status make_solids(ebpo_boolean *b, const ebpo_boolean_operand *operands,
-                               ebpo_error *error)
+static ebpo_status add_solid(ebpo_boolean *b, ebpo_model *model, const ebpo_pose *pose,
+                             ebpo_error *error)
 {
-    for (uint32_t i = 0; i < b->count; i++) {
-        ebpo_error cause = EBPO_ERROR_INIT;
-        if (ebpo_check_solid(operands[i].model, &cause) != EBPO_OK ||
-            ebpo_posed_solid_make(&b->solid[i], operands[i].model, &operands[i].pose, &cause) !=
-                EBPO_OK)
-            return ebpo_fail_operand(operands[i].model, i, &cause, error);
-        b->pose[i] = operands[i].pose;
-    }
+    ebpo_error cause = EBPO_ERROR_INIT;
+    if (ebpo_check_solid(model, &cause) != EBPO_OK ||
+        ebpo_posed_solid_make(&b->solid[b->count], model, pose, &cause) != EBPO_OK)
+        return ebpo_fail_operand(model, b->count, &cause, error);
+    b->pose[b->count++] = *pose;
     return EBPO_OK;
+}
+
+/* Adds the operand of a region whose model has been made with this status. */
+static ebpo_status add_region(ebpo_boolean *b, ebpo_status status, ebpo_error *error)
+{
+    const ebpo_pose pose = EBPO_POSE_INIT;
+    return status == EBPO_OK ? add_solid(b, b->region[b->count].model, &pose, error) : status;
+}
+
+/* Adds the half-spaces, of which the parts around the expression's box count. */
+static ebpo_status add_half_spaces(ebpo_boolean *b, const double *planes, uint32_t count,
+                                   ebpo_error *error)
+{
+    double box[6];
+    ebpo_status status = EBPO_OK;
+    ebpo_boolean_box(b, box);
+    b->first_plane = b->count;
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
+        status = ebpo_region_half_space(&b->region[b->count], planes + 4 * i, box, error);
+        status = add_region(b, status, error);
+        if (status == EBPO_OK)
+            cut_expression(&b->expression, b->count - 1);
+    }
+    return status;
 }
 
 static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
@@ -203,14 +259,21 @@ static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
 }
 
 static ebpo_status fill_operands(ebpo_boolean *b, const ebpo_boolean_operand *operands,
-                                 ebpo_error *error)
+                                 const ebpo_boolean_options *wanted, ebpo_error *error)
 {
-    b->solid = ebpo_alloc_zero(b->count, sizeof *b->solid);
-    b->pose = ebpo_alloc_zero(b->count, sizeof *b->pose);
-    b->context = ebpo_alloc_zero((uint64_t)b->threads * b->count, sizeof(ebpo_context *));
+    uint32_t all = b->given + (wanted->box ? 1 : 0) + wanted->plane_count;
+    ebpo_status status = EBPO_OK;
+    b->solid = ebpo_alloc_zero(all, sizeof *b->solid);
+    b->pose = ebpo_alloc_zero(all, sizeof *b->pose);
+    b->context = ebpo_alloc_zero((uint64_t)b->threads * all, sizeof(ebpo_context *));
     if (!b->solid || !b->pose || !b->context)
-        return ebpo_fail_memory(error, b->count * (sizeof *b->solid + b->threads * sizeof(void *)));
-    ebpo_status status = make_solids(b, operands, error);
+        return ebpo_fail_memory(error, all * (sizeof *b->solid + b->threads * sizeof(void *)));
+    for (uint32_t i = 0; i < b->given && status == EBPO_OK; i++)
+        status = add_solid(b, operands[i].model, &operands[i].pose, error);
+    if (status == EBPO_OK && wanted->box)
+        status = add_region(b, ebpo_region_box(&b->region[b->count], wanted->box, error), error);
+    if (status == EBPO_OK)
+        status = add_half_spaces(b, wanted->planes, wanted->plane_count, error);
     return status == EBPO_OK ? make_contexts(b, error) : status;
 }
 
@@ -225,17 +288,18 @@ ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *operands, uint32_t oper
     ebpo_status status = EBPO_TAKE(ebpo_boolean_options, &wanted, options, error);
     if (status != EBPO_OK)
         return status;
-    if (operand_count == 0 || operand_count > EBPO_BOOLEAN_OPERANDS_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu32 " operands; give 1 to %d",
-                         operand_count, EBPO_BOOLEAN_OPERANDS_MAX);
+    uint64_t all = (uint64_t)operand_count + (wanted.box ? 1 : 0) + wanted.plane_count;
+    if (operand_count == 0 || all > EBPO_BOOLEAN_OPERANDS_MAX)
+        return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu64 " operands; give 1 to %d",
+                         all, EBPO_BOOLEAN_OPERANDS_MAX);
     ebpo_boolean *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b)
         return ebpo_fail_memory(error, sizeof *b);
-    b->count = operand_count;
+    b->given = operand_count;
     b->threads = ebpo_thread_count(wanted.threads);
-    status = make_expression(&b->expression, nodes, node_count, operand_count, error);
+    status = make_expression(b, nodes, node_count, wanted.box != NULL, error);
     if (status == EBPO_OK)
-        status = fill_operands(b, operands, error);
+        status = fill_operands(b, operands, &wanted, error);
     if (status == EBPO_OK)
         *out = b;
     else
@@ -249,6 +313,8 @@ void ebpo_boolean_free(ebpo_boolean *b)
         return;
     for (size_t i = 0; b->context && i < (size_t)b->threads * b->count; i++)
         ebpo_context_free(b->context[i]);
+    for (uint32_t i = b->given; i < EBPO_BOOLEAN_OPERANDS_MAX; i++)
+        ebpo_region_model_free(&b->region[i]);
     free(b->context);
     free(b->solid);
     free(b->pose);

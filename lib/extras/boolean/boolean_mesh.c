@@ -60,11 +60,14 @@ ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean, const ebpo_boolean_mesh_opt
     ebpo_face_list faces;
     memset(out, 0, sizeof *out);
     ebpo_status status = EBPO_TAKE(ebpo_boolean_mesh_options, &wanted, options, error);
+    if (status == EBPO_OK && wanted.changed_only && (wanted.volume || wanted.attributes))
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "changed_only excludes volume and attributes");
     if (status == EBPO_OK)
         status = check_units(boolean, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_face_list_make(&faces, boolean, wanted.workspace, &wanted.progress, error);
+    status = ebpo_face_list_make(&faces, boolean, wanted.changed_only, wanted.workspace,
+                                 &wanted.progress, error);
     if (status == EBPO_OK)
         status = make_mesh(&faces, &wanted, out, &filled, error);
     ebpo_face_list_free(&faces);

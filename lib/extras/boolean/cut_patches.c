@@ -22,6 +22,8 @@
 #include "geometry/predicates.h"
 
 static const char stage[] = "classify";
+static const char base_not_simple[] =
+    "its faces intersect each other, have no area, or point inwards; make the whole result instead";
 
 /* --- edges --- */
 
@@ -190,9 +192,13 @@ static void find_changes(const ebpo_cut_mesh *cut, uint32_t triangle,
             cut->cover[low].opposite ? -1 : 1;
 }
 
-static int value_of(const ebpo_boolean *b, uint64_t in)
+/* Fails unless the base is wound as a simple solid on both sides of a triangle: its faces stay as
+ * they are, so the mesh with the changes would have other winding numbers than 0 and 1. */
+static ebpo_status check_base(int32_t front, int32_t behind, ebpo_error *error)
 {
-    return ebpo_expression_value(&b->expression, UINT64_MAX, in) == EBPO_MAY_IN;
+    if ((front == 0 || front == 1) && (behind == 0 || behind == 1))
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_UNSUPPORTED, "near the other operands, %s", base_not_simple);
 }
 
 static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle, unsigned worker,
@@ -217,15 +223,18 @@ static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle
         int32_t front = 0;
         if (!faces->same[i])
             continue;
-        if (ebpo_exact_winding(&b->solid[i], ebpo_boolean_context(b, worker, i),
-                               (const mpq_t *)middle, &front, &cause) != EBPO_OK)
-            status = ebpo_fail_operand(b->solid[i].model, i, &cause, error);
+        status = ebpo_exact_winding(&b->solid[i], ebpo_boolean_context(b, worker, i),
+                                    (const mpq_t *)middle, &front, &cause);
         front -= shifted < 0 ? change[i] : 0;
+        if (status == EBPO_OK && ebpo_face_list_is_base(faces, i))
+            status = check_base(front, front + change[i], &cause);
+        if (status != EBPO_OK)
+            status = ebpo_fail_operand(b->solid[i].model, i, &cause, error);
         ebpo_rule rule = b->solid[i].model->info->rule;
         in_front |= ebpo_rule_inside(rule, front) ? faces->same[i] : 0;
         behind |= ebpo_rule_inside(rule, front + change[i]) ? faces->same[i] : 0;
     }
-    *sign = (int8_t)(value_of(b, behind) - value_of(b, in_front));
+    *sign = (int8_t)(ebpo_boolean_holds(b, behind) - ebpo_boolean_holds(b, in_front));
     mpq_clears(middle[0], middle[1], middle[2], NULL);
     return status;
 }
@@ -292,7 +301,9 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
 }
 
 /* Returns true if the selected triangles have each edge equally often in both directions. An edge
- * of a single whole face has another whole face of its component, which is not listed. */
+ * of a single whole face has another whole face of its component, which is not listed. If only
+ * changes are wanted, they are balanced against all faces of the base, which is closed, or against
+ * none: the faces that are not listed stay. */
 static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)
 {
     for (uint64_t i = 0, next, all = 3 * cut->count, v = 0; i < all; i = next) {
@@ -303,7 +314,10 @@ static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_
         for (next = i;
              next < e->begin[v + 1] && other_vertex(e->edge[next]) == other_vertex(e->edge[i]);
              next++) {
-            int8_t s = sign[triangle_of(e->edge[next])];
+            uint32_t t = triangle_of(e->edge[next]);
+            int s = sign[t];
+            if (cut->faces->keeps_base && ebpo_face_list_operand(cut->faces, cut->face[t]) == 0)
+                s--;
             balance += e->edge[next] & 1 ? -s : s;
         }
         if (balance != 0 && (next - i > 1 || component_of(cut, triangle_of(e->edge[i]), &operand) ==
@@ -332,8 +346,12 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
     if (status == EBPO_OK)
         status = classify_patches(cut, parent, progress, *sign, patches, error);
     if (status == EBPO_OK && !is_closed(cut, &e, *sign))
-        status = ebpo_fail(error, EBPO_E_FORMAT,
-                           "the result is not closed; check that the operands are (ebpo verify)");
+        status =
+            cut->faces->changed_only
+                ? ebpo_fail(error, EBPO_E_UNSUPPORTED, "operand 1 is cut where %s", base_not_simple)
+                : ebpo_fail(error, EBPO_E_FORMAT,
+                            "the result is not closed; check that the operands are (ebpo "
+                            "verify)");
     free_edges(&e);
     free(parent);
     return status;

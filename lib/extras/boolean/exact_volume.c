@@ -47,10 +47,8 @@ static bool is_first(const measuring *m, uint32_t i) { return m->same[i] != 0; }
 /* Bounds the volume by the box of the result. An empty box means an empty result. */
 static void bound_by_box(measuring *m)
 {
-    double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6], most = 1;
-    for (uint32_t i = 0; i < m->b->count; i++)
-        memcpy(boxes[i], m->b->solid[i].box, sizeof boxes[i]);
-    ebpo_expression_box(&m->b->expression, (const double(*)[6])boxes, box);
+    double box[6], most = 1;
+    ebpo_boolean_box(m->b, box);
     for (int k = 0; k < 3; k++) {
         double size = nextafter(box[3 + k] - box[k], INFINITY);
         most = box[k] > box[3 + k] ? 0 : nextafter(most * size, INFINITY);
@@ -241,7 +239,7 @@ static int is_in(const operand *o, uint64_t around, int32_t winding)
 {
     bool inside = ebpo_rule_inside(o->solid->model->info->rule, winding);
     uint64_t in = around | (inside ? o->m->same[o->number] : 0);
-    return ebpo_expression_value(&o->m->b->expression, UINT64_MAX, in) == EBPO_MAY_IN;
+    return ebpo_boolean_holds(o->m->b, in);
 }
 
 static ebpo_status query_patches(void *user, uint64_t begin, uint64_t end, unsigned worker,

@@ -19,6 +19,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/workspace.h"
+#include "extras/boolean/base_faces.h"
 #include "extras/collide/collider.h"
 #include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
@@ -76,7 +77,7 @@ static ebpo_status find_pairs(ebpo_face_list *faces, const ebpo_progress *progre
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint32_t k = i; k < count && status == EBPO_OK; k++)
-            if (faces->same[i] && faces->same[k])
+            if (faces->same[i] && faces->same[k] && !(i == k && ebpo_face_list_is_base(faces, i)))
                 status = search_operands(faces, i, k, progress, error);
     return status;
 }
@@ -99,9 +100,8 @@ static bool number_corner(ebpo_face_list *faces, const double x[3], uint32_t *nu
     return true;
 }
 
-static bool list_face(ebpo_face_list *faces, const ebpo_mesh *mesh, uint64_t f)
+static bool list_face(ebpo_face_list *faces, const double p[3][3], uint64_t f)
 {
-    double p[3][3];
     if (!ebpo_grow(&faces->face, &faces->face_capacity, (uint64_t)faces->count + 1,
                    sizeof *faces->face) ||
         !ebpo_grow(&faces->number, &faces->number_capacity, (uint64_t)faces->count + 1,
@@ -110,14 +110,20 @@ static bool list_face(ebpo_face_list *faces, const ebpo_mesh *mesh, uint64_t f)
         return false;
     uint32_t *corner = faces->face[faces->count];
     faces->number[faces->count++] = (uint32_t)f;
-    for (int i = 0; i < 3; i++) {
-        ebpo_mesh_position(mesh, mesh->faces[3 * f + (unsigned)i], p[i]);
+    for (int i = 0; i < 3; i++)
         if (!number_corner(faces, p[i], &corner[i]))
             return false;
-    }
     if (ebpo_zero_area(p[0], p[1], p[2]))
         corner[0] = EBPO_NO_CORNER;
     return true;
+}
+
+static bool list_mesh_face(ebpo_face_list *faces, const ebpo_mesh *mesh, uint64_t f)
+{
+    double p[3][3];
+    for (int i = 0; i < 3; i++)
+        ebpo_mesh_position(mesh, mesh->faces[3 * f + (unsigned)i], p[i]);
+    return list_face(faces, (const double(*)[3])p, f);
 }
 
 /* Makes a bit for each face of the operand: 1 if the face is in a pair. */
@@ -143,11 +149,34 @@ static ebpo_status list_faces(ebpo_face_list *faces, uint32_t operand, const ebp
     free(paired);
     bool fine = true;
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
-        fine = fine && (!ebpo_has_bit(whole->listed, f) || list_face(faces, mesh, f));
+        fine = fine && (!ebpo_has_bit(whole->listed, f) || list_mesh_face(faces, mesh, f));
     if (!fine)
         status = ebpo_fail_memory(&cause, (uint64_t)faces->count * sizeof *faces->face);
     return status == EBPO_OK ? EBPO_OK
                              : ebpo_fail_operand(b->solid[operand].model, operand, &cause, error);
+}
+
+/* Lists the faces of the base near other operands. */
+static ebpo_status list_base(ebpo_face_list *faces, ebpo_error *error)
+{
+    const ebpo_boolean *b = faces->boolean;
+    ebpo_base_face *near;
+    uint64_t count;
+    ebpo_error cause = EBPO_ERROR_INIT;
+    faces->keeps_base = ebpo_boolean_holds(b, faces->same[0]);
+    ebpo_status status = ebpo_base_faces_find(b, &near, &count, &cause);
+    if (status == EBPO_OK) {
+        faces->base_source = ebpo_alloc(count, sizeof *faces->base_source);
+        bool fine = faces->base_source != NULL;
+        for (uint64_t i = 0; i < count && fine; i++) {
+            faces->base_source[i] = near[i].source;
+            fine = list_face(faces, (const double(*)[3])near[i].corner, near[i].number);
+        }
+        if (!fine)
+            status = ebpo_fail_memory(&cause, count * sizeof *near);
+    }
+    free(near);
+    return status == EBPO_OK ? EBPO_OK : ebpo_fail_operand(b->solid[0].model, 0, &cause, error);
 }
 
 static ebpo_status read_operands(ebpo_face_list *faces, const ebpo_progress *progress,
@@ -162,7 +191,11 @@ static ebpo_status read_operands(ebpo_face_list *faces, const ebpo_progress *pro
             continue;
         if (!ebpo_progress_stage(progress, "read faces", error))
             return EBPO_E_CANCELLED;
-        status = ebpo_operand_mesh_read(&mesh, b, i, faces->workspace, error);
+        if (ebpo_face_list_is_base(faces, i)) {
+            status = list_base(faces, error);
+            continue;
+        }
+        status = ebpo_operand_mesh_read(&mesh, b, i, false, faces->workspace, error);
         if (status != EBPO_OK)
             return status;
         status = list_faces(faces, i, &mesh, progress, error);
@@ -244,12 +277,15 @@ static ebpo_status list_partners(ebpo_face_list *faces, ebpo_error *error)
 
 /* --- all of it --- */
 
-ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b,
+ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b, bool changed_only,
                                 ebpo_workspace *workspace, const ebpo_progress *progress,
                                 ebpo_error *error)
 {
-    *out = (ebpo_face_list){ .boolean = b, .workspace = workspace };
+    *out = (ebpo_face_list){ .boolean = b, .workspace = workspace, .changed_only = changed_only };
     ebpo_boolean_find_equal(b, out->same);
+    if (changed_only && !out->same[0])
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the expression does not use operand 1, of which the changes are wanted");
     for (uint32_t i = 0; i < b->count; i++)
         if (b->solid[i].model->info->face_count > INT32_MAX)
             return ebpo_fail(error, EBPO_E_LIMIT,
@@ -265,6 +301,7 @@ void ebpo_face_list_free(ebpo_face_list *faces)
     ebpo_corner_ids_free(&faces->corners);
     for (uint32_t i = 0; i < faces->boolean->count; i++)
         ebpo_whole_faces_free(&faces->whole[i]);
+    free(faces->base_source);
     free(faces->minus);
     free(faces->face);
     free(faces->number);

@@ -31,6 +31,10 @@ typedef struct ebpo_face_list {
      * is not listed (ebpo_boolean_find_equal) */
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX];
     ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX];
+    /* Only changes are wanted. Then operand 0 is the *base*: all its faces near other operands are
+     * listed, and none is whole. The other faces of the base are in the result if `keeps_base`. */
+    bool changed_only, keeps_base;
+    uint32_t *base_source; /* for each listed face of the base: its index for callers */
     /* First all intersecting pairs, then only the pairs of faces with an area. The partners of face
      * i are partner[begin[i]] to partner[begin[i + 1] - 1], in ascending order. */
     ebpo_operand_pair *pair;
@@ -41,11 +45,12 @@ typedef struct ebpo_face_list {
 
 #define EBPO_NO_CORNER UINT32_MAX
 
-/* Makes the list: finds the pairs of intersecting faces of different operands, and the pairs of
- * faces of one operand that intersect in more than a common corner or edge; then reads one operand
- * after the other. Must be freed, also after a failure. */
+/* Makes the list (of changes, if `changed_only`): finds the pairs of intersecting faces of
+ * different operands, and the pairs of faces of one operand that intersect in more than a common
+ * corner or edge; then reads one operand after the other. Intersections of the base with itself are
+ * not searched. Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b,
-                                              ebpo_workspace *workspace,
+                                              bool changed_only, ebpo_workspace *workspace,
                                               const ebpo_progress *progress, ebpo_error *error);
 
 void ebpo_face_list_free(ebpo_face_list *faces);
@@ -57,7 +62,14 @@ uint32_t ebpo_face_list_operand(const ebpo_face_list *faces, uint32_t face);
 static inline uint32_t ebpo_face_list_component(const ebpo_face_list *faces, uint32_t operand,
                                                 uint32_t face)
 {
-    return faces->whole[operand].component[faces->number[face]];
+    const uint32_t *component = faces->whole[operand].component;
+    return component ? component[faces->number[face]] : EBPO_NO_COMPONENT;
+}
+
+/* Returns true if the operand is the base of the wanted changes. */
+static inline bool ebpo_face_list_is_base(const ebpo_face_list *faces, uint32_t operand)
+{
+    return faces->changed_only && operand == 0;
 }
 
 static inline const double *ebpo_face_list_corner(const ebpo_face_list *faces, uint32_t face, int i)

@@ -10,8 +10,7 @@
 
 enum { VERTEX_GRAIN = 1 << 15 };
 
-/* Returns true if the pose leaves all coordinates as they are, apart from the sign of zero. */
-static bool moves_nothing(const ebpo_posing *p)
+bool ebpo_moves_nothing(const ebpo_posing *p)
 {
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
@@ -57,15 +56,16 @@ static ebpo_status pose_mesh(ebpo_mesh *mesh, const ebpo_posing *posing, unsigne
 }
 
 ebpo_status ebpo_operand_mesh_read(ebpo_mesh *out, const ebpo_boolean *b, uint32_t operand,
-                                   ebpo_workspace *workspace, ebpo_error *error)
+                                   bool attributes, ebpo_workspace *workspace, ebpo_error *error)
 {
     const ebpo_posed_solid *solid = &b->solid[operand];
     ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
     ebpo_error cause = EBPO_ERROR_INIT;
     how.threads = b->threads;
     how.workspace = workspace;
+    how.attributes = attributes;
     ebpo_status status = ebpo_file_read_mesh(solid->model->file, &how, out, &cause);
-    if (status == EBPO_OK && !moves_nothing(&solid->posing))
+    if (status == EBPO_OK && !ebpo_moves_nothing(&solid->posing))
         status = pose_mesh(out, &solid->posing, b->threads, &cause);
     if (status == EBPO_OK)
         return EBPO_OK;

@@ -4,12 +4,16 @@
 
 #include "extras/boolean/boolean.h"
 
-/* Reads the mesh of an operand at its pose, into the workspace (NULL: malloc). Coordinates become
+/* Reads the mesh of an operand at its pose, into the workspace (NULL: malloc), and if `attributes`
+ * is true its attributes, which are not moved. Coordinates become
  * doubles; a pose that moves nothing leaves them as they are, with their signs of zero. Freed by
  * ebpo_mesh_free. */
 EBPO_MUST_USE ebpo_status ebpo_operand_mesh_read(ebpo_mesh *out, const ebpo_boolean *b,
-                                                 uint32_t operand, ebpo_workspace *workspace,
-                                                 ebpo_error *error);
+                                                 uint32_t operand, bool attributes,
+                                                 ebpo_workspace *workspace, ebpo_error *error);
+
+/* Returns true if the pose leaves all coordinates as they are, apart from the sign of zero. */
+bool ebpo_moves_nothing(const ebpo_posing *posing);
 
 /* The faces of a posed mesh. *Whole* faces have an area, and are in no pair of intersecting faces.
  * They are connected to *components* by edges (pairs of equal positions) of exactly two faces with
@@ -17,7 +21,8 @@ EBPO_MUST_USE ebpo_status ebpo_operand_mesh_read(ebpo_mesh *out, const ebpo_bool
  * are those behind. */
 typedef struct ebpo_whole_faces {
     ebpo_workspace *workspace;
-    uint32_t *component; /* [faces] number of the component; EBPO_NO_COMPONENT: not whole */
+    /* [faces] number of the component; EBPO_NO_COMPONENT: not whole. NULL: no face is. */
+    uint32_t *component;
     uint32_t components;
     bool repeats; /* several vertices have one position */
     /* A bit for each face that must be listed: the faces that are not whole; whole faces of which

@@ -20,9 +20,11 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/workspace.h"
+#include "extras/boolean/result_attributes.h"
 #include "extras/boolean/volume_sum.h"
 #include "mesh/attributes.h"
 #include "mesh/mesh_parts.h"
+#include "query/sample_attributes.h"
 
 #define NO_NUMBER UINT32_MAX
 
@@ -37,8 +39,11 @@ typedef struct output {
     uint64_t of_rounded_capacity;
     ebpo_boolean_mesh_report *report;
     ebpo_mesh *mesh;
+    uint64_t removed; /* of changes: index of the attribute */
     uint8_t *operand; /* attributes of faces, or NULL */
     uint8_t *operand_face;
+    uint8_t *colour; /* of each face, by its operand, or NULL */
+    ebpo_carrying carrying;
     bool measures; /* `volume` is requested */
     ebpo_volume_sum volume;
 } output;
@@ -131,8 +136,16 @@ static void note_displacement(output *o, const double at[3])
             fmax(o->report->displacement, hypot(hypot(moved[0], moved[1]), moved[2]));
 }
 
-/* Numbers a vertex of the operand. Returns false without memory. */
-static bool number_vertex(operand_output *r, uint32_t v)
+/* Gives a vertex the attributes of a vertex of the operand. sign: of its face. */
+static void carry_vertex(operand_output *r, uint32_t number, uint32_t v, int sign)
+{
+    static const double weight[3] = { 1, 0, 0 };
+    const uint32_t corner[3] = { v, v, v };
+    ebpo_carry_vertex(&r->o->carrying, number, corner, weight, sign);
+}
+
+/* Numbers a vertex of the operand. sign: of its face. Returns false without memory. */
+static bool number_vertex(operand_output *r, uint32_t v, int sign)
 {
     output *o = r->o;
     double at[3];
@@ -142,35 +155,56 @@ static bool number_vertex(operand_output *r, uint32_t v)
         if (!ebpo_corner_id(&o->cut->faces->corners, at, &corner) || !number_cut_vertex(o, corner))
             return false;
         r->number[v] = o->number[corner];
-        return true;
+    } else {
+        if (!o->doubles && r->mesh.xyz64)
+            note_displacement(o, at);
+        r->number[v] = add_vertex(o, at);
     }
-    if (!o->doubles && r->mesh.xyz64)
-        note_displacement(o, at);
-    r->number[v] = add_vertex(o, at);
+    carry_vertex(r, r->number[v], v, sign);
     return true;
 }
 
 /* --- faces --- */
 
-/* Adds a face of the operand, with the numbers of its corners. If rounding made two corners equal,
- * the face is omitted: its two other edges are then one edge in both directions. */
-static void add_face(operand_output *r, uint64_t face, const uint32_t corner[3], int sign)
+/* A face of the operand. */
+typedef struct origin {
+    uint64_t face;   /* in the file */
+    uint32_t number; /* in the source */
+} origin;
+
+static origin origin_of(const operand_output *r, uint64_t face)
+{
+    return (origin){ face, r->maps.face_source ? r->maps.face_source[face] : (uint32_t)face };
+}
+
+static void add_colour(output *o, uint64_t at, uint32_t operand)
+{
+    static const uint8_t colours[][3] = { { 196, 196, 204 }, { 230, 130, 60 },  { 80, 150, 220 },
+                                          { 110, 180, 90 },  { 190, 110, 190 }, { 220, 190, 70 },
+                                          { 90, 190, 190 },  { 200, 90, 100 } };
+    memcpy(o->colour + 3 * at, colours[operand % (sizeof colours / sizeof *colours)], 3);
+}
+
+/* Adds a face, with the numbers of its corners. If rounding made two corners equal, the face is
+ * omitted: its two other edges are then one edge in both directions. */
+static void add_face(operand_output *r, origin from, const uint32_t corner[3], int sign)
 {
     output *o = r->o;
     uint64_t at = o->mesh->face_count;
-    uint32_t *to = o->mesh->faces + 3 * at, number = (uint32_t)face;
+    uint32_t *to = o->mesh->faces + 3 * at;
     if (corner[0] == corner[1] || corner[1] == corner[2] || corner[2] == corner[0])
         return;
     to[0] = corner[0];
     to[1] = corner[sign > 0 ? 1 : 2];
     to[2] = corner[sign > 0 ? 2 : 1];
     o->mesh->face_count++;
+    ebpo_carry_face(&o->carrying, at, from.face, sign);
+    if (o->colour)
+        add_colour(o, at, r->operand);
     if (!o->operand)
         return;
-    if (r->maps.face_source)
-        number = r->maps.face_source[face];
     o->operand[at] = (uint8_t)r->operand;
-    memcpy(o->operand_face + sizeof number * at, &number, sizeof number);
+    memcpy(o->operand_face + sizeof from.number * at, &from.number, sizeof from.number);
 }
 
 static void get_corners(const operand_output *r, uint64_t face, uint32_t out[3])
@@ -193,11 +227,11 @@ static bool add_whole_face(operand_output *r, uint64_t face, int sign)
         ebpo_volume_sum_add(&r->o->volume, (const double(*)[3])t, sign);
     }
     for (int i = 0; i < 3; i++) {
-        if (r->number[corner[i]] == NO_NUMBER && !number_vertex(r, corner[i]))
+        if (r->number[corner[i]] == NO_NUMBER && !number_vertex(r, corner[i], sign))
             return false;
         corner[i] = r->number[corner[i]];
     }
-    add_face(r, face, corner, sign);
+    add_face(r, origin_of(r, face), corner, sign);
     return true;
 }
 
@@ -227,7 +261,26 @@ static void measure_triangle(output *o, uint64_t t)
         mpq_clear(exact[i / 3][i % 3]);
 }
 
-static bool add_triangle(operand_output *r, uint64_t face, uint64_t t)
+/* Gives a vertex of a triangle the attributes of its face there. */
+static void carry_point(operand_output *r, uint64_t face, uint32_t v, int sign)
+{
+    output *o = r->o;
+    const uint32_t *corner = r->mesh.faces + 3 * face;
+    double at[3], corners[3][3], weight[3];
+    get_cut_vertex(o, v, at);
+    for (int i = 0; i < 3; i++)
+        ebpo_mesh_position(&r->mesh, corner[i], corners[i]);
+    ebpo_weigh_corners((const double(*)[3])corners, at, weight);
+    for (int i = 0; i < 3; i++)
+        if (at[0] == corners[i][0] && at[1] == corners[i][1] && at[2] == corners[i][2]) {
+            carry_vertex(r, o->number[v], corner[i], sign);
+            return;
+        }
+    ebpo_carry_vertex(&o->carrying, o->number[v], corner, weight, sign);
+}
+
+/* Adds a triangle of a face, if it bounds the result. */
+static bool add_triangle(operand_output *r, origin from, uint64_t t)
 {
     output *o = r->o;
     uint32_t corner[3];
@@ -236,11 +289,14 @@ static bool add_triangle(operand_output *r, uint64_t face, uint64_t t)
     if (o->measures)
         measure_triangle(o, t);
     for (int i = 0; i < 3; i++) {
-        if (!number_cut_vertex(o, o->cut->triangle[t][i]))
+        uint32_t v = o->cut->triangle[t][i];
+        if (!number_cut_vertex(o, v))
             return false;
-        corner[i] = o->number[o->cut->triangle[t][i]];
+        corner[i] = o->number[v];
+        if (o->carrying.count)
+            carry_point(r, from.face, v, o->sign[t]);
     }
-    add_face(r, face, corner, o->sign[t]);
+    add_face(r, from, corner, o->sign[t]);
     return true;
 }
 
@@ -257,24 +313,32 @@ static void mark_near(operand_output *r)
     }
 }
 
+/* Returns the first triangle of the operand in the cut mesh. */
+static uint64_t first_triangle(const operand_output *r)
+{
+    const ebpo_cut_mesh *cut = r->o->cut;
+    uint64_t low = 0, high = cut->count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (cut->face[middle] < cut->faces->first[r->operand])
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 static bool add_faces(operand_output *r)
 {
     const output *o = r->o;
     const ebpo_face_list *faces = o->cut->faces;
     const ebpo_whole_faces *whole = &faces->whole[r->operand];
     uint32_t listed = faces->first[r->operand];
-    uint64_t t = 0, high = o->cut->count;
-    while (t < high) { /* finds the first triangle of the operand */
-        uint64_t middle = t + (high - t) / 2;
-        if (o->cut->face[middle] < listed)
-            t = middle + 1;
-        else
-            high = middle;
-    }
+    uint64_t t = first_triangle(r);
     EBPO_FOR_ITEMS(r->mesh.workspace, f, 0, r->mesh.face_count) {
         if (ebpo_has_bit(whole->listed, f)) {
             for (; t < o->cut->count && o->cut->face[t] == listed; t++)
-                if (!add_triangle(r, f, t))
+                if (!add_triangle(r, origin_of(r, f), t))
                     return false;
             listed++;
         } else {
@@ -284,6 +348,61 @@ static bool add_faces(operand_output *r)
         }
     }
     return true;
+}
+
+/* --- changes of the base --- */
+
+/* Adds a range of removed faces of the base. Returns false without memory. */
+static bool add_removed(output *o, uint64_t first, uint64_t count)
+{
+    uint32_t row[2] = { (uint32_t)first, (uint32_t)count }, last[2];
+    ebpo_attribute *a = &o->mesh->attributes->array[o->removed];
+    if (count == 0)
+        return true;
+    o->report->removed_faces += count;
+    if (a->rows) {
+        uint8_t *before = a->values + (a->rows - 1) * sizeof last;
+        memcpy(last, before, sizeof last);
+        if (last[0] + last[1] == row[0]) {
+            last[1] += row[1];
+            memcpy(before, last, sizeof last);
+            return true;
+        }
+    }
+    if (!ebpo_attribute_reserve(o->mesh->workspace, a, a->rows + 1, 0))
+        return false;
+    memcpy(a->values + a->rows++ * sizeof row, row, sizeof row);
+    return true;
+}
+
+/* Adds the triangles of the changed faces of the base, and the ranges of removed faces. A face that
+ * is one triangle and bounds the result is not changed. */
+static bool add_changes(operand_output *r)
+{
+    output *o = r->o;
+    const ebpo_cut_mesh *cut = o->cut;
+    const ebpo_face_list *faces = cut->faces;
+    uint64_t t = first_triangle(r), after = 0; /* the face after the last removed or kept one */
+    for (uint32_t f = faces->first[0]; f < faces->first[1]; f++) {
+        uint64_t end = t;
+        while (end < cut->count && cut->face[end] == f)
+            end++;
+        bool kept =
+            end == t ? faces->keeps_base
+                     : end - t == 1 && o->sign[t] > 0 &&
+                           memcmp(cut->triangle[t], faces->face[f], sizeof cut->triangle[t]) == 0;
+        uint64_t number = faces->number[f];
+        if (!faces->keeps_base && !add_removed(o, after, number - after))
+            return false;
+        if (!kept && !add_removed(o, number, 1))
+            return false;
+        for (; t < end; t++)
+            if (!kept && !add_triangle(r, (origin){ number, faces->base_source[f] }, t))
+                return false;
+        after = number + 1;
+    }
+    uint64_t all = faces->boolean->solid[0].model->info->face_count;
+    return faces->keeps_base || add_removed(o, after, all - after);
 }
 
 static ebpo_status read_maps(operand_output *r, ebpo_error *error)
@@ -303,8 +422,10 @@ static ebpo_status add_operand(output *o, uint32_t operand, ebpo_error *error)
 {
     const ebpo_face_list *faces = o->cut->faces;
     operand_output r = { .o = o, .operand = operand };
-    ebpo_status status =
-        ebpo_operand_mesh_read(&r.mesh, faces->boolean, operand, faces->workspace, error);
+    if (ebpo_face_list_is_base(faces, operand))
+        return add_changes(&r) ? EBPO_OK : ebpo_fail_memory(error, 40 * o->rounded.count);
+    ebpo_status status = ebpo_operand_mesh_read(&r.mesh, faces->boolean, operand,
+                                                o->carrying.count > 0, faces->workspace, error);
     if (status != EBPO_OK)
         return status;
     uint64_t vertices = r.mesh.vertex_count;
@@ -319,6 +440,7 @@ static ebpo_status add_operand(output *o, uint32_t operand, ebpo_error *error)
         status = read_maps(&r, error);
     if (status == EBPO_OK) {
         ebpo_array_fill(faces->workspace, r.number, 0xff, vertices * sizeof *r.number);
+        ebpo_carrying_operand(&o->carrying, &faces->boolean->solid[operand], &r.mesh);
         mark_near(&r);
         if (!add_faces(&r))
             status = ebpo_fail_memory(error, 40 * o->rounded.count);
@@ -358,44 +480,78 @@ static uint64_t count_whole(const output *o, uint32_t operand)
     const ebpo_face_list *faces = o->cut->faces;
     const ebpo_whole_faces *whole = &faces->whole[operand];
     uint64_t count = 0;
-    EBPO_FOR_ITEMS(faces->workspace, f, 0,
-                   faces->same[operand] ? faces->boolean->solid[operand].model->info->face_count
-                                        : 0)
+    if (!faces->same[operand] || ebpo_face_list_is_base(faces, operand))
+        return 0;
+    EBPO_FOR_ITEMS(faces->workspace, f, 0, faces->boolean->solid[operand].model->info->face_count)
         count +=
             !ebpo_has_bit(whole->listed, f) && o->of_component[operand][whole->component[f]] != 0;
     return count;
 }
 
-/* Returns true if an operand has coordinates beyond the range of floats. */
+/* Returns true if an operand has coordinates beyond the range of floats. The result is in all
+ * half-spaces and in another operand. */
 static bool exceeds_floats(const ebpo_face_list *faces)
 {
-    for (uint32_t i = 0; i < faces->boolean->count; i++)
+    for (uint32_t i = 0; i < faces->boolean->first_plane; i++)
         for (int k = 0; k < 6 && faces->same[i]; k++)
             if (fabs(faces->boolean->solid[i].box[k]) > FLT_MAX)
                 return true;
     return false;
 }
 
+/* Returns true if an operand of the caller has doubles. */
 static bool has_doubles(const ebpo_face_list *faces)
 {
-    for (uint32_t i = 0; i < faces->boolean->count; i++)
+    for (uint32_t i = 0; i < faces->boolean->given; i++)
         if (faces->same[i] && faces->boolean->solid[i].model->info->double_coordinates)
             return true;
     return false;
 }
 
-static uint8_t *add_array(ebpo_mesh *mesh, const char *name, ebpo_attribute_type type,
-                          uint64_t rows)
+/* Adds an attribute with space for `rows` rows; returns NULL without memory. */
+static uint8_t *add_array(ebpo_mesh *mesh, const char *element, const char *names,
+                          ebpo_attribute_type type, uint64_t rows)
 {
-    ebpo_attribute like = { .element = "face", .type = type, .columns = 1 };
+    ebpo_attribute like = { .type = type, .columns = 1 };
+    for (const char *at = strchr(names, ' '); at; at = strchr(at + 1, ' '))
+        like.columns++;
     like.list = EBPO_ATTRIBUTE_NO_LIST;
-    memcpy(like.names, name, strlen(name) + 1);
+    memcpy(like.element, element, strlen(element) + 1);
+    memcpy(like.names, names, strlen(names) + 1);
     ebpo_attribute *a = ebpo_attributes_add(mesh->attributes, &like);
     return a && ebpo_attribute_reserve(mesh->workspace, a, rows + 1, 0) ? a->values : NULL;
 }
 
+/* Adds the attributes of the mesh that describe the result. */
+static ebpo_status add_own_attributes(output *o, const ebpo_boolean_mesh_options *options,
+                                      uint64_t count, ebpo_error *error)
+{
+    ebpo_mesh *mesh = o->mesh;
+    bool changed_only = o->cut->faces->changed_only, fine = true;
+    ebpo_status status = options->origins || options->colours || changed_only
+                             ? ebpo_mesh_need_attributes(mesh, error)
+                             : EBPO_OK;
+    if (status != EBPO_OK)
+        return status;
+    if (changed_only) {
+        o->removed = mesh->attributes->count;
+        fine = add_array(mesh, "removed", "first count", EBPO_ATTRIBUTE_UINT32, 0) != NULL;
+    }
+    if (options->origins) {
+        o->operand = add_array(mesh, "face", "operand", EBPO_ATTRIBUTE_UINT8, count);
+        o->operand_face = add_array(mesh, "face", "operand_face", EBPO_ATTRIBUTE_UINT32, count);
+        fine = fine && o->operand && o->operand_face;
+    }
+    if (options->colours) {
+        o->colour = add_array(mesh, "face", "red green blue", EBPO_ATTRIBUTE_UINT8, count);
+        fine = fine && o->colour;
+    }
+    return fine ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 8 * count, error);
+}
+
 /* Allocates the arrays of the mesh, also for an empty result, so that they have the right types. */
-static ebpo_status make_arrays(output *o, bool origins, ebpo_error *error)
+static ebpo_status make_arrays(output *o, const ebpo_boolean_mesh_options *options,
+                               ebpo_error *error)
 {
     const ebpo_face_list *faces = o->cut->faces;
     ebpo_mesh *mesh = o->mesh;
@@ -418,13 +574,11 @@ static ebpo_status make_arrays(output *o, bool origins, ebpo_error *error)
         mesh->xyz32 = ebpo_array_alloc(mesh->workspace, vertices + 1, 3 * sizeof *mesh->xyz32);
     if (!mesh->faces || (!mesh->xyz32 && !mesh->xyz64))
         return ebpo_workspace_fail(mesh->workspace, 12 * (count + vertices), error);
-    ebpo_status status = origins ? ebpo_mesh_need_attributes(mesh, error) : EBPO_OK;
-    if (status != EBPO_OK || !origins)
+    ebpo_status status = add_own_attributes(o, options, count, error);
+    if (status != EBPO_OK || !options->attributes)
         return status;
-    o->operand = add_array(mesh, "operand", EBPO_ATTRIBUTE_UINT8, count);
-    o->operand_face = add_array(mesh, "operand_face", EBPO_ATTRIBUTE_UINT32, count);
-    return o->operand && o->operand_face ? EBPO_OK
-                                         : ebpo_workspace_fail(mesh->workspace, 5 * count, error);
+    return ebpo_carrying_begin(&o->carrying, faces->boolean, mesh, options->colours, vertices,
+                               count, error);
 }
 
 static ebpo_status add_operands(output *o, const ebpo_progress *progress, ebpo_error *error)
@@ -457,11 +611,14 @@ ebpo_status ebpo_result_mesh_make(const ebpo_cut_mesh *cut, const int8_t *sign,
     if (status == EBPO_OK)
         status = find_components(&o, error);
     if (status == EBPO_OK)
-        status = make_arrays(&o, options->origins, error);
+        status = make_arrays(&o, options, error);
     if (status == EBPO_OK)
         status = add_operands(&o, &options->progress, error);
     for (uint64_t i = 0; i < (mesh->attributes ? mesh->attributes->count : 0); i++)
-        mesh->attributes->array[i].rows = mesh->face_count;
+        if (ebpo_attribute_is_of(&mesh->attributes->array[i], "face"))
+            mesh->attributes->array[i].rows = mesh->face_count;
+    ebpo_carrying_end(&o.carrying);
+    ebpo_carrying_free(&o.carrying);
     if (status == EBPO_OK && o.measures)
         report->volume = ebpo_volume_sum_interval(&o.volume);
     ebpo_volume_sum_end(&o.volume);

@@ -157,12 +157,10 @@ static ebpo_status fail_range(double most, ebpo_error *error)
 
 ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, ebpo_error *error)
 {
-    double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6];
+    double box[6];
     int power;
     *out = (ebpo_world){ .level = level };
-    for (uint32_t i = 0; i < b->count; i++)
-        memcpy(boxes[i], b->solid[i].box, sizeof boxes[i]);
-    ebpo_expression_box(&b->expression, (const double(*)[6])boxes, box);
+    ebpo_boolean_box(b, box);
     if (box[0] > box[3])
         return EBPO_OK;
     double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));

@@ -58,24 +58,14 @@ static void drop_levels(ebpo_tree *tree)
         ebpo_level_free(&tree->level[i]);
 }
 
-/* Writes the temporary file, opens it, and then removes its name, which libhdf5 needs for
- * opening. */
+/* Writes the temporary file and opens it. */
 static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
     ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_publish named = EBPO_PUBLISH_INIT;
-    char path[EBPO_FOLDER_BYTES + 16];
     how.codec_level = 1;
     how.threads = c->options.threads;
     how.progress = c->options.progress;
-    snprintf(path, sizeof path, "%s/ebpo-crossings", folder);
-    ebpo_status status = ebpo_publish_begin(&named, path, error);
-    if (status == EBPO_OK)
-        status = ebpo_tree_write_into(&c->tree, ebpo_publish_path(&named), folder, &how, error);
-    if (status == EBPO_OK)
-        status = ebpo_open_own(ebpo_publish_path(&named), &c->file, error);
-    ebpo_publish_abort(&named);
-    return status;
+    return ebpo_tree_store(&c->tree, folder, "ebpo-crossings", &how, &c->file, error);
 }
 
 /* Least memory budget of the model; only tests have workspaces so small that it applies. */

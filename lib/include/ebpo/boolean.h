@@ -30,11 +30,12 @@ extern "C" {
 
 /* Operation of a node of an expression. */
 typedef enum ebpo_boolean_operation {
-    EBPO_BOOLEAN_OPERAND = 0,             /* the operand with index `left` */
-    EBPO_BOOLEAN_UNION = 1,               /* in `left`, in `right`, or in both */
-    EBPO_BOOLEAN_INTERSECTION = 2,        /* in `left` and in `right` */
-    EBPO_BOOLEAN_DIFFERENCE = 3,          /* in `left` and not in `right` */
-    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4 /* in `left` or in `right`, not in both */
+    EBPO_BOOLEAN_OPERAND = 0,              /* the operand with index `left` */
+    EBPO_BOOLEAN_UNION = 1,                /* in `left`, in `right`, or in both */
+    EBPO_BOOLEAN_INTERSECTION = 2,         /* in `left` and in `right` */
+    EBPO_BOOLEAN_DIFFERENCE = 3,           /* in `left` and not in `right` */
+    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4, /* in `left` or in `right`, not in both */
+    EBPO_BOOLEAN_COMPLEMENT = 5            /* not in `left`; needs a box (ebpo_boolean_options) */
 } ebpo_boolean_operation;
 
 /* Node of the expression tree; `left` and `right` are indices of earlier nodes. */
@@ -50,7 +51,7 @@ typedef struct ebpo_boolean_operand {
     ebpo_pose pose;
 } ebpo_boolean_operand;
 
-/* Maximum numbers of operands and nodes. */
+/* Maximum numbers of operands, a box and half-spaces included, and of nodes. */
 #define EBPO_BOOLEAN_OPERANDS_MAX 64
 #define EBPO_BOOLEAN_NODES_MAX    256
 
@@ -61,7 +62,23 @@ typedef struct ebpo_boolean_options {
     /* Number of threads for many points, and for cells. 0: all cores. */
     unsigned threads;
 
-    uint32_t reserved;
+    /* Number of planes. */
+    uint32_t plane_count;
+
+    /*
+     * Box to which the result is cut, low[3], then high[3]; NULL: none. The box is one more
+     * operand, after those of the caller, and the result is its intersection with the expression.
+     */
+    const double *box;
+
+    /*
+     * [plane_count][4] half-spaces to which the result is cut: the points p with row[0] p[0] +
+     * row[1] p[1] + row[2] p[2] <= row[3]. They are operands after the box. Each is a
+     * tetrahedron that contains its part of the result. The three corners of its face in the plane
+     * are rounded to doubles, and so is the plane through them; for an axis-parallel plane this is
+     * one rounding of row[3] / row[k].
+     */
+    const double *planes;
 } ebpo_boolean_options;
 
 #define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
@@ -75,9 +92,10 @@ typedef struct ebpo_boolean ebpo_boolean;
  * outlive the expression.
  *
  * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node, an operation is not valid,
- * or a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: no operands or nodes, or too many.
- * EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages
- * give the index of the node, or the number of the operand (from 1 on) and its file.
+ * a complement has no box, a box or plane is not valid, or a pose is not valid (ebpo_pose_check).
+ * EBPO_E_LIMIT: no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a surface.
+ * EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or the number
+ * of the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
@@ -298,7 +316,32 @@ typedef struct ebpo_boolean_mesh_options {
     /* True: `volume` of the report is computed. */
     bool volume;
 
-    uint8_t reserved[5];
+    /*
+     * True: the mesh has only the faces of the result that are not unchanged faces of operand 0.
+     * Its attribute `removed` (first count) has the ranges of the other faces of operand 0, in the
+     * order of its file, which ebpo_mesh_write_ply writes as an element. All other faces of operand
+     * 0, with the mesh, are the result. Other faces of operand 0 stay as
+     * they are, also if they intersect each other. Only the part of operand 0 in the box of the
+     * other operands is read, and its faces there must fit in memory. Excludes `volume` and
+     * `attributes`.
+     */
+    bool changed_only;
+
+    /*
+     * True: the mesh has the attributes of vertices and faces of the operands. Values at new
+     * vertices are interpolated. Normals (nx ny nz) are turned with their operand, and reversed
+     * with their face. Faces and vertices of operands without an attribute get 0, or white.
+     * ebpo_mesh_attributes_lost names the attributes that cannot be carried over.
+     */
+    bool attributes;
+
+    /*
+     * True: faces have a colour (attributes red, green and blue) for each operand; colours of
+     * operands are then not carried over.
+     */
+    bool colours;
+
+    uint8_t reserved[2];
 
     /*
      * Holds the arrays of the mesh, and the arrays that grow with the operands; free it after the
@@ -307,9 +350,10 @@ typedef struct ebpo_boolean_mesh_options {
     ebpo_workspace *workspace;
 } ebpo_boolean_mesh_options;
 
-#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                                      \
-    {                                                                                       \
-        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, false, { 0 }, NULL \
+#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                                        \
+    {                                                                                         \
+        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, false, false, false, \
+            false, { 0 }, NULL                                                                \
     }
 
 /* Statistics of ebpo_boolean_mesh. */
@@ -337,6 +381,9 @@ typedef struct ebpo_boolean_mesh_report {
      * three neighbouring doubles, between which the volume is.
      */
     ebpo_value_bounds volume;
+
+    /* If only changes were requested: number of removed faces of operand 0. */
+    uint64_t removed_faces;
 } ebpo_boolean_mesh_report;
 
 #define EBPO_BOOLEAN_MESH_REPORT_INIT EBPO_SIZED(ebpo_boolean_mesh_report)
@@ -358,9 +405,12 @@ typedef struct ebpo_boolean_mesh_report {
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
  *
- * EBPO_E_ARGUMENT: operands have different units. EBPO_E_ABSENT: an operand is a subset.
+ * EBPO_E_ARGUMENT: operands have different units; or changes are requested of an unused operand 0,
+ * or with the volume. EBPO_E_ABSENT: an operand is a subset.
  * EBPO_E_LIMIT: more than 2^31 - 1 faces, or 2^31 vertices. EBPO_E_FORMAT: an operand is not
- * closed, although its file states so. Also the errors of reading. On failure `out` is cleared.
+ * closed, although its file states so. EBPO_E_UNSUPPORTED: only changes are requested, but near the
+ * other operands, operand 0 has faces that intersect each other or have no area, or winding numbers
+ * other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
  *
  * Threads: one at a time per expression.
  */

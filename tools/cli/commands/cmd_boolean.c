@@ -7,12 +7,12 @@
 #include <string.h>
 
 #include "cli/boolean_args.h"
+#include "cli/boolean_operands.h"
 #include "cli/boolean_output.h"
 #include "cli/command.h"
 #include "cli/json.h"
 #include "cli/memory_args.h"
 #include "cli/points.h"
-#include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
 #include "cli/remote_args.h"
@@ -20,15 +20,13 @@
 #include "cli/words.h"
 #include "cli/commands/commands.h"
 
-enum { MODELS = ARGS_OPERANDS_MAX - 1 };
-
 typedef struct values {
     query_values query; /* the first member: the options of other query commands set it */
-    const char *inside, *distance, *out, *temp_dir;
-    arg_list poses;
+    const char *inside, *distance, *out, *temp_dir, *box;
+    arg_list poses, sections;
     int64_t level;
     double tolerance;
-    bool volume, inner, cells, doubles;
+    bool volume, inner, cells, doubles, crossings, changed_only, colours;
 } values;
 
 #include "cli/options/boolean.inc"
@@ -70,7 +68,7 @@ static void print_distance(const values *v, const ebpo_boundary_distance *d)
 /* Request and results for volumes and cells. */
 typedef struct cell_result {
     const values *v;
-    const char **models; /* in the order of the command line */
+    const boolean_operands *operands;
     boolean_output output;
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
@@ -91,29 +89,38 @@ static int32_t volume_kind(const cell_result *a)
     return is_exact(a) ? (int32_t)EBPO_VALUE_EXACT : a->cells.kind;
 }
 
+enum { OPERAND_NAME = 512 };
+
+/* Writes the letter and the file of an operand, or which region it is. */
+static const char *name_operand(const cell_result *a, uint32_t i, char out[OPERAND_NAME])
+{
+    if (i < a->operands->count)
+        snprintf(out, OPERAND_NAME, "%c (%s)", 'A' + (int)i, remote_shown(a->operands->shown[i]));
+    else
+        snprintf(out, OPERAND_NAME, "%s",
+                 a->v->box && i == a->operands->count ? "the box" : "a half-space");
+    return out;
+}
+
 /* Writes why the volume is not exact. */
 static void explain_bound(const cell_result *a, char *out, size_t capacity)
 {
     const ebpo_exact_volume *e = &a->exact;
-    uint32_t i = e->operand[0], k = e->operand[1];
-    const char *first = remote_shown(a->models[i]), *second = remote_shown(a->models[k]);
+    char first[OPERAND_NAME], second[OPERAND_NAME];
+    name_operand(a, e->operand[0], first);
+    name_operand(a, e->operand[1], second);
     switch ((ebpo_volume_doubt)e->doubt) {
     case EBPO_VOLUME_OPERANDS_INTERSECT:
-        snprintf(out, capacity,
-                 "face %" PRIu64 " of %c (%s) intersects face %" PRIu64 " of %c (%s)", e->face[0],
-                 'A' + (int)i, first, e->face[1], 'A' + (int)k, second);
+        snprintf(out, capacity, "face %" PRIu64 " of %s intersects face %" PRIu64 " of %s",
+                 e->face[0], first, e->face[1], second);
         break;
     case EBPO_VOLUME_FACES_INTERSECT:
         snprintf(out, capacity,
-                 "faces %" PRIu64 " and %" PRIu64 " of %c (%s) intersect, other than neighbours",
-                 e->face[0], e->face[1], 'A' + (int)i, first);
+                 "faces %" PRIu64 " and %" PRIu64 " of %s intersect, other than neighbours",
+                 e->face[0], e->face[1], first);
         break;
-    case EBPO_VOLUME_IN_PARTS:
-        snprintf(out, capacity, "%c (%s) is only partly in memory", 'A' + (int)i, first);
-        break;
-    case EBPO_VOLUME_SUBSET:
-        snprintf(out, capacity, "%c (%s) is a part of another file", 'A' + (int)i, first);
-        break;
+    case EBPO_VOLUME_IN_PARTS: snprintf(out, capacity, "%s is only partly in memory", first); break;
+    case EBPO_VOLUME_SUBSET: snprintf(out, capacity, "%s is a part of another file", first); break;
     case EBPO_VOLUME_CERTAIN: snprintf(out, capacity, "%s", ""); break;
     }
 }
@@ -123,7 +130,7 @@ static const char *const volume_kinds[] = { "exact", "interval", "bound" };
 static void print_volume(const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
-    char why[1024], exact[32], lo[32], hi[32], cell[TABLE_CELL];
+    char why[2048], exact[32], lo[32], hi[32], cell[TABLE_CELL];
     explain_bound(a, why, sizeof why);
     if (is_exact(a))
         printf("volume    %s, exact but for one rounding\n",
@@ -167,7 +174,7 @@ static void result_volume_to_json(json *j, const ebpo_value_bounds *volume)
 static void volume_to_json(json *j, const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
-    char why[1024];
+    char why[2048];
     explain_bound(a, why, sizeof why);
     for (int i = 0; i < 2; i++)
         if (is_exact(a))
@@ -338,18 +345,21 @@ static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress 
     return status;
 }
 
-static int make_cells(const values *v, const char **models, const char *unit,
-                      ebpo_workspace *workspace, ebpo_boolean *b)
+static int make_cells(const values *v, const boolean_operands *operands, ebpo_workspace *workspace,
+                      ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     cell_result a = { .v = v,
-                      .models = models,
+                      .operands = operands,
                       .output = { .path = v->out,
-                                  .unit = unit,
+                                  .unit = boolean_operands_unit(operands),
                                   .threads = (unsigned)v->query.threads,
                                   .doubles = v->doubles,
                                   .volume = v->volume,
+                                  .crossings = v->crossings,
+                                  .changed_only = v->changed_only,
+                                  .colours = v->colours,
                                   .workspace = workspace },
                       .exact = EBPO_EXACT_VOLUME_INIT,
                       .cells = EBPO_BOOLEAN_VOLUME_INIT,
@@ -368,7 +378,7 @@ static int make_cells(const values *v, const char **models, const char *unit,
 
 /* --- all of it --- */
 
-static int check_values(const values *v, const char **models, uint32_t count)
+static int check_values(const values *v, const boolean_operands *operands)
 {
     bool has_point_queries = v->inside || v->distance;
     if (v->inside && v->distance)
@@ -382,47 +392,60 @@ static int check_values(const values *v, const char **models, uint32_t count)
         return command_usage("boolean", "--cells needs --output");
     if (v->inner && !v->cells)
         return command_usage("boolean", "--inner needs --output and --cells");
-    if ((v->doubles || v->temp_dir) && !writes_result(v))
-        return command_usage("boolean", "--%s needs --output, and excludes --cells",
-                             v->doubles ? "double" : "temp-dir");
+    const char *of_result = v->doubles        ? "double"
+                            : v->crossings    ? "crossings"
+                            : v->changed_only ? "changed-only"
+                            : v->colours      ? "operand-colours"
+                            : v->temp_dir     ? "temp-dir"
+                                              : NULL;
+    if (of_result && !writes_result(v))
+        return command_usage("boolean", "--%s needs --output, and excludes --cells", of_result);
+    if (v->changed_only && (v->volume || v->crossings || !words_end_with(v->out, ".ply")))
+        return command_usage("boolean", "--changed-only writes a .ply file, and excludes --volume "
+                                        "and --crossings");
     if (v->out && !words_end_with(v->out, ".ply") && !words_end_with(v->out, ".ebpo.h5"))
         return command_usage("boolean",
                              "--output '%s': expected a name that ends with .ply or "
                              ".ebpo.h5",
                              v->out);
-    for (uint32_t i = 0; v->out && i < count; i++)
-        if (command_overwrites("boolean", models[i], v->out))
+    for (uint32_t i = 0; i < operands->inputs; i++) {
+        const boolean_input *in = &operands->input[i];
+        if (v->out && command_overwrites("boolean", in->path, v->out))
             return EXIT_USAGE;
+        if (in->scene && v->query.cut_level >= 0)
+            return command_usage("boolean", "--cut-level does not apply to scenes");
+    }
     return EXIT_OK;
 }
 
-/* Returns the unit of the first model that has one, or NULL. */
-static const char *unit_of(const query_session *sessions, uint32_t count)
+/* Reads the box and the planes to which the result is cut. */
+static int read_regions(const values *v, double box[6], double (*plane)[4],
+                        ebpo_boolean_options *out)
 {
-    for (uint32_t i = 0; i < count; i++) {
-        const ebpo_info *info = ebpo_file_info(sessions[i].file);
-        if (info->unit[0])
-            return info->unit;
-    }
-    return NULL;
+    if (v->box && !args_read_reals(v->box, 6, box))
+        return command_usage("boolean", "--box '%s': expected six numbers X0,Y0,Z0,X1,Y1,Z1",
+                             v->box);
+    for (int i = 0; i < v->sections.count; i++)
+        if (!boolean_read_plane("boolean", v->sections.item[i], plane[i]))
+            return EXIT_USAGE;
+    out->box = v->box ? box : NULL;
+    out->planes = plane[0];
+    out->plane_count = (uint32_t)v->sections.count;
+    return EXIT_OK;
 }
 
 static int evaluate_expression(const values *v, const boolean_nodes *nodes,
-                               const query_session *sessions, const ebpo_pose *poses,
-                               const char **models, uint32_t count, ebpo_workspace *workspace)
+                               const boolean_operands *operands, ebpo_boolean_options *how,
+                               ebpo_workspace *workspace)
 {
-    ebpo_boolean_operand operands[MODELS];
     ebpo_boolean *b;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_boolean_options how = EBPO_BOOLEAN_OPTIONS_INIT;
-    how.threads = (unsigned)v->query.threads;
-    for (uint32_t i = 0; i < count; i++)
-        operands[i] = (ebpo_boolean_operand){ sessions[i].model, poses[i] };
-    if (ebpo_boolean_new(operands, count, nodes->node, nodes->count, &how, &b, &error) != EBPO_OK)
+    how->threads = (unsigned)v->query.threads;
+    if (ebpo_boolean_new(operands->operand, operands->count, nodes->node, nodes->count, how, &b,
+                         &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code = v->inside || v->distance
-                   ? query_points(v, b)
-                   : make_cells(v, models, unit_of(sessions, count), workspace, b);
+    int code =
+        v->inside || v->distance ? query_points(v, b) : make_cells(v, operands, workspace, b);
     ebpo_boolean_free(b);
     return code;
 }
@@ -445,36 +468,52 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
 
 static const values standard = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
 
-static int run_boolean(void *given, const char **operand)
+/* Default memory for each model if only changes are wanted, which need only a part of A. */
+static const uint64_t changes_memory = UINT64_C(256) << 20;
+
+/* Opens the models, and evaluates the expression. */
+static int run_expression(const values *v, const char *expression, boolean_operands *operands,
+                          ebpo_boolean_options *how)
 {
-    const values *v = given;
     boolean_nodes nodes;
-    ebpo_pose poses[MODELS];
-    query_session sessions[MODELS];
     ebpo_model_options model_options;
     ebpo_inside_options inside;
     ebpo_distance_options distance;
-    const char **models = operand + 1;
     ebpo_workspace *workspace = NULL;
-    uint32_t count = 0;
-    for (; count < MODELS && models[count]; count++) {
-        poses[count] = (ebpo_pose)EBPO_POSE_INIT;
-        sessions[count] = (query_session)QUERY_SESSION_INIT;
-    }
-    if (!boolean_read("boolean", operand[0], count, &nodes) ||
-        !boolean_read_poses("boolean", &v->poses, count, poses) ||
+    ebpo_pose pose[BOOLEAN_OPERANDS];
+    for (uint32_t i = 0; i < operands->count; i++)
+        pose[i] = operands->operand[i].pose;
+    if (!boolean_read("boolean", expression, operands->count, &nodes) ||
+        !boolean_read_poses("boolean", &v->poses, operands->count, pose) ||
         !query_options_from("boolean", &v->query, &model_options, &inside, &distance))
         return EXIT_USAGE;
-    int code = check_values(v, models, count);
+    for (uint32_t i = 0; i < operands->count; i++)
+        operands->operand[i].pose = pose[i];
+    int code = check_values(v, operands);
     if (code == EXIT_OK)
-        code = limit_memory(v, count, &model_options, &workspace);
-    for (uint32_t i = 0; i < count && code == EXIT_OK; i++)
-        code = query_open(&sessions[i], "boolean", models[i], &model_options, -1, &v->query.remote);
+        code = limit_memory(v, operands->count, &model_options, &workspace);
+    if (v->changed_only && model_options.memory == 0 && model_options.cut_level < 0)
+        model_options.memory = changes_memory;
     if (code == EXIT_OK)
-        code = evaluate_expression(v, &nodes, sessions, poses, models, count, workspace);
-    for (uint32_t i = 0; i < count; i++)
-        query_close(&sessions[i]);
+        code = boolean_operands_open(operands, "boolean", &model_options, &v->query.remote);
+    if (code == EXIT_OK)
+        code = evaluate_expression(v, &nodes, operands, how, workspace);
     ebpo_workspace_free(workspace);
+    return code;
+}
+
+static int run_boolean(void *given, const char **operand)
+{
+    const values *v = given;
+    boolean_operands operands;
+    double box[6], plane[ARG_LIST_MAX][4];
+    ebpo_boolean_options how = EBPO_BOOLEAN_OPTIONS_INIT;
+    int code = boolean_operands_list(&operands, "boolean", operand + 1);
+    if (code == EXIT_OK)
+        code = read_regions(v, box, plane, &how);
+    if (code == EXIT_OK)
+        code = run_expression(v, operand[0], &operands, &how);
+    boolean_operands_close(&operands);
     return code;
 }
 

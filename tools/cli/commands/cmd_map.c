@@ -23,19 +23,6 @@
 
 enum { LONGER_EDGE_POINTS = 1000, GRID_MAX = 1 << 20 };
 
-/* Reads `count` finite numbers separated by commas, and nothing else. */
-static bool read_reals(const char *text, int count, double *out)
-{
-    for (int i = 0; i < count; i++) {
-        char *end;
-        out[i] = strtod(text, &end);
-        if (end == text || !isfinite(out[i]) || *end != (i + 1 < count ? ',' : 0))
-            return false;
-        text = end + 1;
-    }
-    return true;
-}
-
 static int refuse_value(const char *option, const char *value, const char *expected)
 {
     return command_usage("map", "%s '%s': expected %s", option, value, expected);
@@ -56,7 +43,7 @@ static int find_box(const map_job *j, double low[3], double high[3])
     const ebpo_info *info = ebpo_file_info(j->file);
     double all[6], longest = 0;
     if (j->v->box) {
-        if (!read_reals(j->v->box, 6, all) || !(all[0] < all[3]) || !(all[1] < all[4]) ||
+        if (!args_read_reals(j->v->box, 6, all) || !(all[0] < all[3]) || !(all[1] < all[4]) ||
             !(all[2] < all[5]))
             return refuse_value("--box", j->v->box, "six numbers, the lower corner first");
         memcpy(low, all, 3 * sizeof *low);
@@ -118,7 +105,7 @@ static int find_rectangle(const map_job *j, rectangle *r)
         r->edge[1][up] = high[up] - low[up];
         return EXIT_OK;
     }
-    if (!read_reals(j->v->plane, 9, all))
+    if (!args_read_reals(j->v->plane, 9, all))
         return refuse_value(
             "--plane", j->v->plane,
             "x=V, y=V or z=V with a number or a share such as 50%, or nine numbers: a corner and "
@@ -178,7 +165,7 @@ static int lattice_of_grid(map_job *j)
     double numbers[3], low[3], high[3];
     uint64_t count[3];
     ebpo_error error = EBPO_ERROR_INIT;
-    bool good = read_reals(j->v->grid, 3, numbers);
+    bool good = args_read_reals(j->v->grid, 3, numbers);
     for (int c = 0; c < 3 && good; c++) {
         good = numbers[c] >= 1 && numbers[c] <= GRID_MAX && numbers[c] == floor(numbers[c]);
         count[c] = good ? (uint64_t)numbers[c] : 0;

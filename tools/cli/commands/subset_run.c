@@ -25,13 +25,8 @@ static bool read_levels(const char *text, int *last)
 static bool read_box(const char *text, ebpo_subset_options *o)
 {
     double number[6];
-    for (int i = 0; i < 6; i++) {
-        char *end;
-        number[i] = strtod(text, &end);
-        if (end == text || *end != (i < 5 ? ',' : 0) || !isfinite(number[i]))
-            return false;
-        text = end + 1;
-    }
+    if (!args_read_reals(text, 6, number))
+        return false;
     for (int k = 0; k < 3; k++) {
         o->min[k] = number[k];
         o->max[k] = number[3 + k];

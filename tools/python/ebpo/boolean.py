@@ -2,14 +2,19 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import re
 from typing import TYPE_CHECKING, NamedTuple, Sequence
 
+import numpy as np
+
 from . import _declared as c
-from ._library import Handle, Reporter, Struct, call, made
+from ._checked import doubles as to_doubles
+from ._checked import path
+from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
 from .collide import pose_of
 from .parts import mesh_of
-from .signatures import ArrayLike, Progress, Uint32s, Vertices
+from .signatures import ArrayLike, Path, Progress, Size, Uint32s, Vertices
 
 if TYPE_CHECKING:
     from .collide import Pose
@@ -24,16 +29,18 @@ class Result(NamedTuple):
     """The mesh of a result.
 
     vertices: (n, 3) float32 or float64. faces: (m, 3) uint32. displacement: greatest distance between a vertex
-    and its exact position.
+    and its exact position. volume: bounds of the volume before rounding, equal or neighbouring doubles; nan
+    unless requested.
     """
 
     vertices: Vertices
     faces: Uint32s
     displacement: float
+    volume: tuple[float, float]
 
 
 class Parser:
-    """Reads an expression into nodes; & and * bind first, other operators from left to right."""
+    """Reads an expression into nodes; ~ binds first, then & and *, other operators from left to right."""
 
     def __init__(self, text: str, operands: int) -> None:
         self.words, self.operands, self.nodes = re.findall(r"\S", text), operands, []
@@ -48,6 +55,8 @@ class Parser:
 
     def operand(self) -> int:
         word = self.words.pop(0) if self.words else "the end"
+        if word == "~":
+            return self.add(c.EBPO_BOOLEAN_COMPLEMENT, self.operand())
         if word == "(":
             inner = self.chain("|+-^")
             if self.peek() != ")":
@@ -76,32 +85,63 @@ class Parser:
 
 
 def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | ArrayLike | None] | None = None,
-            doubles: bool = False, threads: int | None = None, progress: Progress | None = None) -> Result:
+            box: ArrayLike | None = None, planes: ArrayLike | None = None, doubles: bool = False,
+            volume: bool = False, memory: Size | None = None, temp_dir: Path | None = None,
+            threads: int | None = None, progress: Progress | None = None) -> Result:
     """Return the mesh of a Boolean expression of models at poses: closed, and cut exactly.
 
     expression: the models are A, B, ... in their order; | or + is the union, & or * the intersection, - the
-        difference, ^ the symmetric difference.
+        difference, ^ the symmetric difference, ~A the complement of A in the box.
     poses: a pose for each model, as for `Collider`; None: as in the files.
+    box: (2, 3), low and high corner of a box to which the result is cut.
+    planes: (n, 4) or (4,), rows of a, b, c, d: the result is cut to the points with ax + by + cz <= d.
     doubles: True: float64 coordinates; False: float32 if all models have float32.
+    volume: True: compute the volume.
+    memory: budget in bytes for the process; the rest is stored in temporary files in temp_dir. None: no limit.
 
     >>> matrix = [[1, 0, 0, .5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     >>> boolean("A - B", [cube, cube], poses=[None, matrix]).vertices.max(axis=0).tolist()
     [0.5, 1.0, 1.0]
+    >>> boolean("A", [cube], planes=[0, 0, 1, .25], volume=True).volume
+    (0.25, 0.25)
     """
     poses = [None] * len(models) if poses is None else poses
     if len(poses) != len(models):
         raise ValueError(f"{len(models)} models, but {len(poses)} poses")
+    if temp_dir is not None and memory is None:
+        raise ValueError("temp_dir needs memory")
     nodes = Parser(expression, len(models)).all()
     handles = [model.model for model in models]
     operands = (c.ebpo_boolean_operand * len(models))()
     for operand, given, where in zip(operands, handles, poses):
         operand.model, operand.pose = given.pointer, pose_of(where)
     options = made(c.ebpo_boolean_options, threads=threads or 0)
+    corners = None if box is None else numbers(box, "box", 6)
+    rows = None if planes is None else numbers(planes, "planes", 4)
+    if corners is not None:
+        options.box = corners.ctypes.data
+    if rows is not None:
+        options.planes, options.plane_count = rows.ctypes.data, len(rows) // 4
     handle = Handle.made("ebpo_boolean_new", operands, len(models), (c.ebpo_boolean_node * len(nodes))(*nodes),
                          len(nodes), ctypes.byref(options), free="ebpo_boolean_free",
                          keep=handles)
-    mesh, report = Struct(c.ebpo_mesh, "ebpo_mesh_free"), made(c.ebpo_boolean_mesh_report)
+    workspace = None
+    if memory is not None:
+        space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
+                     temp_dir=None if temp_dir is None else path(temp_dir, "temp_dir"))
+        workspace = Handle.made("ebpo_workspace_new", ctypes.byref(space), free="ebpo_workspace_free")
+    mesh, report = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace), made(c.ebpo_boolean_mesh_report)
     with Reporter(progress) as reported:
-        how = made(c.ebpo_boolean_mesh_options, doubles=doubles, progress=reported)
+        how = made(c.ebpo_boolean_mesh_options, doubles=doubles, volume=volume, progress=reported,
+                   workspace=workspace.pointer if workspace else None)
         call("ebpo_boolean_mesh", handle, ctypes.byref(how), mesh, ctypes.byref(report))
-    return Result(*mesh_of(mesh), report.displacement)
+    bounds = (report.volume.lo, report.volume.hi) if volume else (math.nan, math.nan)
+    return Result(*mesh_of(mesh), report.displacement, bounds)
+
+
+def numbers(values: ArrayLike, name: str, width: int) -> np.ndarray:
+    """Return the values as a flat array of rows of `width` doubles."""
+    flat = to_doubles(values, name).ravel()
+    if name == "box" and flat.size != width or flat.size % width:
+        raise ValueError(f"{name}: expected {width} numbers{'' if name == 'box' else ' a row'}, not {flat.size}")
+    return flat

@@ -1,0 +1,120 @@
+#include "cli/boolean_operands.h"
+
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/words.h"
+
+static bool add_operand(boolean_operands *o, const char *name, const char *shown,
+                        const ebpo_pose *pose)
+{
+    if (o->count == BOOLEAN_OPERANDS) {
+        command_usage(name, "there are more than %d models; A to Z name them", BOOLEAN_OPERANDS);
+        return false;
+    }
+    o->shown[o->count] = shown;
+    o->operand[o->count++].pose = *pose;
+    return true;
+}
+
+static int list_instances(boolean_operands *o, const char *name, boolean_input *in)
+{
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (ebpo_scene_open(in->path, NULL, &in->scene, &error) != EBPO_OK)
+        return command_failed(name, &error);
+    (void)ebpo_scene_get_counts(in->scene, &counts);
+    if (counts.instances == 0)
+        return command_usage(name, "%s: the scene has no instances", in->path);
+    for (uint64_t i = 0; i < counts.instances; i++) {
+        ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+        ebpo_pose pose;
+        (void)ebpo_scene_get_instance(in->scene, i, &instance);
+        if (ebpo_scene_pose(in->scene, i, counts.begin, &pose, &error) != EBPO_OK)
+            return command_failed(name, &error);
+        if (!add_operand(o, name, instance.name, &pose))
+            return EXIT_USAGE;
+    }
+    return EXIT_OK;
+}
+
+int boolean_operands_list(boolean_operands *o, const char *name, const char **paths)
+{
+    const ebpo_pose still = EBPO_POSE_INIT;
+    memset(o, 0, sizeof *o);
+    for (; *paths; paths++) {
+        boolean_input *in = &o->input[o->inputs++];
+        *in = (boolean_input){ .path = *paths, .first = o->count, .session = QUERY_SESSION_INIT };
+        if (words_end_with(*paths, ".json")) {
+            int code = list_instances(o, name, in);
+            if (code != EXIT_OK)
+                return code;
+        } else if (!add_operand(o, name, *paths, &still)) {
+            return EXIT_USAGE;
+        }
+        in->count = o->count - in->first;
+    }
+    return EXIT_OK;
+}
+
+static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
+                      const ebpo_model_options *model_options, const remote_values *remote)
+{
+    ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    load.memory = model_options->memory * in->count;
+    load.max_expansion = (uint64_t)remote->max_expansion;
+    ebpo_status status = ebpo_scene_load(in->scene, &load, &error);
+    for (uint32_t i = 0; i < in->count && status == EBPO_OK; i++) {
+        ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+        (void)ebpo_scene_get_instance(in->scene, i, &instance);
+        status =
+            ebpo_scene_model(in->scene, instance.model, &o->operand[in->first + i].model, &error);
+    }
+    return status == EBPO_OK ? EXIT_OK : command_failed(name, &error);
+}
+
+int boolean_operands_open(boolean_operands *o, const char *name,
+                          const ebpo_model_options *model_options, const remote_values *remote)
+{
+    int code = EXIT_OK;
+    for (uint32_t i = 0; i < o->inputs && code == EXIT_OK; i++) {
+        boolean_input *in = &o->input[i];
+        if (in->scene) {
+            code = open_scene(o, name, in, model_options, remote);
+        } else {
+            code = query_open(&in->session, name, in->path, model_options, -1, remote);
+            o->operand[in->first].model = in->session.model;
+        }
+    }
+    return code;
+}
+
+void boolean_operands_close(boolean_operands *o)
+{
+    for (uint32_t i = 0; i < o->inputs; i++) {
+        query_close(&o->input[i].session);
+        ebpo_scene_free(o->input[i].scene);
+    }
+}
+
+static const char *unit_of(const ebpo_file *file)
+{
+    return file && ebpo_file_info(file)->unit[0] ? ebpo_file_info(file)->unit : NULL;
+}
+
+const char *boolean_operands_unit(const boolean_operands *o)
+{
+    for (uint32_t i = 0; i < o->inputs; i++) {
+        const boolean_input *in = &o->input[i];
+        const char *unit = unit_of(in->session.file);
+        for (uint32_t k = 0; k < in->count && in->scene && !unit; k++) {
+            ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+            (void)ebpo_scene_get_instance(in->scene, k, &instance);
+            unit = unit_of(ebpo_scene_file(in->scene, instance.model));
+        }
+        if (unit)
+            return unit;
+    }
+    return NULL;
+}

@@ -1,0 +1,42 @@
+/* Opens the operands of a Boolean expression: models, and the instances of scenes. */
+#ifndef EBPO_TOOLS_BOOLEAN_OPERANDS_H
+#define EBPO_TOOLS_BOOLEAN_OPERANDS_H
+
+#include <ebpo/boolean.h>
+#include <ebpo/scene.h>
+
+#include "cli/query_args.h"
+
+/* One for each letter. */
+enum { BOOLEAN_OPERANDS = 26 };
+
+/* A file of the command line. */
+typedef struct boolean_input {
+    const char *path;
+    ebpo_scene *scene; /* NULL: a model */
+    query_session session;
+    uint32_t first, count; /* its operands */
+} boolean_input;
+
+typedef struct boolean_operands {
+    boolean_input input[BOOLEAN_OPERANDS];
+    uint32_t inputs;
+    ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
+    const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
+    uint32_t count;
+} boolean_operands;
+
+/* Lists the operands in the order of the paths (ends with NULL): a model, or all instances of a
+ * scene (NAME.json) at their poses, at the first time of the scene. Models are not opened. Returns
+ * an exit code; errors have been reported on stderr. Call boolean_operands_close in any case. */
+int boolean_operands_list(boolean_operands *o, const char *name, const char **paths);
+
+/* Opens the models. model_options: of each model. */
+int boolean_operands_open(boolean_operands *o, const char *name,
+                          const ebpo_model_options *model_options, const remote_values *remote);
+void boolean_operands_close(boolean_operands *o);
+
+/* Returns the unit of the first operand that has one, or NULL. */
+const char *boolean_operands_unit(const boolean_operands *o);
+
+#endif
