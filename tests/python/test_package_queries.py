@@ -153,7 +153,25 @@ class Queries(Case):
         self.assertAlmostEqual(volume["|"] - volume["&"], volume["^"], 9)
         self.assertAlmostEqual(m.volume - volume["&"], volume["-"], 9)
         self.assertEqual(len(ebpo.boolean("A - (A | B & B)", [m, m], poses=poses).faces), 0)
-        for wrong in "", "A B", "A -", "(A", "A - C", "a":
+        box, plane = [[-9, -9, -9], [9, 9, 9]], [0, 0, 1, .1]
+        cut = [ebpo.boolean(e, [m], box=box, planes=p, volume=True, doubles=True, memory=how, temp_dir="."
+                            if how else None)
+               for e, p, how in (("A", None, None), ("~A", None, "256M"), ("A", plane, None), ("A", [plane, plane], None))]
+        for result in cut:
+            a, b, c = np.moveaxis(result.vertices[result.faces].astype(float), 1, 0)
+            self.assertAlmostEqual(np.einsum("ij,ij->", a, np.cross(b, c)) / 6, result.volume[0], 8)
+            self.assertLessEqual(result.volume[0], result.volume[1])
+        self.assertAlmostEqual(cut[0].volume[0], m.volume, 12)
+        self.assertAlmostEqual(cut[0].volume[0] + cut[1].volume[0], 18**3, 9)
+        self.assertLess(cut[2].vertices[:, 2].max(), .1 + 1e-15)
+        self.assertEqual(cut[2].volume, cut[3].volume)
+        self.assertTrue(np.isnan(mesh.volume).all())
+        for wrong in {"box": [1, 2]}, {"planes": [1, 2, 3]}, {"temp_dir": "."}:
+            with self.assertRaises(ValueError):
+                ebpo.boolean("A", [m], **wrong)
+        with self.assertRaises(ebpo.ArgumentError):
+            ebpo.boolean("~A", [m])
+        for wrong in "", "A B", "A -", "(A", "A - C", "a", "~":
             with self.assertRaises(ValueError):
                 ebpo.boolean(wrong, [m, m])
 

@@ -136,12 +136,20 @@ static ebpo_status query_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
     return status;
 }
 
+/* Makes the mesh with attributes, and then its changes. */
 static ebpo_status make_boolean_mesh(ebpo_boolean *boolean, ebpo_error *error)
 {
     ebpo_boolean_mesh_report report = EBPO_BOOLEAN_MESH_REPORT_INIT;
-    ebpo_mesh mesh = { 0 };
-    ebpo_status status = ebpo_boolean_mesh(boolean, NULL, &mesh, &report, error);
-    ebpo_mesh_free(&mesh);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+        ebpo_mesh mesh = { 0 };
+        options.origins = options.colours = true;
+        options.attributes = i == 0;
+        options.changed_only = i == 1;
+        status = ebpo_boolean_mesh(boolean, &options, &mesh, &report, error);
+        ebpo_mesh_free(&mesh);
+    }
     return status;
 }
 
@@ -658,8 +666,37 @@ static ebpo_status call_scene_new(every_call_env *e)
     return status;
 }
 
+/* --- results that are cut to a box and a half-space --- */
+
+static ebpo_status call_boolean_cut(every_call_env *e)
+{
+    static const double box[6] = { -2, -2, -2, 0.25, 2, 2 }, plane[4] = { 0, 1, 2, 0.5 };
+    const ebpo_boolean_node nodes[2] = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                                         { EBPO_BOOLEAN_COMPLEMENT, 0, 0, 0 } };
+    ebpo_boolean_operand operand = { NULL, EBPO_POSE_INIT };
+    ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
+    ebpo_boolean *boolean = NULL;
+    holding.threads = options.threads = 1;
+    options.box = box;
+    options.planes = plane;
+    options.plane_count = 1;
+    ebpo_status status = ebpo_model_new(e->file, &holding, &operand.model, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_new(&operand, 1, nodes, 2, &options, &boolean, e->error);
+    ebpo_boolean_free(boolean);
+    ebpo_model_free(operand.model);
+    return status;
+}
+
 const every_call every_call_extras[] = {
-    { "crossings", call_crossings }, { "map", call_map },     { "touch", call_haptic },
-    { "paint", call_paint },         { "scene", call_scene }, { "scene_file", call_scene_file },
-    { "scene_new", call_scene_new }, { NULL, NULL },
+    { "crossings", call_crossings },
+    { "map", call_map },
+    { "touch", call_haptic },
+    { "paint", call_paint },
+    { "scene", call_scene },
+    { "scene_file", call_scene_file },
+    { "scene_new", call_scene_new },
+    { "boolean_cut", call_boolean_cut },
+    { NULL, NULL },
 };
