@@ -711,32 +711,36 @@ START_TEST(changes)
 }
 END_TEST
 
-/* Changes of a base that intersects itself, or of an unused one, are refused. */
+/* Refuses changes of two overlapping spheres: the other operand cuts both, or it is in both. */
 START_TEST(refused_changes)
 {
     const double centre[3] = { 0, 0, 0 }, other[3] = { 0.9, 0, 0 };
-    ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    static const double size[2] = { 0.5, 0.1 }, shift[2] = { -0.25, -0.45 };
     ebpo_error got = EBPO_ERROR_INIT;
     ebpo_mesh mesh;
-    scene s = { .nodes = 0 };
-    add_operand(&s, join_meshes(ebpo_test_sphere(centre, 1, 2), ebpo_test_sphere(other, 1, 2)),
-                moved_pose(0, 0, 0), 0);
-    add_operand(&s, ebpo_test_sphere(other, 0.5, 1), moved_pose(-0.25, 0, 0), 0);
-    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
-    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
-    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 };
-    options.changed_only = true;
-    ebpo_boolean *boolean = make_boolean(&s, 1);
-    ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_UNSUPPORTED);
-    options.volume = true;
-    ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_ARGUMENT);
-    ebpo_boolean_free(boolean);
-    s.nodes = 2;
-    options.volume = false;
-    boolean = make_boolean(&s, 1);
-    ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_ARGUMENT);
-    ebpo_boolean_free(boolean);
-    free_scene(&s);
+    for (int i = 0; i < 2; i++) {
+        ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+        scene s = { .nodes = 0 };
+        add_operand(&s, join_meshes(ebpo_test_sphere(centre, 1, 2), ebpo_test_sphere(other, 1, 2)),
+                    moved_pose(0, 0, 0), 0);
+        add_operand(&s, ebpo_test_sphere(other, size[i], 1), moved_pose(shift[i], 0, 0), 0);
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 };
+        options.changed_only = true;
+        ebpo_boolean *boolean = make_boolean(&s, 1);
+        ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got),
+                         EBPO_E_UNSUPPORTED);
+        options.volume = true;
+        ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_ARGUMENT);
+        ebpo_boolean_free(boolean);
+        s.nodes = 2; /* the expression does not use the spheres */
+        options.volume = false;
+        boolean = make_boolean(&s, 1);
+        ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got), EBPO_E_ARGUMENT);
+        ebpo_boolean_free(boolean);
+        free_scene(&s);
+    }
 }
 END_TEST
 
