@@ -370,7 +370,7 @@ static int make_cells(const values *v, const boolean_operands *operands, ebpo_wo
     if (status != EBPO_OK)
         return command_failed("boolean", &error);
     print_cells(&a);
-    bool empty = writes_result(v) && a.output.faces == 0;
+    bool empty = writes_result(v) && !v->changed_only && a.output.faces == 0;
     if (empty)
         fprintf(stderr, "ebpo boolean: %s: warning: the result is empty\n", v->out);
     return !command_flush("boolean") ? EXIT_FAILED : empty ? EXIT_EMPTY : EXIT_OK;
