@@ -24,7 +24,7 @@ import measured
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TURN, SHIFT = (0.1, 0.2, 0.3, 0.9), (0.04, 0.03, -0.05)
-DEEP, COLOURS = (0.2, 0.1, 0.35), (bytes((200, 190, 170)), bytes((215, 105, 60)))
+DEEP = (0.2, 0.1, 0.35)
 NAMES = {"ours": "`ebpo`, PLY", "limited": "with `--memory 512M`", "model": "`ebpo`, .ebpo.h5", "manifold": "manifold3d",
          "corefine": "CGAL"}
 
@@ -76,19 +76,10 @@ def draw(arguments, work):
     measured.run(build / "tools/ebpo", "convert", "-q", arguments.model, model)
     size = max(measured.run_json(build / "tools/ebpo", "info", "--json", model)["report"]["box_size"])
     pose = matrix([t * size for t in DEEP])
-    measured.run(build / "tools/ebpo", "boolean", "A - B", model, model, "--pose", f"B {pose} 1", "-o", out)
-    data = out.read_bytes()
-    body = data.index(b"end_header\n") + 11
-    counts = [int(line.split()[2]) for line in data[:body].decode().split("\n") if line.startswith("element")]
-    middle_of_file, rows = body + 12 * counts[0], []
-    for at in range(middle_of_file, len(data), 18):
-        rows.append(data[at:at + 13] + COLOURS[data[at + 13]])
-    header = data[:body].replace(b"property uchar operand\nproperty uint operand_face\n",
-                                 b"property uchar red\nproperty uchar green\nproperty uchar blue\n")
-    coloured = work / "coloured.ply"
-    coloured.write_bytes(header + data[body:middle_of_file] + b"".join(rows))
-    measured.run(build / "tools/ebpo", "render", coloured, "-o", arguments.picture, "--mesh", "--view",
-                 arguments.view, "--size", "900x700")
+    measured.run(build / "tools/ebpo", "boolean", "A - B", model, model, "--pose", f"B {pose} 1",
+                 "--operand-colours", "-o", out)
+    measured.run(build / "tools/ebpo", "render", out, "-o", arguments.picture, "--mesh", "--view", arguments.view,
+                 "--size", "900x700")
 
 
 def middle(runs, key):
