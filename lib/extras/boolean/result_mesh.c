@@ -179,7 +179,7 @@ static origin origin_of(const operand_output *r, uint64_t face)
 
 static void add_colour(output *o, uint64_t at, uint32_t operand)
 {
-    static const uint8_t colours[][3] = { { 196, 196, 204 }, { 230, 130, 60 },  { 80, 150, 220 },
+    static const uint8_t colours[][3] = { { 200, 190, 170 }, { 215, 105, 60 },  { 80, 150, 220 },
                                           { 110, 180, 90 },  { 190, 110, 190 }, { 220, 190, 70 },
                                           { 90, 190, 190 },  { 200, 90, 100 } };
     memcpy(o->colour + 3 * at, colours[operand % (sizeof colours / sizeof *colours)], 3);
