@@ -208,7 +208,7 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 /* Visits a block, whose parent is `node`. First lowers the limit to the least upper bound of the
  * eight faces: then most of them are known to be farther. Adds the remaining faces to the
  * candidates. */
-EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
+EBPO_EIGHT void near_block_in(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(g->s, block);
     near_faces f = near_load(g, &faces, wide);
@@ -229,6 +229,28 @@ EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node, b
         g->waiting[g->count++] =
             (ebpo_near_candidate){ lows[lane], block * EBPO_BLOCK + lane, node };
     }
+}
+
+static __attribute__((noinline)) void near_floats(ebpo_near_search *g, uint32_t block,
+                                                  uint32_t node)
+{
+    near_block_in(g, block, node, false);
+}
+
+static __attribute__((noinline)) void near_doubles(ebpo_near_search *g, uint32_t block,
+                                                   uint32_t node)
+{
+    near_block_in(g, block, node, true);
+}
+
+/* Calls functions that are not inlined: the code of a block is long, and engines of WebAssembly
+ * compile it at the first query. */
+EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node)
+{
+    if (g->s->wide)
+        near_doubles(g, block, node);
+    else
+        near_floats(g, block, node);
 }
 
 EBPO_EIGHT void near_fetch(const ebpo_accel *s, uint32_t child)
@@ -286,13 +308,13 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
 /* Visits the first block, and returns the node where the walk continues: the deepest ancestor
  * compared with which the search is small. Above this node, the search hardly ever needs another
  * child. */
-EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
+EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
 {
     const ebpo_bound *bound = g->s->bound;
     uint32_t node = g->first_node;
     if (g->first_block == EBPO_NO_BLOCK)
         return g->s->root_bound;
-    near_block(g, g->first_block, node, wide);
+    near_block(g, g->first_block, node);
     if (g->late) /* at the deadline, all unvisited nodes must be below nodes on the stack */
         return g->s->root_bound;
     while (node != g->s->root_bound && g->limit2 > bound[node].cylinder_limit2 * NEAR_SMALL)
@@ -312,7 +334,7 @@ EBPO_EIGHT uint32_t near_other_children(ebpo_near_search *g, uint32_t node, uint
 }
 
 /* Visits everything on the stack. Returns false at the deadline. */
-EBPO_EIGHT bool near_walk_down(ebpo_near_search *g, uint32_t top, bool wide)
+EBPO_EIGHT bool near_walk_down(ebpo_near_search *g, uint32_t top)
 {
     uint32_t steps = 0;
     while (top) {
@@ -326,32 +348,24 @@ EBPO_EIGHT bool near_walk_down(ebpo_near_search *g, uint32_t top, bool wide)
             return false;
         }
         if (near_descend(g, &top, &child, &node) && (child & ~EBPO_IS_BLOCK) != g->first_block)
-            near_block(g, child & ~EBPO_IS_BLOCK, node, wide);
+            near_block(g, child & ~EBPO_IS_BLOCK, node);
     }
     return true;
 }
 
 /* Walks down from the node that near_begin returns, then, node by node up to the root, down through
  * the other children. */
-EBPO_EIGHT void near_walk_in(ebpo_near_search *g, bool wide)
+static void near_walk(ebpo_near_search *g)
 {
-    uint32_t node = near_begin(g, wide), top = 1;
+    uint32_t node = near_begin(g), top = 1;
     g->stack[0] = ebpo_visit_make(0, node);
     g->from[0] = node;
     g->top = 0;
-    while (near_walk_down(g, top, wide) && node != g->s->root_bound) {
+    while (near_walk_down(g, top) && node != g->s->root_bound) {
         uint32_t child = node;
         node = g->s->bound[node].parent;
         top = near_other_children(g, node, child);
     }
-}
-
-static void near_walk(ebpo_near_search *g)
-{
-    if (g->s->wide)
-        near_walk_in(g, true);
-    else
-        near_walk_in(g, false);
 }
 
 const ebpo_nearest_kernels EBPO_KERNEL(ebpo_nearest_kernels) = { near_walk };

@@ -52,9 +52,12 @@ describe_library() { # name, version
 
 build_zstd() {
     zstd=$sources/libzstd/lib
-    options="-DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0"
+    # One decoder of each kind: engines compile code when it first runs, and a second decoder takes longer to
+    # compile than it saves.
+    options="-DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0 -DHUF_FORCE_DECOMPRESS_X1"
+    options="$options -DZSTD_FORCE_DECOMPRESS_SEQUENCES_SHORT"
     compile_library zstd "$zstd"/common/[!pt]*.c "$zstd"/decompress/*.c
-    options="$options -Os -DHUF_FORCE_DECOMPRESS_X1 -DZSTD_FORCE_DECOMPRESS_SEQUENCES_SHORT -DZSTD_NO_INLINE"
+    options="$options -Os -DZSTD_NO_INLINE"
     compile_library zstd-small "$zstd"/common/[!pt]*.c "$zstd"/decompress/*.c
     cp "$zstd"/*.h "$deps/include"
     describe_library libzstd 1.5.4
@@ -139,7 +142,8 @@ EOF
     (cd "$build" && emar rcsD "$deps/lib/libebpo$1.a" $objects)
 }
 
-# Links a module of the package, FILE.wasm, of C files in module/ and the libraries with a suffix.
+# Links a module of the package, FILE.wasm, of C files in module/ and the libraries with a suffix. A function with
+# one caller is inlined only if it is small, because engines compile all of a long function before they run it.
 link_module() { # file, suffix, C files...
     output=$folder/package/$1
     libraries="${2:+-Os} -lebpo$2 -lzstd$2"
@@ -150,6 +154,7 @@ link_module() { # file, suffix, C files...
         -L"$deps/lib" $libraries -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
         -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB \
         -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
+        -sBINARYEN_EXTRA_PASSES=--one-caller-inline-max-function-size=300 \
         -sEXPORTED_FUNCTIONS=_malloc,_free -o "$output")
 }
 
