@@ -2,7 +2,8 @@
 //   node web.mjs PACKAGE MODEL MODULES NATIVE_TIMES [--large MODEL] [--rounds N] [-o PAGE]
 // PACKAGE: folder made by tools/npm/build.sh; MODEL: an .ebpo.h5 file of a solid; MODULES: a folder with node_modules of
 // three and three-mesh-bvh; NATIVE_TIMES: native_times (tests/bench); --large: a file of 25 million faces or more.
-// Times until the first result are wall-clock times, medians of N (default 5). Times per query are medians of N rounds with
+// Times until the first result are wall-clock times, medians of N (default 5); those with loading of the module are in N new
+// processes. Times per query are medians of N rounds with
 // other inputs, after one more round: of processor time, so that other programs disturb less.
 import { execFileSync, fork } from 'node:child_process';
 import { createServer } from 'node:http';
@@ -85,6 +86,22 @@ async function timeFirst(rounds, open, use) {
     model.dispose();
   }
   return median(times);
+}
+
+/** Returns the median time until the first distance in new processes, which load the module. */
+async function timeNew(rounds, folder, url) {
+  const times = [];
+  for (let i = 0; i < rounds; i++) {
+    const child = fork(fileURLToPath(import.meta.url), ['--first', folder, url]);
+    times.push(await new Promise((done, fail) => child.once('message', done).once('exit', () => fail(new Error('the new process failed')))));
+  }
+  return median(times);
+}
+
+/** Reports the time of opening and a first distance in this process. */
+async function reportFirst(folder, url) {
+  const { open } = await import(pathToFileURL(resolve(folder, 'index.js'))), time = await timeFirst(1, () => open(url), (model) => model.distance(middle(model)));
+  process.send(time, () => process.exit());
 }
 
 async function readLevels(model) {
@@ -226,7 +243,7 @@ async function main() {
   const rounds = +option('--rounds', 5), large = option('--large'), page = option('-o');
   const { open } = await import(pathToFileURL(resolve(folder, 'index.js'))), load = (path) => import(pathToFileURL(resolve(modules, 'node_modules', path)));
   const server = await startServer(file), distance = (model) => model.distance(middle(model)), fromUrl = () => open(server.url), first = {};
-  first.cold = await timeFirst(1, fromUrl, distance);
+  first.cold = await timeNew(rounds, folder, server.url);
   first.url = await timeFirst(rounds, fromUrl, distance);
   first.file = await timeFirst(rounds, async () => open(await openAsBlob(file)), distance);
   first.levels = await timeFirst(rounds, fromUrl, readLevels);
@@ -257,4 +274,4 @@ async function main() {
     console.log(text);
 }
 
-await (process.argv[2] === '--serve' ? serveFile(process.argv[3]) : main());
+await (process.argv[2] === '--serve' ? serveFile(process.argv[3]) : process.argv[2] === '--first' ? reportFirst(...process.argv.slice(3)) : main());
