@@ -18,7 +18,8 @@ if [ "${EBPO_TEST_SCALE:-0.05}" = 1 ]; then
     again=$folder/another/folder
     rm -rf "$folder/another"
     mkdir -p "$again/root" "$again/build"
-    tar -C "$root" -c --exclude=node_modules lib tools samples meson.build meson_options.txt LICENSE | tar -C "$again/root" -x
+    tar -C "$root" -c --exclude=node_modules lib tools samples meson.build meson_options.txt LICENSE |
+        tar -C "$again/root" -x
     cp -r "$folder/sources" "$again/build"
     sh "$again/root/tools/npm/build.sh" "$again/build"
     diff -r "$folder/package" "$again/build/package"
