@@ -4,7 +4,7 @@
  * segment. Crossings are exact (ebpo_axis_crossing). */
 #include "core/strict_fp.h"
 
-#include "geometry/cap_tree.h"
+#include "geometry/cap_bounds.h"
 #include "geometry/cap_triangles.h"
 #include "geometry/predicates.h"
 
@@ -26,6 +26,15 @@ static bool ball_is_apart(const ebpo_cap_node *n, const double low[3], const dou
     return false;
 }
 
+/* Returns the crossings of the triangle that belongs to a stretch alone. */
+static int32_t cross_triangle(const cap_segment *g, const ebpo_cap_node *n)
+{
+    const ebpo_cap_tree *t = g->tree;
+    return (int32_t)n->weight * ebpo_axis_crossing(g->from, g->to, g->axis, t->position[n->from],
+                                                   t->position[ebpo_cap_middle(n->from, n->to)],
+                                                   t->position[n->to]);
+}
+
 /* Returns the crossings of the discs below a node. Recursive, at most 64 deep. */
 static int32_t cross_discs(const cap_segment *g, uint64_t at)
 {
@@ -36,9 +45,7 @@ static int32_t cross_discs(const cap_segment *g, uint64_t at)
     if (n->weight == 0)
         return cross_discs(g, n->from) + cross_discs(g, n->to);
     uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
-    int32_t sum =
-        (int32_t)n->weight * ebpo_axis_crossing(g->from, g->to, g->axis, t->position[n->from],
-                                                t->position[m], t->position[n->to]);
+    int32_t sum = cross_triangle(g, n);
     if (first)
         sum += cross_discs(g, at + 1);
     if (ebpo_cap_count(m, n->to))
@@ -53,6 +60,26 @@ int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], doub
         g.low[k] = g.high[k] = from[k];
     g.high[axis] = to;
     return tree->node_count ? -cross_discs(&g, 0) : 0;
+}
+
+int32_t ebpo_cap_path_crossings(const ebpo_cap_tree *tree, uint32_t entry, const double low[3],
+                                const double p[3])
+{
+    const ebpo_cap_node *n = &tree->node[entry & ~EBPO_CAP_TRIANGLE];
+    cap_segment g = { .tree = tree };
+    double from[3] = { low[0], low[1], low[2] };
+    int32_t sum = 0;
+    if (ball_is_apart(n, low, p))
+        return 0;
+    g.from = from;
+    for (g.axis = 0; g.axis < 3; g.axis++) {
+        for (int k = 0; k < 3; k++)
+            g.low[k] = g.high[k] = from[k];
+        g.to = g.high[g.axis] = p[g.axis];
+        sum += entry & EBPO_CAP_TRIANGLE ? cross_triangle(&g, n) : cross_discs(&g, entry);
+        from[g.axis] = p[g.axis];
+    }
+    return -sum;
 }
 
 /* Recursive, at most 64 deep. */

@@ -1,17 +1,6 @@
-/* Makes a tree over the caps of a border, with bounds of their solid angles.
- *
- * Bounds. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
- * centre c and radius R. With r = |x - p|, the solid angle is the integral of f . dA,
- * f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 / r^3. For all p
- * of a box with the centre q and half the diagonal s, whose distance from the ball is g > 0, the
- * half angle therefore is at most a / (2 g^2), and differs from V . f(c) / 2 at q by at most
- * a (R + s) / g^3: the differences x - p form a convex set, in which the norm is at least g.
- * Triangles may also be bounded by pi each.
- *
- * Rounding. Each quantity is computed with a relative error below 2^-45, except V, whose error
- * `slack` bounds; radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
- * only between 2^-300 and 2^300, and lengths below 2^-500 or areas below 2^-900, which may
- * underflow, change the results by less than the constant that is added. */
+/* Makes a tree over the caps of a border: loops in groups of two, and the stretches of each loop.
+ * Each node has a ball around its triangles and sums over them (cap_bounds.c). Radii, lengths and
+ * areas are upper bounds: they are enlarged by a factor of 1 + 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,22 +24,22 @@ typedef struct growing {
     uint64_t *order; /* loops */
 } growing;
 
-/* Sets the ball around the positions from .. to. */
-static void enclose_positions(const ebpo_cap_tree *t, ebpo_cap_node *n)
+/* Sets the ball around positions. */
+static void enclose_positions(ebpo_cap_node *n, double (*position)[3], uint64_t count)
 {
     double low[3], high[3], most = 0;
-    ebpo_vec3_copy(t->position[n->from], low);
-    ebpo_vec3_copy(t->position[n->from], high);
-    for (uint64_t i = n->from; i <= n->to; i++)
+    ebpo_vec3_copy(position[0], low);
+    ebpo_vec3_copy(position[0], high);
+    for (uint64_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], t->position[i][k]);
-            high[k] = fmax(high[k], t->position[i][k]);
+            low[k] = fmin(low[k], position[i][k]);
+            high[k] = fmax(high[k], position[i][k]);
         }
     for (int k = 0; k < 3; k++)
         n->centre[k] = low[k] / 2 + high[k] / 2;
-    for (uint64_t i = n->from; i <= n->to; i++) {
+    for (uint64_t i = 0; i < count; i++) {
         double d[3];
-        ebpo_vec3_subtract(t->position[i], n->centre, d);
+        ebpo_vec3_subtract(position[i], n->centre, d);
         most = fmax(most, ebpo_vec3_length(d));
     }
     n->radius = most * ENLARGE + 0x1p-500;
@@ -61,6 +50,7 @@ static void add_part(ebpo_cap_node *n, const ebpo_cap_node *part)
 {
     n->area = (n->area + part->area) * (1 + 0x1p-50);
     n->slack = (n->slack + part->slack) * (1 + 0x1p-50) + 0x1p-50 * n->area;
+    n->length = (n->length + part->length) * (1 + 0x1p-50);
     n->most += part->most;
     for (int k = 0; k < 3; k++)
         n->vector[k] += part->vector[k];
@@ -81,6 +71,27 @@ static void set_triangle(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t m)
         n->vector[k] = weight * cross[k] / 2;
 }
 
+void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stretch,
+                            ebpo_cap_node *out)
+{
+    uint64_t m = ebpo_cap_middle(stretch->from, stretch->to),
+             at[3] = { stretch->from, m, stretch->to };
+    double corner[3][3];
+    *out = (ebpo_cap_node){ .from = stretch->from, .to = stretch->to, .weight = stretch->weight };
+    for (int i = 0; i < 3; i++)
+        ebpo_vec3_copy(tree->position[at[i]], corner[i]);
+    enclose_positions(out, corner, 3);
+    set_triangle(tree, out, m);
+}
+
+/* Adds a border edge to the length. */
+static void add_edge(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t i, uint64_t j)
+{
+    double edge[3];
+    ebpo_vec3_subtract(t->position[j], t->position[i], edge);
+    n->length += n->weight * (ebpo_vec3_length(edge) * ENLARGE + 0x1p-500);
+}
+
 /* Makes the nodes of the stretch [i, j], in preorder: ebpo_cap_triangle. Recursive, at most 32
  * deep. */
 static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weight)
@@ -88,12 +99,14 @@ static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weig
     ebpo_cap_node *n = &t->node[t->node_count++];
     uint64_t m = ebpo_cap_middle(i, j);
     *n = (ebpo_cap_node){ .from = (uint32_t)i, .to = (uint32_t)j, .weight = weight };
-    enclose_positions(t, n);
+    enclose_positions(n, t->position + i, j - i + 1);
     set_triangle(t, n, m);
     for (int half = 0; half < 2; half++) {
         uint64_t a = half ? m : i, b = half ? j : m;
-        if (ebpo_cap_count(a, b) == 0)
+        if (ebpo_cap_count(a, b) == 0) {
+            add_edge(t, n, a, b);
             continue;
+        }
         const ebpo_cap_node *part = &t->node[t->node_count];
         make_stretch(t, a, b, weight);
         add_part(n, part);
@@ -159,7 +172,9 @@ static void make_group(growing *g, uint64_t begin, uint64_t end)
     ebpo_cap_tree *t = g->tree;
     if (end - begin == 1) {
         uint64_t loop = g->order[begin];
+        ebpo_cap_node *n = &t->node[t->node_count];
         make_stretch(t, g->first[loop], g->first[loop + 1] - 1, g->weight[loop]);
+        add_edge(t, n, n->to, n->from);
         return;
     }
     ebpo_cap_node *n = &t->node[t->node_count++];
@@ -240,95 +255,4 @@ void ebpo_cap_tree_free(ebpo_cap_tree *tree)
     free(tree->position);
     free(tree->node);
     *tree = (ebpo_cap_tree){ .node = NULL };
-}
-
-/* --- bounds --- */
-
-/* A box of points; or, if the radius is 0, one point. */
-typedef struct point_box {
-    const double *p;
-    double half[3], radius;
-} point_box;
-
-static ebpo_bounded bound_node(const ebpo_cap_node *n, const point_box *q)
-{
-    const ebpo_bounded unknown = { 0, n->most };
-    double x[3], apart[3];
-    ebpo_vec3_subtract(n->centre, q->p, x);
-    double d2 = ebpo_vec3_dot(x, x), d = sqrt(d2), ball = (n->radius + q->radius) * ENLARGE,
-           least = d;
-    if (q->radius > 0) {
-        for (int k = 0; k < 3; k++)
-            apart[k] = fmax(fabs(x[k]) * (1 - 0x1p-50) - q->half[k], 0);
-        least = ebpo_vec3_length(apart);
-    }
-    double gap = least * (1 - 0x1p-40) - n->radius * ENLARGE;
-    if (!(gap > 0x1p-300) || !(d < 0x1p300))
-        return unknown;
-    double inverse = 1 / (gap * gap), simple = n->area * inverse / 2,
-           middle = ebpo_vec3_dot(n->vector, x) / (d2 * d) / 2,
-           error = (n->area * (ball / gap + 0x1p-44) + n->slack) * inverse;
-    if (!(error < simple)) {
-        middle = 0;
-        error = simple;
-    }
-    error = error * ENLARGE + 0x1p-250;
-    return error < n->most && fabs(middle) <= 2 * n->most ? (ebpo_bounded){ middle, error }
-                                                          : unknown;
-}
-
-/* Returns the bounds of the triangle that belongs to a stretch alone. */
-static ebpo_bounded bound_triangle(const ebpo_cap_tree *t, const ebpo_cap_node *n,
-                                   const point_box *q)
-{
-    double weight = n->weight;
-    if (q->radius > 0)
-        return (ebpo_bounded){ 0, weight * EBPO_PI_HIGH };
-    ebpo_bounded b =
-        ebpo_half_angle(q->p, t->position[n->from], t->position[ebpo_cap_middle(n->from, n->to)],
-                        t->position[n->to]);
-    return (ebpo_bounded){ weight * b.middle, weight * b.error };
-}
-
-/* Adds to a sum; the error includes the rounding of both sums. */
-static inline void add_bounded(ebpo_bounded *sum, ebpo_bounded term)
-{
-    sum->middle += term.middle;
-    sum->error += term.error + 0x1p-52 * (fabs(sum->middle) + fabs(term.middle) + sum->error);
-}
-
-ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], const double half[3],
-                                 double tolerance)
-{
-    enum { STACK = 160 }; /* two for each level: at most 32 of groups and 32 of stretches */
-    uint32_t stack[STACK], count = 0;
-    ebpo_bounded sum = { 0, 0 };
-    point_box q = { .p = p };
-    if (half) {
-        for (int k = 0; k < 3; k++)
-            q.half[k] = half[k] * ENLARGE;
-        q.radius = ebpo_vec3_length(q.half) * ENLARGE + 0x1p-500;
-    }
-    if (tree->node_count > 0)
-        stack[count++] = 0;
-    while (count > 0) {
-        uint32_t at = stack[--count];
-        const ebpo_cap_node *n = &tree->node[at];
-        ebpo_bounded b = bound_node(n, &q);
-        bool alone = n->weight && n->to - n->from == 2;
-        if (b.error <= tolerance || (alone && half)) {
-            add_bounded(&sum, b);
-        } else if (n->weight == 0) {
-            stack[count++] = n->to;
-            stack[count++] = n->from;
-        } else {
-            uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
-            add_bounded(&sum, bound_triangle(tree, n, &q));
-            if (ebpo_cap_count(m, n->to))
-                stack[count++] = (uint32_t)(at + 1 + first);
-            if (first)
-                stack[count++] = at + 1;
-        }
-    }
-    return sum;
 }

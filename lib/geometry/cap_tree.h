@@ -23,6 +23,8 @@ typedef struct ebpo_cap_node {
     double area;              /* upper bound of the sum of weight * area */
     double vector[3];         /* sum of weight * area * normal */
     double slack;             /* bound of the rounding error of `vector` */
+    double length;            /* upper bound of the sum of weight * length of the border edges: of a
+                               * stretch's path, and for a whole loop of its last edge too */
     double most;              /* pi times the sum of weights: bound of the half angles' sum */
     uint32_t from, to; /* a stretch: positions in ebpo_cap_tree.position; a group: its two nodes */
     uint32_t weight;   /* 0: a group */
@@ -51,16 +53,18 @@ EBPO_MUST_USE ebpo_status ebpo_cap_tree_of_loops(ebpo_cap_tree *out, const ebpo_
                                                  ebpo_error *error);
 void ebpo_cap_tree_free(ebpo_cap_tree *tree);
 
+/* Sets `out` to a node of the triangle that belongs to a stretch alone. Its length is 0. */
+void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stretch,
+                            ebpo_cap_node *out);
+
 /* Returns the crossings of the caps, which turn against the discs, as ebpo_axis_crossing does. */
 int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis);
 /* Returns false if certainly no cap touches the box. */
 bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3]);
 
-/* Bounds the sum of the half angles, that is 2 pi w_D, at all points of a box around p with these
- * half sides; NULL: at p. Nodes whose bounds have an error above `tolerance` are refined; at a
- * single point, down to single triangles. */
-ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], const double half[3],
-                                 double tolerance);
+/* Bounds the sum of the half angles, that is 2 pi w_D, at p. Nodes whose bounds have an error above
+ * `tolerance` are refined, down to single triangles. */
+ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], double tolerance);
 
 /* Converts bounds of the half angles' sum to bounds of w_S = winding + w_D. The error is enlarged
  * by 2^-50 of the middle, which covers the rounding of the interval's ends and of the boundaries

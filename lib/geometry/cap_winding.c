@@ -16,8 +16,8 @@
 
 #include <math.h>
 
+#include "geometry/cap_bounds.h"
 #include "geometry/cap_triangles.h"
-#include "geometry/cap_tree.h"
 
 static const double INVERSE_TURN = 1 / (2 * EBPO_PI_LOW);
 
@@ -70,14 +70,12 @@ static double next_tolerance(double tolerance)
     return tolerance == 0 ? -1 : tolerance < 0x1p-40 ? 0 : tolerance * 0x1p-4;
 }
 
-enum { FIRST_TOLERANCE = 1 };
-
 ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                               double width)
 {
     ebpo_bounded w = { winding, INFINITY };
-    for (double t = FIRST_TOLERANCE; t >= 0 && !(w.error <= width / 2); t = next_tolerance(t))
-        w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, NULL, t), winding);
+    for (double t = 1; t >= 0 && !(w.error <= width / 2); t = next_tolerance(t))
+        w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, t), winding);
     return w;
 }
 
@@ -181,14 +179,54 @@ static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double 
 
 /* --- decisions --- */
 
+/* Returns 1 or 0 if the bounds of a front decide, else -1. */
+static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_cap_rule *rule,
+                           ebpo_bounded *w)
+{
+    bool apart;
+    int result;
+    do {
+        *w = ebpo_cap_winding_of(ebpo_cap_front_sum(front, &apart), winding);
+        result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);
+    } while (result < 0 && ebpo_cap_front_refine(front));
+    return result;
+}
+
+/* Returns 1 or 0 if bounds in doubles decide, else -1. */
+static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
+                            const ebpo_cap_rule *rule, ebpo_bounded *w)
+{
+    const ebpo_cap_box point = ebpo_cap_point(p);
+    ebpo_cap_front front;
+    ebpo_cap_front_begin_all(&front, tree, &point);
+    int result = decide_by_front(&front, winding, rule, w);
+    /* the front has space for few nodes */
+    for (double t = 0x1p-8; t >= 0 && result < 0; t = next_tolerance(t)) {
+        *w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, t), winding);
+        result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);
+    }
+    return result;
+}
+
 ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                                   const ebpo_cap_rule *rule)
 {
-    for (double t = FIRST_TOLERANCE; t >= 0; t = next_tolerance(t)) {
-        ebpo_bounded w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, NULL, t), winding);
-        int result = ebpo_cap_rule_result(rule, w.middle - w.error, w.middle + w.error);
-        if (result >= 0)
-            return (ebpo_cap_decision){ result, false, w };
-    }
-    return decide_exactly(tree, p, winding, rule);
+    ebpo_bounded w;
+    int result = decide_by_bounds(tree, p, winding, rule, &w);
+    return result >= 0 ? (ebpo_cap_decision){ result, false, w }
+                       : decide_exactly(tree, p, winding, rule);
+}
+
+ebpo_cap_decision ebpo_cap_decide_near(const ebpo_cap_tree *tree, const ebpo_near_cell *cell,
+                                       const uint32_t *disc, const double p[3], int32_t winding,
+                                       const ebpo_cap_rule *rule)
+{
+    const ebpo_cap_box point = ebpo_cap_point(p);
+    ebpo_cap_front front;
+    ebpo_bounded w;
+    ebpo_cap_front_begin(&front, tree, &point, disc, cell->count,
+                         (ebpo_bounded){ (double)cell->far_middle, (double)cell->far_error });
+    int result = decide_by_front(&front, winding, rule, &w);
+    return result >= 0 ? (ebpo_cap_decision){ result, false, w }
+                       : ebpo_cap_decide(tree, p, winding, rule);
 }

@@ -301,5 +301,7 @@ void ebpo_node_table_free(ebpo_node_table *table)
     free(table->grid);
     free(table->grid_depth);
     free(table->split);
+    free(table->near);
+    free(table->disc);
     memset(table, 0, sizeof *table);
 }

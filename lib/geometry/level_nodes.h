@@ -231,9 +231,14 @@ typedef struct ebpo_node_table {
     int grid_bits;
     uint32_t *grid;      /* [z][y][x] entry of the node that is or contains the cell */
     uint8_t *grid_depth; /* [z][y][x] depth below the root of the node in `grid` */
-    /* entries of parts of uniform nodes, octant by octant, for results of points: query/holes.h */
-    uint32_t (*split)[8];
+    /* marks of parts of leaves and uniform nodes, octant by octant: query/holes.h */
+    int32_t (*split)[8];
     uint32_t split_count;
+    /* cells near the border of a surface, and their lists of discs: geometry/cap_bounds.h */
+    struct ebpo_near_cell *near;
+    uint32_t near_count;
+    uint32_t *disc;
+    uint64_t disc_count;
 } ebpo_node_table;
 
 /* Returns the bits of the grid for a table with this number of groups; 0: no grid. */

@@ -33,9 +33,9 @@ typedef enum ebpo_leaf_kind {
  * queries. So each is done only after this number of queries in the leaf. */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
 /* Values of `cell_face` without a free cell face. EBPO_NEAR_BORDER: the leaf of a surface is near
- * the border (the edges of holes), so points in it are decided one by one (holes.h).
- * EBPO_NEAR_CAPS: in addition, a cap (faces that close a hole) touches the leaf. */
-enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7, EBPO_NEAR_CAPS = 8 };
+ * the border (the edges of holes), so points in it are decided one by one (holes.h), and `rows` is
+ * a number of ebpo_marked_entry. */
+enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7 };
 /* A leaf with more planes is of the general kind. */
 enum { EBPO_KIND_PLANES_MAX = 16 };
 
@@ -70,8 +70,8 @@ typedef struct ebpo_accel_leaf {
     uint32_t rows;
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t queries; /* approximate number of queries until the kind is known */
-    /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE,
-     * EBPO_NEAR_BORDER or EBPO_NEAR_CAPS */
+    /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE or
+     * EBPO_NEAR_BORDER */
     uint8_t cell_face;
     int8_t cell_face_step; /* winding number on that cell face minus that at the lowest corner */
 } ebpo_accel_leaf;

@@ -322,7 +322,7 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
                          "model options: models that share a budget need load mode "
                          "EBPO_LOAD_CACHE");
     ebpo_accel_estimate_whole(info, &keep, &out->whole);
-    out->whole += ebpo_holes_estimate(info);
+    out->whole += ebpo_holes_estimate(info) + ebpo_holes_marks_max(info);
     least = least_budget(info, o);
     out->least = least < out->whole ? least : out->whole;
     out->budget = o->memory;

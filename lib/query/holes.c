@@ -6,21 +6,25 @@
  * whole cell. The error of a bound shows that no cap touches the cell, so k changes in the cell at
  * faces only. If |w_D| is below t and below 1 - t for the threshold t, the rule for w equals the
  * rule for k; the rules are then equal in all cells below too. Other white nodes have one result if
- * the bounds of k + w_D are on one side of the rule's boundary. Points of the remaining cells are
- * decided one by one (cap_winding.c). */
+ * the bounds of k + w_D are on one side of the rule's boundary. Near a cap, the value of w at the
+ * centre and a bound of its variation decide. Points of the remaining cells are decided one by one
+ * (cap_winding.c).
+ *
+ * Discs that are far from a cell are bounded once for all cells below. Each cell has a list of the
+ * other discs, which is made from the list of its parent (cap_bounds.c). */
 #include "core/strict_fp.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "format/border_loops.h"
+#include "geometry/cap_bounds.h"
 #include "geometry/level_nodes.h"
 #include "query/holes.h"
-
-/* Tolerances of the bounds of half angles. */
-static const double FIRST_TOLERANCE = 0.5, LAST_TOLERANCE = 0x1p-8;
 
 ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *file, double threshold,
                             ebpo_error *error)
@@ -64,37 +68,51 @@ uint64_t ebpo_holes_bytes(const ebpo_holes *holes)
 typedef struct marking {
     const ebpo_holes *holes;
     const ebpo_marked_table *m;
-    bool fits; /* winding numbers are small enough */
-    uint64_t capacity;
+    ebpo_cap_lists lists;
+    bool fits;       /* winding numbers are small enough */
+    bool has_memory; /* for lists */
+    uint64_t split_capacity, near_capacity, disc_capacity;
+    uint64_t bytes; /* left for the table */
+    ebpo_cap_front front;
 } marking;
 
-/* Bounds w_D in a cell. Returns false if a cap may touch the cell. */
-static bool bound_in_cell(const marking *w, ebpo_cell cell, double tolerance, ebpo_bounded *out)
+/* What is known of the discs in a cell: bounds of the far ones, and a list of the others. */
+typedef struct near_discs {
+    uint64_t begin, end; /* in marking.lists */
+    ebpo_bounded far;
+    bool decided; /* the rule for k decides in the whole cell */
+} near_discs;
+
+static ebpo_cap_box box_of(const marking *w, ebpo_cell cell)
 {
-    double low[3], high[3], centre[3], half[3];
+    double low[3], high[3];
     ebpo_cell_bounds(w->m->box, cell, low, high);
-    for (int k = 0; k < 3; k++) {
-        centre[k] = low[k] / 2 + high[k] / 2;
-        half[k] = fmax(high[k] - centre[k], centre[k] - low[k]);
-    }
-    *out = ebpo_cap_tree_bound(&w->holes->caps, centre, half, tolerance);
-    /* a triangle without a bound has an error of pi or more */
-    return out->error < 3;
+    return ebpo_cap_box_of(low, high);
 }
 
-/* Returns true if the rule for k decides in the cell. Refines the bounds down to `least`. */
-static bool is_far(const marking *w, ebpo_cell cell, double least)
+/* Bounds w_D in a cell step by step: lists[begin .. end) are the near discs. */
+static void begin_front(marking *w, const ebpo_cap_box *box, const near_discs *near)
+{
+    ebpo_cap_front_begin(&w->front, &w->holes->caps, box, w->lists.entry + near->begin,
+                         near->end - near->begin, near->far);
+}
+
+/* Returns true if |w_D| is certainly below t and 1 - t. */
+static bool is_small(const marking *w, ebpo_bounded angles)
 {
     const double t = fmin(w->holes->rule.threshold, 1 - w->holes->rule.threshold);
-    ebpo_bounded b;
-    for (double tolerance = FIRST_TOLERANCE; tolerance >= least; tolerance /= 8) {
-        if (!bound_in_cell(w, cell, tolerance, &b))
-            return false;
-        b = ebpo_cap_winding_of(b, 0);
-        if (fabs(b.middle) + b.error < t - 0x1p-40)
+    ebpo_bounded b = ebpo_cap_winding_of(angles, 0);
+    return fabs(b.middle) + b.error < t - 0x1p-40;
+}
+
+/* Returns true if a disc of the list is large compared with the box. */
+static bool has_large_disc(const marking *w, const ebpo_cap_box *box, const near_discs *near)
+{
+    for (uint64_t i = near->begin; i < near->end; i++) {
+        uint32_t entry = w->lists.entry[i];
+        const ebpo_cap_node *n = &w->holes->caps.node[entry & ~EBPO_CAP_TRIANGLE];
+        if (n->weight && n->radius > box->radius / 2)
             return true;
-        if (fabs(b.middle) - b.error > t)
-            return false;
     }
     return false;
 }
@@ -106,81 +124,225 @@ static bool caps_touch(const marking *w, ebpo_cell cell)
     return ebpo_caps_near(&w->holes->caps, low, high);
 }
 
-/* Returns the mark of a cell without faces. `winding`: winding number at the cell's lowest
- * corner. */
-static ebpo_uniform_mark find_mark(const marking *w, ebpo_cell cell, int32_t winding)
+/* Returns true if |w_D| is small in the cell, by at most `steps` refinements. */
+static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, int steps)
 {
-    ebpo_bounded b;
-    for (double t = FIRST_TOLERANCE; t >= LAST_TOLERANCE && bound_in_cell(w, cell, t, &b); t /= 8) {
-        b = ebpo_cap_winding_of(b, winding);
-        int result = ebpo_cap_rule_result(&w->holes->rule, b.middle - b.error, b.middle + b.error);
-        if (result >= 0)
-            return result ? EBPO_MARK_IN : EBPO_MARK_OUT;
-    }
-    return caps_touch(w, cell) ? EBPO_MARK_NEAR : EBPO_MARK_APART;
+    bool apart;
+    begin_front(w, box, near);
+    do {
+        if (is_small(w, ebpo_cap_front_sum(&w->front, &apart)))
+            return true;
+    } while (steps-- > 0 && ebpo_cap_front_refine(&w->front));
+    return false;
 }
 
-static uint32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool far);
+/* Begins bounds of w_D at the centre of a cell. *variation: how much 2 pi w_S at most differs from
+ * its value at the centre if no face touches the cell; and also 2 pi w_D, if no cap touches it.
+ * Returns false if this is not bounded. */
+static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variation)
+{
+    const ebpo_cap_box centre = ebpo_cap_point(box->centre);
+    *variation = ebpo_cap_variation(&w->holes->caps, box, EBPO_PI_LOW);
+    if (*variation == INFINITY)
+        return false;
+    ebpo_cap_front_begin_all(&w->front, &w->holes->caps, &centre);
+    return true;
+}
 
-/* Splits a cell without faces. Returns the index of its parts, or -1 if there is no space. */
-static int64_t split_cell(marking *w, ebpo_cell cell, int32_t winding)
+/* Returns true if |w_D| is small in a leaf that no cap touches, by the value at the centre. */
+static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
+{
+    double variation;
+    bool apart;
+    if (!begin_at_centre(w, box, &variation))
+        return false;
+    do {
+        ebpo_bounded b = ebpo_cap_front_sum(&w->front, &apart);
+        b.error += variation;
+        if (is_small(w, b))
+            return true;
+    } while (ebpo_cap_front_refine(&w->front));
+    return false;
+}
+
+/* Returns 1 or 0 if all points of a cell without faces have this result, else -1. `winding`: that
+ * of the lowest corner. */
+static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, const near_discs *near,
+                       int32_t winding)
+{
+    const ebpo_cap_rule *rule = &w->holes->rule;
+    double variation, low[3], high[3];
+    bool apart;
+    begin_front(w, box, near);
+    do {
+        ebpo_bounded b = ebpo_cap_winding_of(ebpo_cap_front_sum(&w->front, &apart), winding);
+        int result =
+            apart ? ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error) : -1;
+        if (result >= 0)
+            return result;
+    } while (ebpo_cap_front_refine(&w->front));
+    if (!has_large_disc(w, box, near) || !begin_at_centre(w, box, &variation))
+        return -1;
+    ebpo_cell_bounds(w->m->box, cell, low, high);
+    winding += ebpo_holes_crossings(w->holes, low, box->centre);
+    do {
+        ebpo_bounded b = ebpo_cap_front_sum(&w->front, &apart);
+        b.error += variation;
+        b = ebpo_cap_winding_of(b, winding);
+        int result = ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error);
+        if (result >= 0)
+            return result;
+    } while (ebpo_cap_front_refine(&w->front));
+    return -1;
+}
+
+/* Returns true if the rule for k decides in a leaf. */
+static bool is_far_leaf(marking *w, ebpo_cell cell, const ebpo_cap_box *box, const near_discs *near)
+{
+    return is_far(w, box, near, INT_MAX) ||
+           (has_large_disc(w, box, near) && !caps_touch(w, cell) && is_far_by_centre(w, box));
+}
+
+/* Makes the list of a cell from the list of its parent. */
+static near_discs narrow(marking *w, const ebpo_cap_box *box, const near_discs *parent)
+{
+    near_discs near = { w->lists.count, 0, parent->far, parent->decided };
+    if (!near.decided && w->has_memory)
+        w->has_memory = ebpo_cap_lists_narrow(&w->lists, &w->holes->caps, box, parent->begin,
+                                              parent->end, &near.far);
+    near.end = w->lists.count;
+    return near;
+}
+
+/* Uses bytes of the table. Returns false if there are too few. */
+static bool use_bytes(marking *w, uint64_t bytes)
+{
+    bool fits = bytes <= w->bytes;
+    w->bytes -= fits ? bytes : 0;
+    return fits;
+}
+
+/* Adds an ebpo_near_cell. Returns its index, or -1 without space. */
+static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, int32_t winding)
+{
+    ebpo_node_table *t = w->m->table;
+    uint64_t count = near->end - near->begin;
+    if (!w->has_memory || t->near_count >= 1 << 25 || t->disc_count + count > UINT32_MAX ||
+        count > UINT16_MAX || !use_bytes(w, sizeof *t->near + count * sizeof *t->disc) ||
+        !ebpo_grow(&t->near, &w->near_capacity, t->near_count + 1, sizeof *t->near) ||
+        !ebpo_grow(&t->disc, &w->disc_capacity, t->disc_count + count, sizeof *t->disc))
+        return -1;
+    if (count)
+        memcpy(t->disc + t->disc_count, w->lists.entry + near->begin, count * sizeof *t->disc);
+    float middle = (float)near->far.middle;
+    double error = near->far.error + fabs((double)middle - near->far.middle);
+    t->near[t->near_count] =
+        (ebpo_near_cell){ middle,          (float)error * (1 + 0x1p-22f) + 0x1p-100f,
+                          winding,         (uint32_t)t->disc_count,
+                          (uint16_t)count, caps_touch(w, cell) };
+    t->disc_count += count;
+    return (int32_t)t->near_count++;
+}
+
+static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
+                         const near_discs *parent);
+
+/* Splits a cell. Returns the index of its parts, or -1 if there is no space. */
+static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
+                          const near_discs *near)
 {
     ebpo_node_table *t = w->m->table;
     uint32_t index = t->split_count;
     double low[3], corner[3], high[3];
-    if (cell.level >= w->m->deepest || index >= w->m->splits ||
-        !ebpo_grow(&t->split, &w->capacity, index + 1, sizeof *t->split))
+    if (cell.level >= w->m->deepest || index >= 1 << 25 || !use_bytes(w, sizeof *t->split) ||
+        !ebpo_grow(&t->split, &w->split_capacity, index + 1, sizeof *t->split))
         return -1;
     t->split_count++;
     ebpo_cell_bounds(w->m->box, cell, low, high);
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_cell child = ebpo_cell_child(cell, octant);
         ebpo_cell_bounds(w->m->box, child, corner, high);
-        uint32_t entry =
-            mark_cell(w, child, winding + ebpo_holes_crossings(w->holes, low, corner), false);
-        t->split[index][octant] = entry;
+        int32_t k = winding + (leaf ? 0 : ebpo_holes_crossings(w->holes, low, corner)),
+                marked = mark_cell(w, child, k, leaf, near);
+        t->split[index][octant] = marked;
     }
-    return index;
+    return (int32_t)index;
 }
 
-/* Returns the entry of a cell without faces. */
-static uint32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool far)
+/* Returns the marked entry of a part of a leaf, or of a cell without faces. `winding`: number for
+ * ebpo_near_cell. */
+static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
+                         const near_discs *parent)
 {
-    bool in = ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, winding);
-    ebpo_uniform_mark mark = !far ? find_mark(w, cell, winding) : in ? EBPO_MARK_IN : EBPO_MARK_OUT;
-    int64_t parts = mark >= EBPO_MARK_APART ? split_cell(w, cell, winding) : -1;
+    const ebpo_cap_box box = box_of(w, cell);
+    const near_discs near = narrow(w, &box, parent);
+    int32_t result = -1, index = -1, marked;
+    if (near.decided)
+        result = !leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, winding);
+    else if (w->has_memory)
+        result = !leaf                               ? find_result(w, cell, &box, &near, winding)
+                 : is_far_leaf(w, cell, &box, &near) ? 0
+                                                     : -1;
+    w->fits = w->fits && abs(winding) < 1 << 25;
+    if (result >= 0)
+        marked = ebpo_marked_entry(winding, (ebpo_uniform_mark)result);
+    else if ((index = split_cell(w, cell, winding, leaf, &near)) >= 0)
+        marked = ebpo_marked_entry(index, EBPO_MARK_SPLIT);
+    else if ((index = store_near(w, cell, &near, winding)) >= 0)
+        marked = ebpo_marked_entry(index, EBPO_MARK_LISTED);
+    else
+        marked = ebpo_marked_entry(winding, EBPO_MARK_NEAR);
+    w->lists.count = near.begin;
+    return marked;
+}
+
+static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const near_discs *parent)
+{
+    const ebpo_accel *s = w->m->accel;
+    const ebpo_cap_box box = box_of(w, cell);
+    const near_discs near = narrow(w, &box, parent);
+    if (!near.decided && (!w->has_memory || !is_far_leaf(w, cell, &box, &near))) {
+        bool touched = caps_touch(w, cell);
+        int32_t caps = touched ? store_near(w, cell, &near, 0) : -1;
+        leaf->kind = EBPO_LEAF_GENERAL;
+        leaf->cell_face = EBPO_NEAR_BORDER;
+        leaf->rows = (uint32_t)(touched && caps < 0 ? ebpo_marked_entry(0, EBPO_MARK_NEAR)
+                                                    : mark_cell(w, cell, caps, true, &near));
+        w->m->cell_faces(s, s->list + leaf->list, cell);
+    }
+    w->lists.count = near.begin;
+}
+
+static uint32_t mark_uniform(marking *w, ebpo_cell cell, int32_t winding, const near_discs *parent)
+{
     uint32_t entry = 0;
-    w->fits = w->fits && abs(winding) < 1 << 25 &&
-              ebpo_entry_uniform(parts >= 0 ? ebpo_marked_entry((int32_t)parts, EBPO_MARK_SPLIT)
-                                            : ebpo_marked_entry(winding, mark),
-                                 &entry);
+    w->fits = ebpo_entry_uniform(mark_cell(w, cell, winding, false, parent), &entry) && w->fits;
     return entry;
 }
 
-static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell)
-{
-    if (is_far(w, cell, LAST_TOLERANCE))
-        return;
-    leaf->kind = EBPO_LEAF_GENERAL;
-    leaf->cell_face = caps_touch(w, cell) ? EBPO_NEAR_CAPS : EBPO_NEAR_BORDER;
-}
-
 /* Marks a node and the nodes below it. Recursive, one call for each level. */
-static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, bool far)
+static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_discs *parent)
 {
+    enum { STEPS = 2 };
     ebpo_node_table *t = w->m->table;
     uint32_t value = ebpo_entry_value(*entry);
     switch (ebpo_entry_kind_of(*entry)) {
-    case EBPO_ENTRY_UNIFORM: *entry = mark_cell(w, cell, ebpo_entry_winding(*entry), far); break;
+    case EBPO_ENTRY_UNIFORM:
+        *entry = mark_uniform(w, cell, ebpo_entry_winding(*entry), parent);
+        break;
     case EBPO_ENTRY_LEAF:
-        if (w->m->leaf && !far)
-            mark_leaf(w, &w->m->leaf[value], cell);
+        if (w->m->accel)
+            mark_leaf(w, &w->m->accel->leaf[value], cell, parent);
         break;
-    case EBPO_ENTRY_GRAY:
-        far = far || is_far(w, cell, FIRST_TOLERANCE);
+    case EBPO_ENTRY_GRAY: {
+        const ebpo_cap_box box = box_of(w, cell);
+        near_discs near = narrow(w, &box, parent);
+        near.decided = near.decided || (w->has_memory && is_far(w, &box, &near, STEPS));
         for (unsigned octant = 0; octant < 8; octant++)
-            mark_node(w, &t->group[value][octant], ebpo_cell_child(cell, octant), far);
+            mark_node(w, &t->group[value][octant], ebpo_cell_child(cell, octant), &near);
+        w->lists.count = near.begin;
         break;
+    }
     case EBPO_ENTRY_SUBTREE_ROOT: break;
     }
 }
@@ -188,9 +350,23 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, bool far)
 ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
                             ebpo_error *error)
 {
-    marking w = { holes, marked, true, 0 };
     ebpo_node_table *table = marked->table;
-    mark_node(&w, &table->root, marked->root, false);
+    marking *w = ebpo_alloc_zero(1, sizeof *w);
+    near_discs all = { 0, 0, { 0, 0 }, false };
+    if (!w)
+        return ebpo_fail_memory(error, sizeof *w);
+    w->holes = holes;
+    w->m = marked;
+    w->fits = true;
+    w->bytes = marked->bytes;
+    w->has_memory = ebpo_grow(&w->lists.entry, &w->lists.capacity, 1, sizeof *w->lists.entry);
+    if (w->has_memory && holes->caps.node_count > 0)
+        w->lists.entry[all.end++] = 0; /* the root */
+    w->lists.count = all.end;
+    mark_node(w, &table->root, marked->root, &all);
+    bool fits = w->fits;
+    free(w->lists.entry);
+    free(w);
     if (table->grid) { /* it has copies of entries */
         free(table->grid);
         free(table->grid_depth);
@@ -199,27 +375,48 @@ ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *ma
         table->grid_bits = 0;
         ebpo_node_table_make_grid(table);
     }
-    return w.fits ? EBPO_OK
-                  : ebpo_fail(error, EBPO_E_LIMIT, "the winding number of a node is beyond 2^25");
+    return fits ? EBPO_OK
+                : ebpo_fail(error, EBPO_E_LIMIT, "the winding number of a node is beyond 2^25");
+}
+
+uint64_t ebpo_holes_marked_bytes(const ebpo_node_table *table)
+{
+    return table->split_count * sizeof *table->split + table->near_count * sizeof *table->near +
+           table->disc_count * sizeof *table->disc;
 }
 
 /* --- points --- */
 
 int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const double p[3])
 {
-    double from[3] = { low[0], low[1], low[2] };
-    int32_t sum = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        sum += ebpo_cap_crossings(&holes->caps, from, p[axis], axis);
-        from[axis] = p[axis];
-    }
-    return sum;
+    return holes->caps.node_count ? ebpo_cap_path_crossings(&holes->caps, 0, low, p) : 0;
+}
+
+static ebpo_where where_of(ebpo_holes *holes, ebpo_cap_decision d)
+{
+    if (d.tie)
+        holes->ties++;
+    return d.inside ? EBPO_IN : EBPO_OUT;
 }
 
 ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding)
 {
-    ebpo_cap_decision d = ebpo_cap_decide(&holes->caps, p, winding, &holes->rule);
-    if (d.tie)
-        holes->ties++;
-    return d.inside ? EBPO_IN : EBPO_OUT;
+    return where_of(holes, ebpo_cap_decide(&holes->caps, p, winding, &holes->rule));
+}
+
+int32_t ebpo_holes_list_crossings(const ebpo_holes *holes, const ebpo_node_table *table,
+                                  const ebpo_near_cell *cell, const double low[3],
+                                  const double p[3])
+{
+    int32_t sum = 0;
+    for (uint32_t i = 0; i < cell->count; i++)
+        sum += ebpo_cap_path_crossings(&holes->caps, table->disc[cell->first + i], low, p);
+    return sum;
+}
+
+ebpo_where ebpo_holes_where_in(ebpo_holes *holes, const ebpo_node_table *table,
+                               const ebpo_near_cell *cell, const double p[3], int32_t winding)
+{
+    return where_of(holes, ebpo_cap_decide_near(&holes->caps, cell, table->disc + cell->first, p,
+                                                winding, &holes->rule));
 }

@@ -70,6 +70,7 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 typedef struct leaf_point {
     ebpo_cell leaf;
     double xi[3];       /* coordinates in the cell, 0 .. 1; the error is at most 2^-30 */
+    const uint32_t *at; /* position at the finest level */
     uint32_t sixteenth; /* coordinates in sixteenths of the cell, eight bits for each axis, as the
                          * lower sides in ebpo_listed_block */
 } leaf_point;
@@ -80,6 +81,7 @@ static inline void find_leaf_point(int deepest, int level, const ebpo_position *
     int up = deepest - level;
     double size = ebpo_half_power(up);
     out->leaf.level = level;
+    out->at = position->at;
     out->sixteenth = 0;
     for (int k = 0; k < 3; k++) {
         out->leaf.at[k] = position->at[k] >> up;
@@ -247,15 +249,47 @@ static inline void inside_beyond_root(const ebpo_context *context, const double 
         give_out(out);
 }
 
-/* Decides a point of a cell near the border (the edges of holes) by the winding number at the
- * cell's lowest corner, plus the crossings of caps between this corner and the point. */
-static void decide_near(const ebpo_context *context, ebpo_cell cell, int32_t winding,
-                        const double p[3], ebpo_inside_result *out)
+/* Decides a point of a cell near the border. `cell`: the cell's record, or NULL. `winding`: winding
+ * number of surface and caps. */
+static void decide_near(const ebpo_context *context, const ebpo_node_table *table,
+                        const ebpo_near_cell *cell, int32_t winding, const double p[3],
+                        ebpo_inside_result *out)
 {
-    const ebpo_box box = ebpo_model_box(context->model);
+    if (context->undecided || !cell) {
+        decide_capped(context, p, winding, out);
+        return;
+    }
+    ebpo_where where = ebpo_holes_where_in(context->model->holes, table, cell, p, winding);
+    *out = (ebpo_inside_result){ (int32_t)where, where == EBPO_IN, 0 };
+}
+
+/* Decides a point of a leaf near the border. `winding`: winding number of surface and caps at the
+ * leaf's lowest corner plus the crossings of faces on the way to the point. */
+static void decide_in_leaf(const ebpo_context *context, const ebpo_accel *s,
+                           const ebpo_accel_leaf *leaf, const leaf_point *at, const double p[3],
+                           int32_t winding, ebpo_inside_result *out)
+{
+    int level = at->leaf.level;
+    int32_t marked = ebpo_marked_part(&s->nodes, (int32_t)leaf->rows, at->at,
+                                      context->model->locator.level, &level);
+    const ebpo_holes *holes = context->model->holes;
+    const ebpo_near_cell *cell = NULL;
+    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
+    int32_t caps = ebpo_marked_value(marked);
     double low[3], high[3];
-    ebpo_cell_bounds(&box, cell, low, high);
-    decide_capped(context, p, winding + ebpo_holes_crossings(context->model->holes, low, p), out);
+    ebpo_cell_bounds(&s->box, at->leaf, low, high);
+    if (mark == EBPO_MARK_LISTED) {
+        cell = &s->nodes.near[caps];
+        caps = cell->winding;
+    }
+    if (mark == EBPO_MARK_NEAR)
+        winding += ebpo_holes_crossings(holes, low, p);
+    else if (caps >= 0)
+        winding += ebpo_holes_list_crossings(holes, &s->nodes, &s->nodes.near[caps], low, p);
+    if (mark == EBPO_MARK_OUT)
+        give_winding(context, winding, out);
+    else
+        decide_near(context, &s->nodes, cell, winding, p, out);
 }
 
 /* Decides a point in a leaf by counting crossings. */
@@ -267,20 +301,17 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
     uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
     /* another thread may be writing the cell face of a leaf that is not bounded yet */
-    bool near = bounded && leaf->cell_face >= EBPO_NEAR_BORDER;
+    bool near = bounded && leaf->cell_face == EBPO_NEAR_BORDER;
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
         return ebpo_fail_memory(error, most * sizeof *context->open);
-    bool on_no_face =
-        bounded && leaf->cell_face < EBPO_NO_CELL_FACE
-            ? from_cell_face(kernels, s, leaf, at, p, context->open, &winding)
-            : from_corner(kernels, s, leaf, bounded && !near, at, p, context->open, &winding);
+    bool on_no_face = bounded && leaf->cell_face < EBPO_NO_CELL_FACE
+                          ? from_cell_face(kernels, s, leaf, at, p, context->open, &winding)
+                          : from_corner(kernels, s, leaf, bounded, at, p, context->open, &winding);
     if (!on_no_face)
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-    else if (near && leaf->cell_face == EBPO_NEAR_CAPS)
-        decide_near(context, at->leaf, winding, p, out);
     else if (near)
-        decide_capped(context, p, winding, out);
+        decide_in_leaf(context, s, leaf, at, p, winding, out);
     else
         give_winding(context, winding, out);
     return EBPO_OK;
@@ -309,33 +340,45 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
     return result_in_leaf(context, s, &s->leaf[number], &at, p, out, error);
 }
 
-/* Classifies a point in a white node of a surface. */
+/* Classifies a point in a white node of a surface, all of whose points have the same result. */
+static inline void give_marked(const ebpo_context *context, int32_t marked, ebpo_inside_result *out)
+{
+    bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
+    *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT,
+                                 context->undecided ? ebpo_marked_value(marked) : in, 0 };
+}
+
+/* Classifies a point in another white node of a surface. */
 static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
                                                     const ebpo_node_table *table, uint32_t entry,
                                                     const ebpo_position *position, int level,
                                                     const double p[3], ebpo_inside_result *out)
 {
     int deepest = context->model->locator.level;
-    int32_t marked = ebpo_entry_winding(entry);
-    while (ebpo_entry_mark(marked) == EBPO_MARK_SPLIT)
-        marked = ebpo_entry_winding(table->split[ebpo_marked_value(marked)]
-                                                [ebpo_octant_at(position->at, deepest - ++level)]);
-    int32_t winding = ebpo_marked_value(marked);
-    bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
-    switch (ebpo_entry_mark(marked)) {
-    case EBPO_MARK_APART: decide_capped(context, p, winding, out); break;
-    case EBPO_MARK_NEAR:
-        decide_near(context,
-                    ebpo_cell_ancestor((ebpo_cell){ deepest,
-                                                    { position->at[0], position->at[1],
-                                                      position->at[2] } },
-                                       level),
-                    winding, p, out);
-        break;
-    default:
-        *out =
-            (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, context->undecided ? winding : in, 0 };
+    int32_t marked =
+        ebpo_marked_part(table, ebpo_entry_winding(entry), position->at, deepest, &level);
+    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
+    const ebpo_box box = ebpo_model_box(context->model);
+    const ebpo_holes *holes = context->model->holes;
+    const ebpo_near_cell *near = NULL;
+    double low[3], high[3];
+    if (mark <= EBPO_MARK_IN) {
+        give_marked(context, marked, out);
+        return;
     }
+    ebpo_cell cell = ebpo_cell_ancestor(
+        (ebpo_cell){ deepest, { position->at[0], position->at[1], position->at[2] } }, level);
+    ebpo_cell_bounds(&box, cell, low, high);
+    int32_t winding = ebpo_marked_value(marked);
+    if (mark == EBPO_MARK_LISTED) {
+        near = &table->near[winding];
+        winding = near->winding;
+        if (near->touched)
+            winding += ebpo_holes_list_crossings(holes, table, near, low, p);
+    } else {
+        winding += ebpo_holes_crossings(holes, low, p);
+    }
+    decide_near(context, table, near, winding, p, out);
 }
 
 /* Classifies a point in a white or black node of a table. */
@@ -343,10 +386,13 @@ static inline void inside_uniform(const ebpo_context *context, const ebpo_node_t
                                   uint32_t entry, const ebpo_position *position, int level,
                                   const double p[3], ebpo_inside_result *out)
 {
-    if (context->model->holes)
-        inside_marked(context, table, entry, position, level, p, out);
+    int32_t value = ebpo_entry_winding(entry);
+    if (!context->model->holes)
+        give_winding(context, value, out);
+    else if (ebpo_entry_mark(value) <= EBPO_MARK_IN)
+        give_marked(context, value, out);
     else
-        give_winding(context, ebpo_entry_winding(entry), out);
+        inside_marked(context, table, entry, position, level, p, out);
 }
 
 /* Classifies p in a subtree whose root's cell contains p; `position` is its shifted position. */
@@ -613,10 +659,11 @@ static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_i
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK && m->holes)
-        status = ebpo_holes_mark(m->holes,
-                                 &(ebpo_marked_table){ &subtree->box, leaf->cell, &subtree->nodes,
-                                                       subtree->leaf, 0, 0 },
-                                 error);
+        status =
+            ebpo_holes_mark(m->holes,
+                            &(ebpo_marked_table){ &subtree->box, leaf->cell, &subtree->nodes,
+                                                  subtree, m->kernels.inside->cell_faces, 0, 0 },
+                            error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
@@ -627,13 +674,23 @@ static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_i
     return status;
 }
 
+/* Decides a point of a white node. `winding`: that of its lowest corner. */
+static void decide_white(const inside_query *a, ebpo_cell cell, int32_t winding,
+                         ebpo_inside_result *out)
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(&a->box, cell, low, high);
+    winding += ebpo_holes_crossings(a->context->model->holes, low, a->p);
+    decide_capped(a->context, a->p, winding, out);
+}
+
 static ebpo_status uniform_from_file(inside_query *a, const ebpo_node *node,
                                      ebpo_inside_result *out, ebpo_error *error)
 {
     int32_t winding;
     ebpo_status status = ebpo_chunks_winding(a->context->model->chunks, node, &winding, error);
     if (status == EBPO_OK && a->context->model->holes)
-        decide_near(a->context, node->cell, winding, a->p, out);
+        decide_white(a, node->cell, winding, out);
     else if (status == EBPO_OK)
         give_winding(a->context, winding, out);
     return status;

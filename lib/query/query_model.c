@@ -74,6 +74,9 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 
 /* --- envelopes that a context keeps --- */
 
+/* Bytes of marks of the nodes above the subtrees of a surface. */
+enum { TOP_MARKS = 1 << 17 };
+
 /* Maximum number of kept envelopes; most take 1 to 3 KB. */
 enum { SLOTS = 256 };
 
@@ -192,19 +195,34 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
-/* Marks the nodes of a surface with its border (holes.h). Only in a whole model may marking split
- * uniform nodes: they are used for many queries. */
-static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, ebpo_error *error)
+/* Returns the deepest level of cells without faces that are split: with a few undecided cells near
+ * each edge of the border, these are a few percent of the root box. */
+static int split_level(const ebpo_model *m)
+{
+    int level = 0;
+    while (level < m->locator.level && UINT64_C(1) << 3 * level < 64 * m->info->border_points)
+        level++;
+    return level;
+}
+
+/* Marks the nodes of a surface with its border, with at most `bytes` of additional data. */
+static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, uint64_t bytes, ebpo_error *error)
 {
     if (!m->holes)
         return EBPO_OK;
-    uint32_t splits = s == m->whole ? s->nodes.group_count / 64 + 4096 : 0;
     ebpo_marked_table marked = {
-        &s->box, s->root.cell, &s->nodes, s->leaf, m->locator.level, splits
+        &s->box, s->root.cell, &s->nodes, s, m->kernels.inside->cell_faces, split_level(m), bytes
     };
     ebpo_status status = ebpo_holes_mark(m->holes, &marked, error);
-    s->bytes += s->nodes.split_count * sizeof *s->nodes.split;
+    s->bytes += ebpo_holes_marked_bytes(&s->nodes);
     return status;
+}
+
+/* Returns the bytes that remain for marks of a subtree. */
+static uint64_t space_for_marks(const ebpo_model *m, const ebpo_accel *s, uint64_t most)
+{
+    uint64_t left = most > s->bytes ? most - s->bytes : 0, marks = ebpo_holes_marks_max(m->info);
+    return left < marks ? left : marks;
 }
 
 /* Loads a subtree for the cache, within `most` bytes. */
@@ -219,7 +237,8 @@ static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **
                                                 ebpo_subtree_needs(key & 1), &space, error);
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
-    if (status == EBPO_OK && mark_accel(m, subtree, error) != EBPO_OK) {
+    if (status == EBPO_OK &&
+        mark_accel(m, subtree, space_for_marks(m, subtree, most), error) != EBPO_OK) {
         ebpo_accel_free(subtree);
         subtree = NULL;
         status = EBPO_E_LIMIT;
@@ -271,7 +290,8 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
                                         true, m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
-    return status == EBPO_OK ? mark_accel(m, m->whole, error) : status;
+    return status == EBPO_OK ? mark_accel(m, m->whole, ebpo_holes_marks_max(m->info), error)
+                             : status;
 }
 
 /* Makes caches under the model's own budget; 0: no limit. */
@@ -328,9 +348,10 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     if (status == EBPO_OK && m->holes) {
         ebpo_box box = ebpo_root_box(m->info);
         m->top->bytes += ebpo_holes_bytes(m->holes);
-        ebpo_marked_table marked = { &box, { 0, { 0, 0, 0 } }, &m->top->nodes,
-                                     NULL, m->locator.level,   0 };
+        ebpo_marked_table marked = { &box, { 0, { 0, 0, 0 } }, &m->top->nodes, NULL,
+                                     NULL, split_level(m),     TOP_MARKS };
         status = ebpo_holes_mark(m->holes, &marked, error);
+        m->top->bytes += ebpo_holes_marked_bytes(&m->top->nodes);
     }
     if (status == EBPO_OK)
         status = m->options.budget ? make_shared_caches(m, &source, error)

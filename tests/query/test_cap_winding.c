@@ -12,11 +12,11 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
+#include "geometry/cap_bounds.h"
 #include "geometry/cap_triangles.h"
 #include "geometry/predicates.h"
 #include "mesh/border.h"
 #include "mesh/mesh_parts.h"
-#include "geometry/cap_tree.h"
 #include "solids.h"
 
 /* ---- the judge ---- */
@@ -422,7 +422,105 @@ START_TEST(test_centre_of_three_cube_faces_is_a_tie)
 }
 END_TEST
 
-/* Bounds for a box of points contain the values at its points, at every tolerance. */
+/* Checks the bounds of boxes around p, each in the one before, against the value at p. */
+static void check_boxes(judge *j, const holed *h, const double q[3], const double half[3],
+                        const double p[3])
+{
+    ebpo_cap_lists lists = { NULL, 0, 0 };
+    ebpo_cap_front *front = malloc(sizeof *front);
+    ebpo_bounded far = { 0, 0 };
+    uint64_t begin = 0, end = h->tree.node_count > 0;
+    double low[3], high[3];
+    bool apart;
+    lists.entry = calloc(lists.capacity = 1, sizeof *lists.entry);
+    lists.count = end;
+    for (int k = 0; k < 3; k++) {
+        low[k] = q[k] - half[k];
+        high[k] = q[k] + half[k];
+    }
+    for (int step = 0; step < 8; step++) {
+        const ebpo_cap_box box = ebpo_cap_box_of(low, high);
+        ck_assert(ebpo_cap_lists_narrow(&lists, &h->tree, &box, begin, end, &far));
+        begin = end;
+        end = lists.count;
+        ebpo_cap_front_begin(front, &h->tree, &box, lists.entry + begin, end - begin, far);
+        do
+            check_contains(j, ebpo_cap_front_sum(front, &apart), "list of a box");
+        while (ebpo_cap_front_refine(front));
+        ebpo_cap_front_begin_all(front, &h->tree, &box);
+        do
+            check_contains(j, ebpo_cap_front_sum(front, &apart), "box");
+        while (ebpo_cap_front_refine(front));
+        ck_assert(!apart || !ebpo_caps_near(&h->tree, low, high) || front->stuck >= 3);
+        for (int k = 0; k < 3; k++) {
+            low[k] = low[k] / 2 + p[k] / 2;
+            high[k] = high[k] / 2 + p[k] / 2;
+        }
+    }
+    free(front);
+    free(lists.entry);
+}
+
+/* Returns true if a face may touch the box. */
+static bool faces_near(const holed *h, const double q[3], const double half[3])
+{
+    for (uint64_t f = 0; f < h->mesh.face_count; f++) {
+        bool apart = false;
+        double t[3][3];
+        for (int i = 0; i < 3; i++)
+            ebpo_mesh_position(&h->mesh, h->mesh.faces[3 * f + (uint64_t)i], t[i]);
+        for (int k = 0; k < 3; k++)
+            apart = apart || fmin(fmin(t[0][k], t[1][k]), t[2][k]) > q[k] + half[k] ||
+                    fmax(fmax(t[0][k], t[1][k]), t[2][k]) < q[k] - half[k];
+        if (!apart)
+            return true;
+    }
+    return false;
+}
+
+/* Checks the bound of the difference of w_S between q and p, if no face touches the box. Returns
+ * the bound, or INFINITY. */
+static double check_variation(judge *j, const holed *h, const double q[3], const double half[3],
+                              const double p[3])
+{
+    const double low[3] = { q[0] - half[0], q[1] - half[1], q[2] - half[2] },
+                 high[3] = { q[0] + half[0], q[1] + half[1], q[2] + half[2] };
+    const ebpo_cap_box box = ebpo_cap_box_of(low, high);
+    double bound = ebpo_cap_variation(&h->tree, &box, INFINITY), at_p;
+    if (faces_near(h, q, half) || !judge_winding(j, &h->mesh, p))
+        return INFINITY;
+    at_p = mpf_get_d(j->angle);
+    ck_assert(judge_winding(j, &h->mesh, box.centre));
+    double varied = 2 * EBPO_PI_LOW * fabs(mpf_get_d(j->angle) - at_p);
+    ck_assert_msg(varied <= bound + 1e-12, "varies by %g, beyond %g", varied, bound);
+    return bound;
+}
+
+START_TEST(test_variation_in_boxes_is_bounded)
+{
+    uint64_t state = 6, bounded = 0;
+    judge j;
+    judge_begin(&j);
+    for (uint64_t i = 0; i < ebpo_test_scaled(200); i++) {
+        holed h;
+        holed_make(&h, i % 2 ? integer_soup(&state) : half_sphere());
+        for (int c = 0; c < 40; c++) {
+            double q[3], p[3], half[3], size = ldexp(1, (int)(c % 6) - 4);
+            for (int k = 0; k < 3; k++) {
+                q[k] = 8 * ebpo_test_random_unit(&state) - 2;
+                half[k] = size * ebpo_test_random_unit(&state);
+                p[k] = q[k] + half[k] * (2 * ebpo_test_random_unit(&state) - 1);
+            }
+            bounded += check_variation(&j, &h, q, half, p) < 3;
+        }
+        holed_free(&h);
+    }
+    ck_assert_uint_gt(bounded, 0);
+    judge_end(&j);
+}
+END_TEST
+
+/* Bounds for a box of points contain the values at its points, at every step. */
 START_TEST(test_bounds_of_boxes_contain_their_points)
 {
     uint64_t state = 5;
@@ -444,10 +542,9 @@ START_TEST(test_bounds_of_boxes_contain_their_points)
             mpf_sub(j.angle, j.angle, j.t);
             mpf_mul(j.angle, j.angle, j.pi);
             mpf_mul_ui(j.angle, j.angle, 2);
-            for (double tolerance = 4; tolerance > 1e-9; tolerance /= 16) {
-                check_contains(&j, ebpo_cap_tree_bound(&h.tree, q, half, tolerance), "box");
-                check_contains(&j, ebpo_cap_tree_bound(&h.tree, p, NULL, tolerance), "point");
-            }
+            for (double tolerance = 4; tolerance > 1e-9; tolerance /= 16)
+                check_contains(&j, ebpo_cap_tree_bound(&h.tree, p, tolerance), "point");
+            check_boxes(&j, &h, q, half, p);
         }
         holed_free(&h);
     }
@@ -464,6 +561,7 @@ TEST_SUITE(cap_winding)
     tcase_add_test(all, test_small_models_agree_with_sums_in_400_bits);
     tcase_add_test(all, test_soups_agree_with_sums_in_400_bits);
     tcase_add_test(all, test_bounds_of_boxes_contain_their_points);
+    tcase_add_test(all, test_variation_in_boxes_is_bounded);
     suite_add_tcase(suite, all);
     return suite;
 }

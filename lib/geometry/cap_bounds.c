@@ -1,0 +1,373 @@
+/* Bounds winding numbers of the discs of a border, at points and in boxes.
+ *
+ * Discs. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
+ * centre c and radius R. With r = |x - p|, the solid angle is the integral of f . dA,
+ * f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 / r^3. For all p
+ * of a box with the centre q and half the diagonal s, whose distance from the ball is g > 0, the
+ * half angle therefore is at most a / (2 g^2), and differs from V . f(c) / 2 at q by at most
+ * a (R + s) / g^3: the differences x - p form a convex set, in which the norm is at least g.
+ * Triangles may also be bounded by pi each.
+ *
+ * Border edges. Away from its faces, w_S is smooth, also on caps. The gradient of 4 pi w_S is the
+ * integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of length l
+ * at the distance d contributes at most l / d^2, and at most 2 / d, the value of a whole line. So
+ * the border bounds how much 2 pi w_S varies in a box that no face touches: by s / 2 times the sum
+ * over the edges. For a whole loop the variation is also at most a s / g^3, as above.
+ *
+ * Rounding. Each quantity is computed with a relative error below 2^-45, except V, whose error
+ * `slack` bounds; radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
+ * only between 2^-300 and 2^300, and lengths below 2^-500 or areas below 2^-900, which may
+ * underflow, change the results by less than the constant that is added. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "geometry/cap_bounds.h"
+#include "geometry/cap_triangles.h"
+#include "geometry/vec3.h"
+
+static const double ENLARGE = 1 + 0x1p-40;
+static const double DISTANCE_MIN = 0x1p-300, DISTANCE_MAX = 0x1p300, TINY = 0x1p-250;
+/* Discs are far from a box if the sum of both radii is at most FAR times their distance. */
+static const double FAR = 0.5;
+
+/* Depth of walks: at most 32 levels of groups and 32 of stretches, with two entries each and one
+ * triangle. */
+enum { STACK = 224 };
+
+ebpo_cap_box ebpo_cap_box_of(const double low[3], const double high[3])
+{
+    ebpo_cap_box box;
+    for (int k = 0; k < 3; k++) {
+        box.centre[k] = low[k] / 2 + high[k] / 2;
+        box.half[k] = fmax(high[k] - box.centre[k], box.centre[k] - low[k]) * ENLARGE;
+    }
+    box.radius = ebpo_vec3_length(box.half) * ENLARGE + 0x1p-500;
+    return box;
+}
+
+/* --- one disc --- */
+
+/* Returns a lower bound of the distance between a box and the ball of a node. */
+static double gap_between(const ebpo_cap_node *n, const ebpo_cap_box *q, const double x[3],
+                          double distance)
+{
+    if (q->radius > 0) {
+        double apart[3];
+        for (int k = 0; k < 3; k++)
+            apart[k] = fmax(fabs(x[k]) * (1 - 0x1p-50) - q->half[k], 0);
+        distance = ebpo_vec3_length(apart);
+    }
+    return distance * (1 - 0x1p-40) - n->radius * ENLARGE;
+}
+
+/* Bounds the sum of a node's half angles. *gap: lower bound of its distance, if above
+ * DISTANCE_MIN. */
+static ebpo_bounded bound_node(const ebpo_cap_node *n, const ebpo_cap_box *q, double *gap_out)
+{
+    const ebpo_bounded unknown = { 0, n->most };
+    double x[3];
+    ebpo_vec3_subtract(n->centre, q->centre, x);
+    double d2 = ebpo_vec3_dot(x, x), d = sqrt(d2), ball = (n->radius + q->radius) * ENLARGE,
+           gap = gap_between(n, q, x, d);
+    *gap_out = gap;
+    if (!(gap > DISTANCE_MIN) || !(d < DISTANCE_MAX))
+        return unknown;
+    double inverse = 1 / (gap * gap), simple = n->area * inverse / 2,
+           middle = ebpo_vec3_dot(n->vector, x) / (d2 * d) / 2,
+           error = (n->area * (ball / gap + 0x1p-44) + n->slack) * inverse;
+    if (!(error < simple)) {
+        middle = 0;
+        error = simple;
+    }
+    error = error * ENLARGE + TINY;
+    return error < n->most && fabs(middle) <= 2 * n->most ? (ebpo_bounded){ middle, error }
+                                                          : unknown;
+}
+
+/* Returns the half angle of a stretch's triangle at a point. Next to an edge, where doubles do not
+ * suffice, in 512 bits. */
+static ebpo_bounded bound_triangle(const ebpo_cap_tree *t, const ebpo_cap_node *n,
+                                   const double p[3])
+{
+    const double *a = t->position[n->from], *c = t->position[n->to],
+                 *b = t->position[ebpo_cap_middle(n->from, n->to)], weight = n->weight;
+    ebpo_bounded half = ebpo_half_angle(p, a, b, c);
+    ebpo_exact_angle exact;
+    if (half.error > 0x1p-10 && ebpo_half_angle_exact(p, a, b, c, &exact))
+        half = (ebpo_bounded){ exact.angle, 0x1p-46 };
+    return (ebpo_bounded){ weight * half.middle, weight * half.error };
+}
+
+/* Adds to a sum; the error includes the rounding of both sums. */
+static inline void add_bounded(ebpo_bounded *sum, ebpo_bounded term)
+{
+    sum->middle += term.middle;
+    sum->error += term.error + 0x1p-52 * (fabs(sum->middle) + fabs(term.middle) + sum->error);
+}
+
+/* --- entries --- */
+
+/* Returns the node of an entry; `own` has space for a triangle's node. */
+static const ebpo_cap_node *node_of(const ebpo_cap_tree *t, uint32_t entry, ebpo_cap_node *own)
+{
+    const ebpo_cap_node *n = &t->node[entry & ~EBPO_CAP_TRIANGLE];
+    if (!(entry & EBPO_CAP_TRIANGLE))
+        return n;
+    ebpo_cap_triangle_node(t, n, own);
+    return own;
+}
+
+/* Returns true if an entry has parts: it is not a single triangle. */
+static bool has_parts(const ebpo_cap_tree *t, uint32_t entry)
+{
+    const ebpo_cap_node *n = &t->node[entry & ~EBPO_CAP_TRIANGLE];
+    return !(entry & EBPO_CAP_TRIANGLE) && (n->weight == 0 || n->to - n->from > 2);
+}
+
+/* Sets the parts of a node: those of a group; or the triangle of a stretch and its halves. Returns
+ * their count. */
+static uint32_t find_parts(const ebpo_cap_tree *t, uint32_t entry, uint32_t part[3])
+{
+    const ebpo_cap_node *n = &t->node[entry];
+    uint32_t count = 0;
+    if (n->weight == 0) {
+        part[0] = n->from;
+        part[1] = n->to;
+        return 2;
+    }
+    uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
+    part[count++] = entry | EBPO_CAP_TRIANGLE;
+    if (first)
+        part[count++] = entry + 1;
+    if (ebpo_cap_count(m, n->to))
+        part[count++] = (uint32_t)(entry + 1 + first);
+    return count;
+}
+
+/* --- points --- */
+
+ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], double tolerance)
+{
+    uint32_t stack[STACK], count = 0;
+    ebpo_bounded sum = { 0, 0 };
+    const ebpo_cap_box q = ebpo_cap_point(p);
+    if (tree->node_count > 0)
+        stack[count++] = 0;
+    while (count > 0) {
+        uint32_t entry = stack[--count];
+        const ebpo_cap_node *n = &tree->node[entry & ~EBPO_CAP_TRIANGLE];
+        double gap;
+        bool triangle = entry & EBPO_CAP_TRIANGLE;
+        ebpo_bounded b = triangle ? bound_triangle(tree, n, p) : bound_node(n, &q, &gap);
+        if (triangle || b.error <= tolerance)
+            add_bounded(&sum, b);
+        else
+            count += find_parts(tree, entry, stack + count);
+    }
+    return sum;
+}
+
+/* --- lists --- */
+
+bool ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
+                           const ebpo_cap_box *box, uint64_t begin, uint64_t end, ebpo_bounded *far)
+{
+    uint32_t stack[STACK];
+    for (uint64_t i = begin; i < end; i++) {
+        uint32_t count = 1;
+        stack[0] = lists->entry[i];
+        while (count > 0) {
+            uint32_t entry = stack[--count];
+            ebpo_cap_node own;
+            const ebpo_cap_node *n = node_of(tree, entry, &own);
+            double gap;
+            ebpo_bounded b = bound_node(n, box, &gap);
+            if (b.error < n->most && n->radius + box->radius <= FAR * gap) {
+                add_bounded(far, b);
+            } else if (n->radius > box->radius && has_parts(tree, entry)) {
+                count += find_parts(tree, entry, stack + count);
+            } else {
+                if (!ebpo_grow(&lists->entry, &lists->capacity, lists->count + 1,
+                               sizeof *lists->entry))
+                    return false;
+                lists->entry[lists->count++] = entry;
+            }
+        }
+    }
+    return true;
+}
+
+/* --- refined sums --- */
+
+static ebpo_bounded bound_entry(const ebpo_cap_front *f, uint32_t entry)
+{
+    ebpo_cap_node own;
+    double gap;
+    return bound_node(node_of(f->tree, entry, &own), &f->box, &gap);
+}
+
+void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, const ebpo_cap_box *box,
+                          const uint32_t *entry, uint64_t count, ebpo_bounded far)
+{
+    front->tree = tree;
+    front->box = *box;
+    front->done = far;
+    front->count = 0;
+    front->touched = count > EBPO_CAP_FRONT;
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_bounded b = bound_entry(front, entry[i]);
+        if (front->touched) {
+            add_bounded(&front->done, b);
+            continue;
+        }
+        front->entry[front->count] = entry[i];
+        front->bound[front->count++] = b;
+    }
+}
+
+void ebpo_cap_front_begin_all(ebpo_cap_front *front, const ebpo_cap_tree *tree,
+                              const ebpo_cap_box *box)
+{
+    const uint32_t root = 0;
+    ebpo_cap_front_begin(front, tree, box, &root, tree->node_count > 0, (ebpo_bounded){ 0, 0 });
+}
+
+ebpo_bounded ebpo_cap_front_sum(const ebpo_cap_front *front, bool *apart)
+{
+    ebpo_bounded sum = front->done;
+    *apart = !front->touched;
+    for (uint32_t i = 0; i < front->count; i++) {
+        const ebpo_cap_node *n = &front->tree->node[front->entry[i] & ~EBPO_CAP_TRIANGLE];
+        double most = front->entry[i] & EBPO_CAP_TRIANGLE ? n->weight * EBPO_PI_LOW : n->most;
+        *apart = *apart && front->bound[i].error < most;
+        add_bounded(&sum, front->bound[i]);
+    }
+    return sum;
+}
+
+/* Replaces entry i by its parts. */
+static void refine_entry(ebpo_cap_front *f, uint32_t i)
+{
+    uint32_t part[3], count = 1, entry = f->entry[i];
+    f->count--;
+    f->entry[i] = f->entry[f->count];
+    f->bound[i] = f->bound[f->count];
+    if (has_parts(f->tree, entry))
+        count = find_parts(f->tree, entry, part);
+    else /* the one triangle of a node, at a point */
+        part[0] = entry | EBPO_CAP_TRIANGLE;
+    for (uint32_t k = 0; k < count; k++) {
+        if (f->box.radius == 0 && part[k] & EBPO_CAP_TRIANGLE) {
+            const ebpo_cap_node *n = &f->tree->node[part[k] & ~EBPO_CAP_TRIANGLE];
+            add_bounded(&f->done, bound_triangle(f->tree, n, f->box.centre));
+        } else {
+            f->entry[f->count] = part[k];
+            f->bound[f->count++] = bound_entry(f, part[k]);
+        }
+    }
+}
+
+bool ebpo_cap_front_refine(ebpo_cap_front *front)
+{
+    bool point = front->box.radius == 0, refined = false;
+    double most = 0;
+    front->stuck = front->done.error;
+    for (uint32_t i = 0; i < front->count; i++)
+        if (point || has_parts(front->tree, front->entry[i]))
+            most = fmax(most, front->bound[i].error);
+        else
+            front->stuck += front->bound[i].error;
+    if (!(most > 0) || !(front->stuck < EBPO_PI_LOW))
+        return false;
+    for (uint32_t i = front->count; i-- > 0;) /* an entry that is moved to i has been visited */
+        if (front->bound[i].error >= most / 4 && front->count + 2 < EBPO_CAP_FRONT &&
+            (point || has_parts(front->tree, front->entry[i]))) {
+            refine_entry(front, i);
+            refined = true;
+        }
+    return refined;
+}
+
+/* --- variation --- */
+
+typedef struct varying {
+    const ebpo_cap_tree *tree;
+    const ebpo_cap_box *box;
+    double sum, most;
+} varying;
+
+/* Adds the variation by a border edge. */
+static void vary_by_edge(varying *v, uint64_t i, uint64_t j, double weight)
+{
+    double from[3], edge[3];
+    ebpo_vec3_subtract(v->tree->position[i], v->box->centre, from);
+    ebpo_vec3_subtract(v->tree->position[j], v->tree->position[i], edge);
+    double square = ebpo_vec3_dot(edge, edge), length = sqrt(square),
+           rounding = 0x1p-40 * (ebpo_vec3_length(from) + length),
+           at = square > 0 ? fmin(fmax(-ebpo_vec3_dot(from, edge) / square, 0), 1) : 0;
+    for (int k = 0; k < 3; k++)
+        from[k] += at * edge[k];
+    double distance = ebpo_vec3_length(from) * (1 - 0x1p-40) - rounding - v->box->radius;
+    if (distance > DISTANCE_MIN && distance < DISTANCE_MAX)
+        v->sum += weight * v->box->radius *
+                      (fmin(2, (length + 0x1p-500) / distance) / distance / 2) * ENLARGE +
+                  TINY;
+    else
+        v->sum = INFINITY;
+}
+
+/* Adds the variation by the path of a stretch. `at`: its node. Recursive, at most 32 deep. */
+static void vary_by_path(varying *v, uint64_t at)
+{
+    const ebpo_cap_node *n = &v->tree->node[at];
+    double x[3];
+    ebpo_vec3_subtract(n->centre, v->box->centre, x);
+    double distance = ebpo_vec3_length(x), gap = gap_between(n, v->box, x, distance);
+    if (gap > n->radius && gap > DISTANCE_MIN && distance < DISTANCE_MAX) {
+        v->sum += n->length * v->box->radius / (gap * gap) / 2 * ENLARGE + TINY;
+        return;
+    }
+    uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
+    if (first)
+        vary_by_path(v, at + 1);
+    else
+        vary_by_edge(v, n->from, m, n->weight);
+    if (!(v->sum < v->most))
+        return;
+    if (ebpo_cap_count(m, n->to))
+        vary_by_path(v, at + 1 + first);
+    else
+        vary_by_edge(v, m, n->to, n->weight);
+}
+
+/* Adds the variation by whole loops. Recursive, at most 32 deep. */
+static void vary_by_loops(varying *v, uint64_t at)
+{
+    const ebpo_cap_node *n = &v->tree->node[at];
+    double x[3];
+    ebpo_vec3_subtract(n->centre, v->box->centre, x);
+    double distance = ebpo_vec3_length(x), gap = gap_between(n, v->box, x, distance);
+    if (gap > n->radius && gap > DISTANCE_MIN && distance < DISTANCE_MAX) {
+        double s = v->box->radius, inverse = 1 / (gap * gap);
+        v->sum += fmin(n->length / 2, n->area / gap) * inverse * s * ENLARGE + TINY;
+    } else if (n->weight) {
+        vary_by_path(v, at);
+        vary_by_edge(v, n->to, n->from, n->weight);
+    } else {
+        vary_by_loops(v, n->from);
+        if (v->sum < v->most)
+            vary_by_loops(v, n->to);
+    }
+}
+
+double ebpo_cap_variation(const ebpo_cap_tree *tree, const ebpo_cap_box *box, double most)
+{
+    varying v = { tree, box, 0, most };
+    if (tree->node_count > 0)
+        vary_by_loops(&v, 0);
+    v.sum = v.sum * ENLARGE + TINY;
+    return v.sum < most ? v.sum : INFINITY;
+}
