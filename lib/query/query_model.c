@@ -195,12 +195,14 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
-/* Returns the deepest level of cells without faces that are split: with a few undecided cells near
+/* Returns the deepest level of cells that are split near the border: with a few undecided cells at
  * each edge of the border, these are a few percent of the root box. */
 static int split_level(const ebpo_model *m)
 {
+    enum { CELLS_FOR_EDGE = 64, LEAST = 7 };
     int level = 0;
-    while (level < m->locator.level && UINT64_C(1) << 3 * level < 64 * m->info->border_points)
+    while (level < m->locator.level &&
+           (level < LEAST || UINT64_C(1) << 3 * level < CELLS_FOR_EDGE * m->info->border_points))
         level++;
     return level;
 }
