@@ -218,8 +218,11 @@ void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, cons
     front->count = 0;
     front->touched = count > EBPO_CAP_FRONT;
     for (uint64_t i = 0; i < count; i++) {
-        ebpo_bounded b = bound_entry(front, entry[i]);
-        if (front->touched) {
+        bool triangle = box->radius == 0 && entry[i] & EBPO_CAP_TRIANGLE;
+        ebpo_bounded b =
+            triangle ? bound_triangle(tree, &tree->node[entry[i] & ~EBPO_CAP_TRIANGLE], box->centre)
+                     : bound_entry(front, entry[i]);
+        if (front->touched || triangle) {
             add_bounded(&front->done, b);
             continue;
         }

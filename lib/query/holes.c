@@ -204,7 +204,7 @@ static bool is_far_leaf(marking *w, ebpo_cell cell, const ebpo_cap_box *box, con
 }
 
 /* Makes the list of a cell from the list of its parent. */
-static near_discs narrow(marking *w, const ebpo_cap_box *box, const near_discs *parent)
+static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_discs *parent)
 {
     near_discs near = { w->lists.count, 0, parent->far, parent->decided };
     if (!near.decided && w->has_memory)
@@ -275,7 +275,7 @@ static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                          const near_discs *parent)
 {
     const ebpo_cap_box box = box_of(w, cell);
-    const near_discs near = narrow(w, &box, parent);
+    const near_discs near = narrow_list(w, &box, parent);
     int32_t result = -1, index = -1, marked;
     if (near.decided)
         result = !leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, winding);
@@ -300,7 +300,7 @@ static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const n
 {
     const ebpo_accel *s = w->m->accel;
     const ebpo_cap_box box = box_of(w, cell);
-    const near_discs near = narrow(w, &box, parent);
+    const near_discs near = narrow_list(w, &box, parent);
     if (!near.decided && (!w->has_memory || !is_far_leaf(w, cell, &box, &near))) {
         bool touched = caps_touch(w, cell);
         int32_t caps = touched ? store_near(w, cell, &near, 0) : -1;
@@ -336,7 +336,7 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_di
         break;
     case EBPO_ENTRY_GRAY: {
         const ebpo_cap_box box = box_of(w, cell);
-        near_discs near = narrow(w, &box, parent);
+        near_discs near = narrow_list(w, &box, parent);
         near.decided = near.decided || (w->has_memory && is_far(w, &box, &near, STEPS));
         for (unsigned octant = 0; octant < 8; octant++)
             mark_node(w, &t->group[value][octant], ebpo_cell_child(cell, octant), &near);
