@@ -64,8 +64,10 @@ typedef struct ebpo_catalogue_entry {
     double min[3], max[3];
 
     /*
-     * Data from the header of the file, for programs that read the catalogue; queries do not use
-     * this data. If file_bytes is 0, these six members are unknown and not written.
+     * Data from the header of the file, for programs that read the catalogue: size of the file,
+     * numbers of faces and vertices, rule for winding numbers; mesh: the file has a mesh; pruned:
+     * the file is a subset. Queries do not use this data. If file_bytes is 0, these six members are
+     * unknown and not written.
      */
     uint64_t file_bytes, face_count, vertex_count;
     ebpo_rule rule;
@@ -74,7 +76,10 @@ typedef struct ebpo_catalogue_entry {
     /* True: the model is a solid; false: it is a surface. */
     bool solid;
 
-    /* True for a part that consists only of caps: distances and rays ignore it. */
+    /*
+     * True for a part without faces of the model, only with caps. Distances and rays ignore this
+     * part.
+     */
     bool unseen;
 
     uint64_t reserved[4];
@@ -145,8 +150,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_new(const ebpo_catalogue_entry
                                                       ebpo_catalogue **out, ebpo_error *error);
 
 /*
- * Describes an open file as an entry with the given `path`, which is not copied. Its box is the box
- * of the mesh; for a file without faces it is not valid for ebpo_catalogue_new.
+ * Describes an open file as an entry with the given `path`, which is not copied. The entry's box is
+ * the box of the mesh. The entry of a file without faces has no valid box, so ebpo_catalogue_new
+ * refuses the entry.
  *
  * Threads: any.
  */
@@ -184,7 +190,10 @@ typedef struct ebpo_catalogue_facts {
     /* Number of entries, at least 1. */
     uint64_t count;
 
-    /* Size of the file, and the FNV-1a hash of its bytes. 0: the catalogue was made of entries. */
+    /*
+     * Size of the catalogue's file, and the FNV-1a hash of its bytes. 0: the catalogue was made of
+     * entries.
+     */
     uint64_t file_bytes, file_hash;
 
     /* As in ebpo_catalogue_options. */
@@ -206,7 +215,7 @@ EBPO_API ebpo_status ebpo_catalogue_get_facts(const ebpo_catalogue *catalogue,
 
 /*
  * Returns entry `number`, from 0. Relative paths in the entry are already joined with their base
- * folder. Lent until the catalogue is freed. NULL: `number` is out of range.
+ * folder. The entry is valid until the catalogue is freed. NULL: `number` is out of range.
  *
  * Threads: any.
  */
@@ -226,8 +235,8 @@ typedef struct ebpo_catalogue_models_options {
     size_t struct_size;
 
     /*
-     * Total memory limit in bytes. The models of a catalogue get equal shares; with more than eight
-     * models, an eighth each. 0: no limit.
+     * Total memory limit in bytes. Each open model may use one n-th of the limit; n is the number
+     * of models of its catalogue, but at most 8. 0: no limit.
      */
     uint64_t memory;
 
@@ -363,7 +372,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
  *
  * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no face is found
  *
- * EBPO_E_ABSENT: all entries are unseen.
+ * EBPO_E_ABSENT: all entries are parts with only caps (`unseen`).
  *
  * Threads: any.
  */
@@ -374,13 +383,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
- * have the same rounded t, the first of them in the catalogue is used. Exception: hits whose t
- * exceeds the range of double (INFINITY with a face) are compared along a direction that is longer
- * by a power of two (see ebpo_ray_hit).
+ * have the same rounded t, the first of them in the catalogue is used. Exception: if t is too large
+ * for a double (t is INFINITY, but there is a face), t is computed again for the direction
+ * multiplied by a power of two, and these values are compared (see ebpo_ray_hit).
  *
  * model   as for ebpo_catalogue_distance
  *
- * EBPO_E_ABSENT: all entries are unseen.
+ * EBPO_E_ABSENT: all entries are parts with only caps (`unseen`).
  *
  * Threads: any.
  */

@@ -13,11 +13,12 @@
  *   By levels             ebpo_collide_levels
  *   One mesh              ebpo_mesh_self_intersections
  *
- * Decisions are exact on posed coordinates (pose.h). Results do not depend on the order of the
- * models or on the machine. Results do not depend on budgets either, with two exceptions: the pair
- * of intersecting faces that ebpo_collide_first and ebpo_collide_distance return, and distances
- * within a tolerance. Every query supports partly loaded models: a budget or a cut level (query.h)
- * keeps only some subtrees in memory. docs/develop/collision.md explains the kinds of pairs.
+ * Decisions are exact on posed coordinates (pose.h). The *world* is the space of posed coordinates.
+ * Results do not depend on the order of the models or on the machine. Results do not depend on
+ * budgets either, with two exceptions: the pair of intersecting faces that ebpo_collide_first and
+ * ebpo_collide_distance return, and distances within a tolerance. Every query supports partly
+ * loaded models: a budget or a cut level (query.h) keeps only some subtrees in memory.
+ * docs/develop/collision.md explains the kinds of pairs.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -37,14 +38,14 @@ typedef struct ebpo_collider_options {
     size_t struct_size;
 
     /*
-     * Number of threads for queries of all pairs of faces. 0: all cores. Other queries use the
-     * calling thread.
+     * Number of threads for ebpo_collide_all and the functions that use its pairs. 0: all cores.
+     * Other queries use the calling thread.
      */
     unsigned threads;
 
     /*
-     * Memory in bytes for pairs before sorting, besides the models' budgets. 0: 64 MiB. If all
-     * pairs need more, the models are traversed several times.
+     * Memory in bytes for pairs that are not sorted yet, besides the models' budgets. 0: 64 MiB. If
+     * the pairs need more memory, the models are traversed several times.
      */
     uint64_t memory;
 } ebpo_collider_options;
@@ -87,7 +88,10 @@ EBPO_API void ebpo_collider_free(ebpo_collider *collider);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose,
                                                    ebpo_error *error);
 
-/* Options of all queries. NULL: no poses (both models as in their files), and no deadline. */
+/*
+ * Options of all queries of a collider. NULL: no poses (both models as in their files), and no
+ * deadline.
+ */
 typedef struct ebpo_collide_options {
     size_t struct_size;
 
@@ -99,7 +103,7 @@ typedef struct ebpo_collide_options {
 
     ebpo_progress progress;
 
-    /* For ebpo_collide_levels, which uses only levels 0 to `level`. -1: all levels in memory. */
+    /* Only for ebpo_collide_levels: levels 0 to `level` are used. -1: all levels in memory. */
     int32_t level;
 
     int32_t reserved;
@@ -113,8 +117,8 @@ typedef struct ebpo_collide_options {
 /* ---- any contact ---- */
 
 /*
- * face_a, face_b: source indices (indices in the file if it has no source indices). file_face_a,
- * file_face_b: indices in the files.
+ * Two faces, one of model A and one of model B. face_a, face_b: source indices (indices in the file
+ * if it has no source indices). file_face_a, file_face_b: indices in the files.
  */
 typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
@@ -127,7 +131,8 @@ typedef struct ebpo_face_pair {
 
 /*
  * Finds a pair of intersecting faces. *found: 1: a pair was found; 0: no faces intersect; -1:
- * undecided at the deadline. A solid inside another is not a contact.
+ * undecided at the deadline. Only faces count: for a solid inside another solid without
+ * intersecting faces, *found is 0.
  *
  * For the same files and poses, the pair is the same on every machine, but it is not the first pair
  * of ebpo_collide_all. For partly loaded models it also depends on the subtrees in memory.
@@ -146,17 +151,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
 
 /*
  * Relation of two point sets at their poses. The set of a solid is the closure of the points that
- * are inside by its rule. The set of a surface is only its faces, even if the file has the data
- * that decides which points are inside (EBPO_PART_BORDER), because no faces close the holes. Faces
- * without area are ignored. Exactly one relation applies: EBPO_A_INSIDE_B, EBPO_B_INSIDE_A and
- * EBPO_EQUAL take precedence over EBPO_TOUCHING and EBPO_INTERSECTING.
+ * are inside by its rule. The set of a surface is only its faces, because no faces close its holes.
+ * This is also true with EBPO_PART_BORDER, the part of a file with which ebpo_inside decides for a
+ * surface. Faces without area are ignored. Exactly one relation applies: EBPO_A_INSIDE_B,
+ * EBPO_B_INSIDE_A and EBPO_EQUAL take precedence over EBPO_TOUCHING and EBPO_INTERSECTING.
  */
 typedef enum ebpo_relation {
     EBPO_DISJOINT = 0,     /* no common point */
     EBPO_TOUCHING = 1,     /* a common point, but none in the interior of both */
     EBPO_INTERSECTING = 2, /* common interior points */
     EBPO_A_INSIDE_B = 3,   /* B is a solid and contains all points of A; the sets are not equal */
-    EBPO_B_INSIDE_A = 4,   /* the reverse */
+    EBPO_B_INSIDE_A = 4,   /* A is a solid and contains all points of B; the sets are not equal */
     EBPO_EQUAL = 5,        /* the same points; the sets are not empty */
     EBPO_RELATION_UNDECIDED = 6 /* undecided at the deadline */
 } ebpo_relation;
@@ -178,10 +183,11 @@ typedef struct ebpo_relation_result {
  * contacts, one face of each shell decides. If models only touch, every face in contact is tested.
  *
  * Memory: a model entirely in memory takes 4 bytes per face in the collider, and about 60 during
- * the call. A partly loaded model takes half a byte per face, and about 60 per face of a subtree.
- * A subtree of a partly loaded model is loaded if it has faces in contact. It is also loaded if one
- * face inside the other model is known and the subtree may have a face outside the other model, or
- * the reverse.
+ * the call. A partly loaded model takes half a byte per face, and about 60 per face of a subtree. A
+ * subtree of a partly loaded model is loaded if it has faces in contact. It is also loaded if it
+ * may decide that a model is partly inside the other one: if a face inside the other model was
+ * found, and the subtree may have a face outside the other model; or if a face outside was found,
+ * and the subtree may have a face inside.
  *
  * Errors are those of ebpo_collide_first; after the deadline the call succeeds. EBPO_E_ABSENT: as
  * for ebpo_inside.
@@ -278,12 +284,12 @@ typedef struct ebpo_polyline {
     uint64_t count;        /* number of points, at least 2 */
     const double *points;  /* [count][3]; closed: the last point is the first */
     const uint64_t *faces; /* [count - 1][2] faces of A and B, from each point to the next */
-    const double *normals; /* [count - 1][2][3] their unit normals, approximated in doubles */
+    const double *normals; /* [count - 1][2][3] unit normals of `faces`, approximated in doubles */
     bool closed;
     uint8_t reserved[7];
 } ebpo_polyline;
 
-/* Callback. It returns false to stop the call. */
+/* Callback that gets a line. It returns false to stop the call. */
 typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
 
 /*
@@ -309,10 +315,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collide
 /* Format of a file of pairs (ebpo_collide_write). */
 typedef enum ebpo_pairs_format {
     /*
-     * All pairs and segments in the order of ebpo_collide_all, as HDF5 that version 1.8 and later
-     * can read:
+     * All pairs and segments in the order of ebpo_collide_all, as an HDF5 file that HDF5 1.8 and
+     * later can read:
      *   /pairs/faces       int64 [n][2]  face_a and face_b of ebpo_face_pair
-     *   /pairs/file_faces  int64 [n][2]  in the files
+     *   /pairs/file_faces  int64 [n][2]  indices in the files
      *   /pairs/kind        uint8 [n]     ebpo_pair_kind
      *   /contacts/points   double [m][6] for crossing pairs: both ends of the segment
      *   /contacts/faces    int64 [m][2]  as /pairs/faces
@@ -374,9 +380,9 @@ typedef struct ebpo_collide_distance_options {
     double at_least;
 
     /*
-     * True: starts with the last pair of this collider, which is faster if poses change little.
-     * Exact distances and decisions do not depend on it. The bounds of intervals, and the reported
-     * pair of intersecting faces, may depend on it.
+     * True: starts with the pair that the previous distance query of this collider found, which is
+     * faster if poses change little. Exact distances and decisions do not depend on this option.
+     * The bounds of intervals, and the reported pair of intersecting faces, may depend on it.
      */
     bool warm;
 
@@ -473,8 +479,8 @@ typedef struct ebpo_separation {
     ebpo_value_bounds t;
 
     /*
-     * The pair of faces that separates last; of several pairs, the first in the order of
-     * ebpo_collide_all. EBPO_NO_FACE: none was found.
+     * The pair of faces that touches at t, the last contact; of several pairs, the first in the
+     * order of ebpo_collide_all. EBPO_NO_FACE: no such pair was found.
      */
     ebpo_face_pair pair;
 } ebpo_separation;
@@ -487,8 +493,8 @@ typedef struct ebpo_separation {
  * without rounding. If the models separate and touch again during the motion, t is that of the last
  * contact.
  *
- * For partly loaded models, subtrees whose envelopes separate later than the best result are
- * loaded.
+ * For partly loaded models, a subtree is loaded if its envelope, moved by the greatest t found so
+ * far, may still touch an envelope of the other model.
  *
  * direction   of any length, which is the unit of t; its 1-norm must be within 2^-500 .. 2^500
  *
@@ -506,13 +512,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_separation(ebpo_collider *collid
 
 /* Result of ebpo_collide_levels. */
 typedef struct ebpo_level_result {
-    /* Common point of both models (solids or faces): 1 certain, 0 certainly none, -1 undecided. */
+    /*
+     * 1: the models (solids, or faces of surfaces) certainly have a common point. 0: certainly not.
+     * -1: undecided.
+     */
     int32_t common;
 
-    /* Intersecting faces: 0 certainly none, -1 undecided. */
+    /* 0: certainly no faces intersect. -1: undecided. */
     int32_t contact;
 
-    /* Distance of the faces, as in ebpo_collide_distance; INFINITY if a model has none. */
+    /* Distance of the faces, as in ebpo_collide_distance; INFINITY if a model has no faces. */
     ebpo_value_bounds distance;
 
     /* Number of pairs of nodes that may have intersecting faces. */
@@ -524,11 +533,11 @@ typedef struct ebpo_level_result {
 } ebpo_level_result;
 
 /*
- * Computes certain results from levels alone, without faces. Envelopes bound the distance from
- * below; nodes with faces bound it from above. Solids intersect if a cell inside one contains a
- * point of the other. Reads no data; also works for models with only a few levels in memory (a cut
- * level). At the deadline, or when the pairs of nodes need more than the collider's memory, the
- * search stops with the results known so far.
+ * Computes certain results from levels alone, without faces. Envelopes give a lower bound of the
+ * distance, and nodes with faces give an upper bound. Solids intersect if a cell inside one
+ * contains a point of the other. Reads no data; also works for models with only a few levels in
+ * memory (a cut level). At the deadline, or when the pairs of nodes need more than the collider's
+ * memory, the search stops with the results known so far.
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check).
  *
@@ -616,20 +625,21 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_self_intersections(
     ebpo_self_intersections_fn take, void *user, ebpo_self_intersections_summary *out,
     ebpo_error *error);
 
-/* Sums since the collider was made. */
+/* Statistics of a collider: sums since the collider was made. */
 typedef struct ebpo_collider_stats {
     size_t struct_size;
 
     /*
-     * Number of tested pairs of nodes, of tested pairs of blocks (of up to eight faces), and of
-     * pairs of faces that needed the exact test.
+     * node_pairs: number of tested pairs of nodes. block_pairs: number of tested pairs of blocks
+     * (of up to eight faces). exact: number of pairs of faces that needed the exact test.
      */
     uint64_t node_pairs, block_pairs, exact;
 
     /*
-     * For partly loaded models: number of pairs of subtrees with near envelopes, of subtrees in
-     * these pairs, of loads, and of bytes read from the files during the queries, including reads
-     * by other users of the files.
+     * For partly loaded models. subtree_pairs: number of pairs of subtrees whose envelopes are near
+     * each other. subtrees: number of subtrees in these pairs. loads: number of loads of subtrees.
+     * bytes_read: bytes read from the files during the queries, including reads by other users of
+     * the files.
      */
     uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;

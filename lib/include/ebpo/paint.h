@@ -28,7 +28,7 @@
  *
  * An ebpo_paint is entirely in memory, 48 bytes per point, and keeps a descriptor of its file open.
  * Memory for queries of the model is that of the model's budget, plus the memory stated for each
- * function. Returned texts and arrays are valid until the paint is changed or freed.
+ * function. Texts and arrays that functions return are valid until the paint is changed or freed.
  *
  * Application: EBP 2017, section 4.5 (painting by a haptic device).
  */
@@ -127,11 +127,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
  *
  * The save compares the file with the version that this paint read or saved, and then replaces the
  * file. A lock protects both steps against all users of this library, in any process and thread.
- * Programs that do not use this library may still replace the file between the two steps. Without
- * locks (see ebpo_paint_open_to_change), users of this library may do this, too.
+ * Programs that do not use this library may still replace the file between the two steps. If there
+ * is no lock (see ebpo_paint_open_to_change), other users of this library may also replace the file
+ * between the two steps.
  *
- * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also if another user has
- * had the file open to change for 10 seconds.
+ * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also if the lock is not
+ * free within 10 seconds, because another user has the file open to change.
  *
  * Threads: any.
  */
@@ -155,7 +156,10 @@ typedef struct ebpo_paint_info {
      */
     const char *generator, *model_sha256, *model_name, *unit;
 
-    /* 1: indices of faces are those of the source. 0: those of the model's file. */
+    /*
+     * 1: indices of faces are source indices (indices in the mesh that was converted). 0: indices
+     * of faces are those in the model's file.
+     */
     uint64_t source_numbers;
 
     uint64_t layer_count, note_count, stroke_count, point_count;
@@ -216,7 +220,10 @@ typedef struct ebpo_paint_layer {
      */
     const char *title, *author, *date, *description;
 
-    /* Colour of the layer in lists, and default colour for pens: 0xRRGGBBAA. */
+    /*
+     * Colour of the layer in lists of layers, and default colour for pens that paint in the layer:
+     * 0xRRGGBBAA.
+     */
     uint32_t colour;
 
     /* Opacity of the whole layer, 0 to 255. */
@@ -291,7 +298,7 @@ typedef struct ebpo_paint_point {
      */
     uint32_t weight[2];
 
-    /* Milliseconds since the stroke's time. */
+    /* Milliseconds since `time` of the stroke. */
     uint32_t time;
 
     /* Share of the stroke's radius, in units of 2^-15: 1 to 2^15. */
@@ -408,8 +415,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_stroke(ebpo_paint *paint, u
 
 /* ---- a pen ---- */
 
-/* A sample of the haptic device. */
+/* One position of the device that draws, such as a haptic device, with pressure and time. */
 typedef struct ebpo_paint_input {
+    /* Position, in the model's coordinates. */
     double place[3];
 
     /* Pressure of the pen, 0 to 1. 0: does not paint. */
@@ -423,22 +431,25 @@ typedef struct ebpo_paint_input {
 typedef struct ebpo_paint_pen {
     size_t struct_size;
 
+    /* Index of the layer, kind and colour of the strokes, as in ebpo_paint_stroke. */
     uint64_t layer;
     ebpo_paint_kind kind;
-    uint32_t colour; /* as in strokes */
+    uint32_t colour;
 
-    /* Radius of its points, as in strokes. */
+    /* Radius of points of full size, as in ebpo_paint_stroke. */
     double radius;
 
     /*
-     * Maximum distance of points from the pen, in the model's unit, 0 to 2^200. Points are on the
-     * part of the surface within this distance that is connected to the pen. 0: at the pen.
+     * Maximum distance of points from the *foot* of the pen, the point of the surface nearest to
+     * the device. In the model's unit, 0 to 2^200. Points are on the part of the surface that is
+     * within this distance and connected to the foot. 0: all points are at the foot.
      */
     double spread;
 
     /*
-     * Number of points per step at full pressure, 1 to 10,000. At pressure p, a step has p *
-     * density points, rounded, and at least one. If `spread` is 0, a step has one point.
+     * Number of points at each step along the path (see `step`) at full pressure, 1 to 10,000. At
+     * pressure p, a step has p * density points, rounded, and at least one. If `spread` is 0, this
+     * number must be 1.
      */
     uint32_t density;
 
@@ -450,8 +461,8 @@ typedef struct ebpo_paint_pen {
     double size_least, size_full;
 
     /*
-     * Step along the path, in the model's unit. 0: half of the larger of radius and spread. Else at
-     * least 2^-200.
+     * Length of a step: distance along the path between two positions at which points are made, in
+     * the model's unit, at least 2^-200. 0: half of the larger of radius and spread.
      */
     double step;
 
@@ -464,7 +475,7 @@ typedef struct ebpo_paint_pen {
     /* Seed for the positions of points. */
     uint64_t seed;
 
-    /* As in strokes. */
+    /* Time of all strokes, as in ebpo_paint_stroke. */
     uint64_t time;
 
     ebpo_progress progress;
@@ -484,7 +495,8 @@ typedef struct ebpo_paint_drawn {
     size_t struct_size;
 
     /*
-     * Number of strokes, of their points, of steps that painted, and of steps with the pen lifted.
+     * Number of strokes, number of their points, number of steps that painted, and number of steps
+     * with the pen lifted.
      */
     uint64_t strokes, points, steps, lifted;
 
@@ -499,15 +511,16 @@ typedef struct ebpo_paint_drawn {
 
 /*
  * Converts the path of a device to strokes, with a new stroke after each lift of the pen. The path
- * is straight between samples. At each step along the path, the pen is at the nearest point of the
- * surface. More pressure gives more points. Equal inputs and seeds give equal points.
+ * is straight between samples. At each step along the path, the pen paints at the nearest point of
+ * the surface. More pressure gives more points. Equal inputs and seeds give equal points.
  *
  * context   of a matching model
  * input     [count], at least 1
  * drawn     receives statistics; may be NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
- * match. EBPO_E_ABSENT, EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of
+ * match. EBPO_E_ABSENT: the model is a subset that omits faces around the pen. EBPO_E_LIMIT: the
+ * budget is too small (ebpo_model_new), or two samples are too many steps apart. Also the errors of
  * reading (base.h).
  *
  * Threads: one at a time per paint and per context.
@@ -536,9 +549,9 @@ typedef struct ebpo_paint_options {
     size_t struct_size;
 
     /*
-     * For areas, 1 to 65,536. A part of a face that is partly covered is subdivided down to
-     * 1/fineness of the least radius of points around. With 256, the bounds of the area of a disc
-     * are within 1 %, and `value` is within 0.1 %.
+     * For areas, 1 to 65,536. A partly covered part of a face is halved until its longest edge is
+     * at most r / fineness, where r is the least radius of the balls that intersect this part. With
+     * 256, the bounds of the area of a disc are within 1 %, and `value` is within 0.1 %.
      */
     unsigned fineness;
 
@@ -555,10 +568,10 @@ typedef struct ebpo_paint_options {
 
 /* A face that intersects the ball of a point of a stroke; valid until the callback returns. */
 typedef struct ebpo_paint_face {
-    /* As in ebpo_distance_result; index in the file. */
+    /* face: index as in ebpo_distance_result. file_face: index in the file. */
     uint64_t face, file_face;
 
-    /* As stored in the file. */
+    /* Coordinates of the three corners, as stored in the file. */
     double corner[3][3];
 
     /* 1: this corner is covered. A face without covered corners may be covered in its middle. */
@@ -593,12 +606,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_cover(const ebpo_paint *paint, ebp
 typedef struct ebpo_paint_baked {
     size_t struct_size;
 
-    /* Number of vertices that strokes of visible layers cover, including erased ones. */
+    /*
+     * Number of vertices that strokes of visible layers cover, including vertices whose paint a
+     * later stroke erases.
+     */
     uint64_t vertices;
 
     /*
-     * Number of points of visible layers, of points whose faces a subset lacks, and of points that
-     * cover no vertex because their balls are smaller than the faces.
+     * points: number of points of visible layers. points_outside_subset: number of those whose
+     * faces a subset lacks. points_without_vertex: number of those that cover no vertex, because
+     * their balls are smaller than the faces.
      */
     uint64_t points, points_outside_subset, points_without_vertex;
 } ebpo_paint_baked;
@@ -672,15 +689,18 @@ typedef struct ebpo_paint_areas {
     uint64_t colour_count;
     ebpo_paint_colour_area *colours;
 
-    /* Number of faces that intersect balls of points, and of points whose faces a subset lacks. */
+    /*
+     * faces: number of faces that intersect balls of points. points_outside_subset: number of
+     * points whose faces a subset lacks.
+     */
     uint64_t faces, points_outside_subset;
 } ebpo_paint_areas;
 
 #define EBPO_PAINT_AREAS_INIT EBPO_SIZED(ebpo_paint_areas)
 
 /*
- * Measures the painted area, including invisible layers, with any opacity. The area covered by a
- * later stroke of the same layer does not count for the earlier one.
+ * Measures the painted area, including invisible layers, with any opacity. Where strokes of one
+ * layer overlap, the area counts for the later stroke only.
  *
  * out   freed by ebpo_paint_areas_free
  *

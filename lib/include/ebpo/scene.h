@@ -22,7 +22,8 @@
  *
  * An *instance* is a model at a pose. A *route* is a list of poses with times; an instance or a
  * camera with a route moves along it. Layers and groups are named sets of instances; an instance is
- * in at most one layer and in any number of groups.
+ * in at most one layer and in any number of groups. A *rule* states for pairs of instances that
+ * they are ignored, or which *clearance* (minimum distance) they must have.
  *
  * Models, instances and cameras are numbered in the order in which they were added. Times are in
  * seconds. Before the first time of its route, an instance has the first pose of the route. After
@@ -62,9 +63,9 @@ typedef struct ebpo_scene_options {
     uint64_t max_values;
 
     /*
-     * True: files named by the scene may be anywhere. False: the files must be in the scene's
-     * folder or below. Their paths must be relative and without "..", and no link may lead out of
-     * the folder.
+     * True: files named by the scene may be anywhere. False: these files must be in the scene's
+     * folder or below; their paths must be relative and without "..", and no symbolic link may lead
+     * out of the folder.
      */
     bool outside;
 
@@ -142,15 +143,19 @@ typedef struct ebpo_scene_instance {
     /* 1 to 255 bytes of UTF-8, unique among instances. */
     const char *name;
 
+    /* Index of the model. */
     uint64_t model;
 
-    /* Pose in the world. With a route: pose relative to the moving frame of the route. */
+    /* Pose in the world. With a route: pose in the coordinates that the route moves. */
     ebpo_pose pose;
 
     /* Index of the route, and of the layer (ebpo_scene_get_layer). EBPO_SCENE_NONE: none. */
     uint64_t route, layer;
 
-    /* Pairs of two fixed instances are not tested. Must be false with a route. */
+    /*
+     * True: pairs of this instance and another fixed instance are not tested. An instance with a
+     * route must not be fixed.
+     */
     bool fixed;
 
     uint8_t reserved[7];
@@ -184,11 +189,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_instance(ebpo_scene *scene,
 typedef struct ebpo_scene_counts {
     size_t struct_size;
 
+    /* Number of models, of instances, and so on. */
     uint64_t models, instances, layers, groups, routes, cameras;
 
     /*
-     * Number of poses of all routes, of entries of "ignore", of entries of "clearance", and of
-     * fixed instances.
+     * poses: number of poses of all routes. ignored, clearances: number of entries of "ignore" and
+     * of "clearance" in the scene file. fixed: number of fixed instances.
      */
     uint64_t poses, ignored, clearances, fixed;
 
@@ -209,12 +215,13 @@ EBPO_API ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_c
 typedef struct ebpo_scene_model_facts {
     size_t struct_size;
 
-    /* Lent until the scene is freed. The path is as in the scene file. */
+    /* Texts, valid until the scene is freed. The path is as in the scene file. */
     const char *name, *path;
 
     /* content_sha256 that the file must have. All 0: not stated. */
     uint8_t digest[32];
 
+    /* Number of instances of the model. */
     uint64_t instances;
 
     /*
@@ -240,7 +247,7 @@ EBPO_API ebpo_status ebpo_scene_get_model_facts(const ebpo_scene *scene, uint64_
 typedef struct ebpo_scene_stats {
     size_t struct_size;
 
-    /* Number of open files, and of files with a model in memory. */
+    /* files: number of open files. models: number of files with a model in memory. */
     uint64_t files, models;
 
     /* Bytes of memory of these models. */
@@ -295,14 +302,19 @@ EBPO_API uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance
 /* A perspective camera of a scene (ebpo_scene_get_camera). */
 typedef struct ebpo_scene_camera {
     size_t struct_size;
+    /* Name, valid until the scene is freed. */
     const char *name;
 
-    /* In the world, or in the moving frame of its route. */
+    /*
+     * Positions of the eye and of the point that it looks at, and upward direction: in the world
+     * or, with a route, in the coordinates that the route moves.
+     */
     double eye[3], target[3], up[3];
 
     /* Vertical field of view in degrees. */
     double fov;
 
+    /* Size of the image in pixels. */
     uint32_t width, height;
 
     /* Index of the route, or EBPO_SCENE_NONE. */
@@ -321,9 +333,9 @@ EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t cam
 
 /*
  * Returns true if a pair is to be tested: the scene does not ignore the pair, and the instances are
- * different and not both fixed. *clearance is then the largest clearance (minimum distance) that
- * the scene requires for the pair, in the world's unit; 0: none. Returns false also for indices out
- * of range.
+ * different and not both fixed. In this case *clearance is the largest clearance (minimum distance)
+ * that the rules of the scene require for the pair, in the world's unit; 0: no clearance. Returns
+ * false also for indices out of range.
  *
  * Threads: any.
  */
@@ -445,8 +457,8 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
 /*
  * Broad phase: finds the pairs that ebpo_scene_pair_rule allows and whose boxes
  * (ebpo_scene_instance_box) are at most their clearance apart on each axis, in ascending order of
- * a, then b. The instances of every pair that ebpo_scene_pair_rule allows and that is not found are
- * farther apart than their clearance at all times in from .. to.
+ * a, then b. If ebpo_scene_pair_rule allows a pair, and this function does not find it, then the
+ * two instances are farther apart than their clearance at all times in from .. to.
  *
  * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_LIMIT: more than 2^23 pairs.
  *
@@ -465,9 +477,9 @@ typedef enum ebpo_clash_kind {
     EBPO_CLASH_CROSSING = 4, /* faces cross */
 
     /* Only with ebpo_scene_clash_options.relate, instead of the previous kinds: */
-    EBPO_CLASH_PROTRUDING = 5, /* one is partly inside the other, a solid */
-    EBPO_CLASH_ENCLOSED = 6,   /* one is inside the other, a solid; faces may touch */
-    EBPO_CLASH_DUPLICATE = 7   /* both are the same point set */
+    EBPO_CLASH_PROTRUDING = 5, /* one instance is partly inside the other, which is a solid */
+    EBPO_CLASH_ENCLOSED = 6,   /* one instance is inside the other, a solid; faces may touch */
+    EBPO_CLASH_DUPLICATE = 7   /* both instances are the same point set */
 } ebpo_clash_kind;
 
 /*
@@ -489,8 +501,9 @@ typedef struct ebpo_scene_clash {
     uint64_t touching, crossing, coplanar;
 
     /*
-     * Required clearance. Exact distance of the faces for EBPO_CLASH_NEAR, and if one instance is
-     * inside the other without contact; else 0.
+     * clearance: the clearance that the scene requires for the pair. distance: exact distance of
+     * the faces for EBPO_CLASH_NEAR, and if one instance is inside the other without contact; else
+     * 0.
      */
     double clearance, distance;
 
@@ -514,7 +527,9 @@ typedef struct ebpo_scene_clash {
      */
     double location[3];
 
-    /* Box of `location` and, with ebpo_scene_clash_options.count, of all contact segments. */
+    /*
+     * Box that contains `location` and, with ebpo_scene_clash_options.count, all contact segments.
+     */
     double location_min[3], location_max[3];
 
     /*
@@ -591,17 +606,20 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_
 
 /* ---- as a file ---- */
 
-/* A report of the clashes at several points in time; it is being written to a file. */
+/* A file of the clashes at several times, while it is being written. */
 typedef struct ebpo_scene_report ebpo_scene_report;
 
-/* One time of a report. */
+/* One time of a report, with statistics. */
 typedef struct ebpo_scene_frame {
     double time;
 
-    /* Number of tested pairs; duration in nanoseconds. */
+    /* tested: number of tested pairs. nanoseconds: duration of the tests. */
     uint64_t tested, nanoseconds;
 
-    /* During the frame: bytes read, models made, subtrees loaded (ebpo_scene_stats). */
+    /*
+     * During the tests of this time: bytes read, number of models made, number of subtrees loaded
+     * (ebpo_scene_stats).
+     */
     uint64_t bytes_read, models, loads;
 } ebpo_scene_frame;
 
@@ -717,11 +735,11 @@ typedef struct ebpo_scene_approach_options {
 
 /*
  * Finds when instances first come within their clearance of each other; no time is missed. For each
- * pair of ebpo_scene_pairs (from, to), the distance is evaluated at one time. This distance and
- * ebpo_scene_motion give the earliest later time at which the pair can be near. The distance is
- * evaluated at this time next, and so on. There is one result per pair, in ascending order of a,
- * then b. An instance that is inside another from the beginning, without near faces, counts as
- * apart.
+ * pair of ebpo_scene_pairs (from, to), the distance is evaluated at a time. This distance and the
+ * bound of ebpo_scene_motion give a later time, before which the pair cannot be near. At this later
+ * time the distance is evaluated next, and so on. There is one result per pair, in ascending order
+ * of a, then b. An instance that is inside another one from the beginning, without near faces,
+ * counts as apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -778,7 +796,10 @@ typedef enum ebpo_scene_purpose {
     /* Images from the scene's cameras, with cells no larger than a pixel. */
     EBPO_SCENE_FOR_VIEW = 1,
 
-    /* Tests if points of instances are inside other instances. */
+    /*
+     * Tests if points of instances are inside other instances. Needs only the data near other
+     * instances.
+     */
     EBPO_SCENE_FOR_INSIDE = 2,
 
     /*
@@ -796,9 +817,9 @@ typedef struct ebpo_plan_options {
     ebpo_progress progress;
 
     /*
-     * Data is included if its distance from another instance is at most the clearance plus this
-     * margin, in the world's unit. With a larger margin, ebpo_scene_approach needs fewer
-     * evaluations. 0: for each pair, 1/32 of the longest side of the smaller box.
+     * Data of an instance is included if its distance from another instance is at most the
+     * clearance plus this margin, in the world's unit. With a larger margin, ebpo_scene_approach
+     * needs fewer evaluations. 0: for each pair, 1/32 of the longest side of the smaller box.
      */
     double margin;
 
@@ -820,12 +841,15 @@ typedef struct ebpo_scene_need {
     uint64_t model;
 
     /*
-     * EBPO_SCENE_FOR_VIEW: number of cameras. Else: number of pairs that include an instance of
-     * this model's file; a pair of two such instances counts twice.
+     * EBPO_SCENE_FOR_VIEW: number of cameras. Other purposes: number of pairs that include an
+     * instance of this model's file; a pair of two such instances counts twice.
      */
     uint64_t users;
 
-    /* Number of subtrees that intersect the box, and of all subtrees. 0, 0: the file has none. */
+    /*
+     * subtrees: number of the file's subtrees that intersect the box. of_subtrees: number of all
+     * subtrees of the file. 0, 0: the file is not divided into subtrees.
+     */
     uint64_t subtrees, of_subtrees;
 
     /* Size of the required chunks, each counted once, and size of the file; in bytes. */
@@ -843,7 +867,7 @@ typedef struct ebpo_scene_need {
      */
     uint32_t parts;
 
-    /* True if the box does not contain all faces. */
+    /* True: the box does not contain all faces of the model. */
     bool boxed;
 
     uint8_t reserved[3];
@@ -932,7 +956,7 @@ typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models,
  * contains subsets of the models' files, pose files, and packed.scene.json, which is the scene with
  * these files, their digests and the digests of the source files. `take` may be NULL.
  *
- * Queries of the purpose at times in from .. to have the same results in the new scene.
+ * Queries of options.purpose at times in from .. to have the same results in the new scene.
  * ebpo_scene_approach may evaluate other times, and intervals of distances beyond the clearance may
  * be wider. Queries that need more data return EBPO_E_ABSENT.
  *

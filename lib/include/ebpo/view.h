@@ -32,7 +32,8 @@ extern "C" {
 
 /*
  * Order in which gray nodes of the cut are refined. Of nodes with equal priority, the coarser level
- * is first, then the lower octcode.
+ * is first, then the lower octcode (path from the root to the node, three bits for each level;
+ * stream.h).
  */
 typedef enum ebpo_priority {
     /* Level by level, by octcode: the order of the file. */
@@ -91,19 +92,24 @@ typedef struct ebpo_view_options {
 
     /* ---- members that ebpo_view_stream_change may change ---- */
 
+    /* Order in which gray nodes are refined. */
     ebpo_priority priority;
 
     /* The observer; copied. NULL: no observer, allowed only with EBPO_PRIORITY_LEVEL. */
     const ebpo_observer *observer;
 
+    /* Treatment of gray nodes outside the image. */
     ebpo_unseen unseen;
 
-    /* Nodes up to this size in the image are not refined. 0: no limit. */
+    /*
+     * Gray nodes whose size in the image (`pixels` of ebpo_view_node) is at most this number are
+     * not refined. 0: no limit.
+     */
     double pixels;
 
     /*
-     * Nodes farther from the eye than this, in the model's unit, are not refined. INFINITY: no
-     * limit.
+     * Gray nodes whose cells are farther from the eye than this, in the model's unit, are not
+     * refined. INFINITY: no limit.
      */
     double distance;
 
@@ -122,8 +128,8 @@ typedef struct ebpo_view_options {
     /* ---- members that ebpo_view_stream_change may not change ---- */
 
     /*
-     * planes: half-spaces of each node. polygons: its envelope as polygons. Both are as in
-     * ebpo_stream_options. If both are false, no planes are read.
+     * planes: true: nodes have half-spaces. polygons: true: nodes have envelopes as polygons. Both
+     * are as in ebpo_stream_options. If both are false, no planes are read.
      */
     bool planes, polygons;
 
@@ -157,16 +163,21 @@ typedef struct ebpo_view_options {
 
 /* A node that a view has delivered. */
 typedef struct ebpo_view_node {
+    /* Cell, type and envelope of the node. */
     ebpo_stream_node node;
 
+    /* Level of the node in the tree; 0 is the root. */
     int level;
 
-    /* True for the last of eight siblings, which now replace their parent; and for the root. */
+    /*
+     * True for the root, and for the last of eight siblings: all eight are delivered now, and
+     * replace their parent.
+     */
     bool complete;
 
     /*
-     * True if the cell is at least partly in the image, and for some cells outside the image. True
-     * without an observer.
+     * False: the cell is certainly outside the image. True: the cell may be partly in the image, or
+     * there is no observer.
      */
     bool seen;
 
@@ -177,8 +188,9 @@ typedef struct ebpo_view_node {
     double distance;
 
     /*
-     * Size of the cell's diagonal in pixels, at this distance and in the middle of the image.
-     * INFINITY: the eye is in the cell. NAN without an observer.
+     * Length in pixels that the cell's diagonal would have in the middle of the image, if it were
+     * `distance` away from the eye and parallel to the image. INFINITY: the eye is in the cell. NAN
+     * without an observer.
      */
     double pixels;
 } ebpo_view_node;
@@ -223,7 +235,8 @@ EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
  * The caller may pause at any time, and may retry after EBPO_E_IO and EBPO_E_MEMORY. EBPO_E_FORMAT
  * is permanent, and so is EBPO_E_LIMIT (more than 2^32 groups of siblings).
  *
- * The sequence of nodes depends only on the file and the options. Limits only truncate it.
+ * The sequence of nodes depends only on the file and the options. A lower limit of bytes or nodes
+ * ends the same sequence earlier.
  *
  * Threads: one at a time per stream.
  */
@@ -231,11 +244,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_next(ebpo_view_stream *strea
                                                          ebpo_view_node *out, ebpo_view_end *end,
                                                          ebpo_error *error);
 
-/* Faces of a leaf: all that intersect its cell. */
+/* All faces that intersect the cell of a leaf. */
 typedef struct ebpo_view_faces {
     size_t struct_size;
 
-    /* Number of faces; number of faces that no earlier leaf delivered. */
+    /*
+     * face_count: number of faces. new_count: number of those faces that no earlier leaf has
+     * delivered.
+     */
     uint64_t face_count, new_count;
 
     /* [face_count] corners, in the model's unit */
@@ -245,8 +261,8 @@ typedef struct ebpo_view_faces {
     const uint32_t *numbers;
 
     /*
-     * [face_count] 1: an earlier leaf delivered this face; else 0. So a viewer can draw each face
-     * once
+     * [face_count] 1: an earlier leaf has delivered this face; 0: new. A viewer that draws only the
+     * new faces draws each face once
      */
     const uint8_t *repeated;
 } ebpo_view_faces;
@@ -254,8 +270,8 @@ typedef struct ebpo_view_faces {
 #define EBPO_VIEW_FACES_INIT EBPO_SIZED(ebpo_view_faces)
 
 /*
- * Gets the faces of the last node of ebpo_view_stream_next. Only a leaf has faces, and only with
- * options.faces. Arrays are valid until the next call with the stream.
+ * Gets the faces of the last node of ebpo_view_stream_next. If this node is not a leaf, or
+ * options.faces is false, face_count is 0. Arrays are valid until the next call with the stream.
  *
  * Faces are read with the leaf and its siblings. If the faces would exceed options.bytes, the leaf
  * and its siblings are not delivered.
@@ -270,7 +286,7 @@ EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
  * siblings, the next nodes are selected by the new options. On failure nothing changes. `options`
  * must not be NULL.
  *
- * EBPO_E_ARGUMENT: invalid options, or a fixed option differs.
+ * EBPO_E_ARGUMENT: invalid options, or a member that must not change differs (ebpo_view_options).
  *
  * Threads: one at a time per stream.
  */
@@ -278,13 +294,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_change(ebpo_view_stream *str
                                                            const ebpo_view_options *options,
                                                            ebpo_error *error);
 
-/* Callback that gets a node, which is valid until it returns. It returns false to stop the call. */
+/*
+ * Callback that gets a node, which is valid until the callback returns. It returns false to stop
+ * the call.
+ */
 typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 
 /*
- * Visits the cut: all nodes that are not replaced, including white ones. The order is front to back
- * of the observer, or, without an observer, depth first by octcode. `complete` is always true.
- * There are no nodes before the root is delivered. Reads nothing. `visit` must not use the stream.
+ * Visits the cut: all delivered nodes that are not replaced by their children, including white
+ * nodes. The order is front to back as seen by the observer, or, without an observer, depth first
+ * by octcode. `complete` is always true. Before the root is delivered, the cut has no nodes. Reads
+ * nothing. `visit` must not use the stream.
  *
  * Threads: one at a time per stream.
  */
@@ -297,15 +317,15 @@ typedef struct ebpo_view_stats {
     /* Number of delivered nodes. */
     uint64_t nodes;
 
-    /* Nodes of the cut, indexed by ebpo_node_type. */
+    /* Number of nodes of the cut by type, indexed by ebpo_node_type. */
     uint64_t cut[4];
 
-    /* Gray nodes of the cut that will be refined. */
+    /* Number of gray nodes of the cut that will be refined. */
     uint64_t waiting;
 
     /*
-     * Size of the largest visible gray node of the cut, which bounds the coarseness of the image.
-     * 0: none is visible. NAN without an observer.
+     * Size in the image (`pixels` of ebpo_view_node) of the largest visible gray node of the cut.
+     * No coarser node is visible. 0: none is visible. NAN without an observer.
      */
     double pixels;
 
