@@ -1,5 +1,6 @@
-/* Reads nodes for drawing, for the WebAssembly module of viewers. A part of a level is the nodes
- * of one subtree; in levels without subtrees, up to EBPO_INDEX_ROWS groups of siblings. All chunks
+/* Reads nodes for drawing, for the WebAssembly module of viewers. A level is read in parts. In
+ * levels that the file stores by subtree, a part is the nodes of one subtree. In other levels, a
+ * part is up to EBPO_INDEX_ROWS (4,096) groups; a group is the eight children of a node. All chunks
  * that a call needs are requested together, as far as their positions are known. */
 #include <stdlib.h>
 #include <string.h>
@@ -23,10 +24,10 @@ enum {
  * it, because the list may arrive late. Returns 1 if the file has such a list. */
 int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
 {
-    ebpo_file *own = ebpo_reader_own(object->file);
-    bool has_checksums = own->has_checksums;
+    ebpo_file *file = ebpo_reader_own(object->file); /* the same file, mutable */
+    bool has_checksums = file->has_checksums;
     object->chunk_memory = (uint64_t)memory;
-    own->has_checksums = false;
+    file->has_checksums = false;
     return has_checksums;
 }
 
@@ -34,11 +35,11 @@ int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
  * chunks. */
 int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
 {
-    ebpo_file *own = ebpo_reader_own(object->file);
-    own->has_checksums = true;
-    ebpo_status status = ebpo_chunk_checksums_read(own, &object->error);
+    ebpo_file *file = ebpo_reader_own(object->file); /* the same file, mutable */
+    file->has_checksums = true;
+    ebpo_status status = ebpo_chunk_checksums_read(file, &object->error);
     if (status == EBPO_E_PENDING)
-        own->has_checksums = false;
+        file->has_checksums = false;
     ebpo_chunks_free(object->chunks);
     object->chunks = NULL;
     return status;
@@ -46,7 +47,8 @@ int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
 
 /* ---- bytes of levels ---- */
 
-/* Array 0: bytes of the file for levels 0 to i, doubles. Reads the chunk directory. */
+/* Puts a double for each level into result array 0: the number of bytes of the file that the header
+ * and all levels down to this level take. Reads the chunk directory. */
 int EBPO_JS(ebpo_js_level_bytes)(ebpo_js_object *object)
 {
     const ebpo_info *info = ebpo_file_info(object->file);
@@ -65,26 +67,29 @@ int EBPO_JS(ebpo_js_level_bytes)(ebpo_js_object *object)
 
 /* Result arrays of ebpo_js_nodes. */
 enum {
-    PART_FACTS,  /* double [13] of each part: level, part, group, groups; by type, white to gray:
-                    rank of the first node; items of PART_COUNTS, PART_PLANES, PART_LEAF_COUNTS,
-                    PART_LEAF_PLANES and PART_COLOURS */
-    PART_TYPES,  /* uint16 of each group */
-    PART_COUNTS, /* uint8 of each gray node: number of planes */
-    PART_PLANES, /* uint32: codes */
-    PART_LEAF_COUNTS,
-    PART_LEAF_PLANES,
-    PART_COLOURS /* uint32 of each gray node; none in files without colours */
+    /* double [13] of each part: [0] level, [1] part, [2] first group, [3] number of groups, [4] to
+     * [7] rank of the first white, black, leaf and gray node, [8] to [12] number of the part's
+     * items in PART_COUNTS, PART_PLANES, PART_LEAF_COUNTS, PART_LEAF_PLANES and PART_COLOURS */
+    PART_FACTS,
+    PART_TYPES,       /* uint16 of each group: types of its eight nodes */
+    PART_COUNTS,      /* uint8 of each gray node: number of planes */
+    PART_PLANES,      /* uint32 of each of these planes: code */
+    PART_LEAF_COUNTS, /* uint8 of each leaf: number of stored planes */
+    PART_LEAF_PLANES, /* uint32 of each of these planes: code */
+    PART_COLOURS      /* uint32 of each gray node; none in files without colours */
 };
 
 typedef struct wanted_part {
-    double level, part; /* part -1: the whole level */
+    double level, part; /* index of the part in the level; -1: the whole level */
 } wanted_part;
 
+/* Returns the number of groups of a level; level 0 has one group, with the root alone. */
 static uint64_t groups_of_level(const ebpo_info *info, int level)
 {
     return level ? info->level[level - 1].gray_count : 1;
 }
 
+/* Sets *run to the groups of a wanted part. */
 static ebpo_status find_run(ebpo_js_object *object, const wanted_part *wanted, ebpo_run *run)
 {
     const ebpo_info *info = ebpo_file_info(object->file);
@@ -106,7 +111,8 @@ static ebpo_status find_run(ebpo_js_object *object, const wanted_part *wanted, e
     return status;
 }
 
-/* Appends the items of an array, and their number to the facts. NULL: none. */
+/* Appends data[count], items of `size` bytes, to result array n, and the number of items to
+ * PART_FACTS. NULL: no items. */
 static bool put_items(ebpo_js_object *object, unsigned n, const void *data, uint64_t count,
                       size_t size)
 {
@@ -115,7 +121,7 @@ static bool put_items(ebpo_js_object *object, unsigned n, const void *data, uint
            ebpo_js_put(object, PART_FACTS, &items, sizeof items) == EBPO_OK;
 }
 
-/* Puts one part, which is all of `level`. */
+/* Appends one part to the result arrays; `l` has only the nodes of this part. */
 static ebpo_status put_part(ebpo_js_object *object, const wanted_part *wanted, const ebpo_run *run,
                             const ebpo_level *l)
 {
@@ -132,6 +138,7 @@ static ebpo_status put_part(ebpo_js_object *object, const wanted_part *wanted, c
     return ok ? EBPO_OK : EBPO_E_MEMORY;
 }
 
+/* Reads a whole level as one part. */
 static ebpo_status read_whole(ebpo_js_object *object, const wanted_part *wanted)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -164,16 +171,17 @@ static ebpo_status read_part(ebpo_js_object *object, const wanted_part *wanted)
     return status;
 }
 
-/* Collects the chunks of parts that are not in memory. A subtree is collected down to its deepest
- * wanted level, once. */
+/* Collects in `hints` the chunks of the wanted parts that are not in memory. wanted[count] has the
+ * levels of a subtree one after another, ascending: the subtree is collected once, down to the
+ * deepest of these levels. */
 static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_part *wanted,
                        uint32_t count)
 {
-    uint32_t without = EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS;
+    uint32_t not_needed = EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS;
     for (uint32_t i = 0; i < count; i++) {
         int level = (int)wanted[i].level;
         if (wanted[i].part < 0)
-            ebpo_hint_level(hints, level, without);
+            ebpo_hint_level(hints, level, not_needed);
         else if (ebpo_subtree_table_has(object->file, level) &&
                  (i + 1 == count || wanted[i + 1].part != wanted[i].part))
             ebpo_subtrees_hint(object->chunks, hints, (uint64_t)wanted[i].part, 1, DRAWN, level,
@@ -181,47 +189,48 @@ static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_p
     }
 }
 
-/* Returns how many of the first parts take at most `bytes` bytes of the file, roughly; at least a
- * few. Parts that are not subtrees are few. */
+/* Returns a number of first parts that together take at most `bytes` bytes of the file, but at
+ * least LEAST parts or all: doubles this number while the parts fit. Parts of levels that are not
+ * stored by subtree are not counted, because such levels are small. */
 static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
                                  double bytes)
 {
     enum { LEAST = 16 };
-    uint32_t most = count < LEAST ? count : LEAST;
-    while (most < count) {
-        uint32_t more = 2 * most < count ? 2 * most : count;
+    uint32_t fitting = count < LEAST ? count : LEAST;
+    while (fitting < count) {
+        uint32_t more = 2 * fitting < count ? 2 * fitting : count;
         ebpo_hints hints = EBPO_HINTS_INIT(object->file);
         hints.counts_bytes = true;
         hint_parts(object, &hints, wanted, more);
         if ((double)ebpo_hints_bytes(&hints) > bytes)
             break;
-        most = more;
+        fitting = more;
     }
-    return most;
+    return fitting;
 }
 
-/* Reads parts of levels: `wanted` is [count] level and part, or -1 for the whole level; the levels
- * of a subtree are adjacent and ascend. Only the first parts that take about `bytes` bytes of the
- * file are read. */
+/* Reads the parts wanted[count] into the result arrays. The levels of one subtree must be adjacent
+ * in `wanted` and ascend. Reads only as many first parts as take about `bytes` bytes of the file.
+ */
 int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
                            double bytes)
 {
     const ebpo_info *info = ebpo_file_info(object->file);
     ebpo_status status = EBPO_OK;
     uint64_t *subtrees = malloc(count * sizeof *subtrees);
-    uint32_t rows = 0, parts = 0;
+    uint32_t subtree_count = 0, partial_count = 0; /* parts that are not whole levels */
     ebpo_js_clear(object);
     if (!subtrees && count)
         return object->error.status = EBPO_E_MEMORY;
     for (uint32_t i = 0; i < count; i++)
-        parts += wanted[i].part >= 0;
-    if (parts)
+        partial_count += wanted[i].part >= 0;
+    if (partial_count)
         status = ebpo_js_need_chunks(object);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
         if (wanted[i].part >= 0 && wanted[i].level > info->subtree_level && info->subtree_level)
-            subtrees[rows++] = (uint64_t)wanted[i].part;
-    if (rows)
-        ebpo_subtree_table_hint(object->chunks, subtrees, rows);
+            subtrees[subtree_count++] = (uint64_t)wanted[i].part;
+    if (subtree_count)
+        ebpo_subtree_table_hint(object->chunks, subtrees, subtree_count);
     free(subtrees);
     if (status != EBPO_OK)
         return status;
@@ -231,7 +240,8 @@ int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, ui
     ebpo_hint_all(&hints);
     for (uint32_t i = 0; i < count && (status == EBPO_OK || status == EBPO_E_PENDING); i++) {
         ebpo_status one = read_part(object, &wanted[i]);
-        status = one == EBPO_OK ? status : one; /* after EBPO_E_PENDING, collects further ranges */
+        /* goes on after EBPO_E_PENDING, so that the missing bytes of all parts are requested */
+        status = one == EBPO_OK ? status : one;
     }
     return status;
 }
