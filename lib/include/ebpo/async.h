@@ -94,8 +94,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_source(ebpo_async *async, ebpo_sou
 EBPO_API uint64_t ebpo_async_begin(ebpo_async *async);
 
 /*
- * Ends an operation, which is complete or given up. Bytes that no running operation has used may
- * then be removed.
+ * Ends an operation that is complete, or that the caller no longer repeats. Bytes that no running
+ * operation has used may then be removed.
  *
  * Threads: any.
  */

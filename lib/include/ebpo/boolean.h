@@ -45,7 +45,7 @@ typedef struct ebpo_boolean_node {
     uint32_t reserved;
 } ebpo_boolean_node;
 
-/* A solid at a pose. A model may be used many times. */
+/* An operand: a solid at a pose. Several operands may use one model. */
 typedef struct ebpo_boolean_operand {
     ebpo_model *model;
     ebpo_pose pose;
@@ -59,7 +59,7 @@ typedef struct ebpo_boolean_operand {
 typedef struct ebpo_boolean_options {
     size_t struct_size;
 
-    /* Number of threads for many points, and for cells. 0: all cores. */
+    /* Number of threads for ebpo_boolean_inside_many and for cells. 0: all cores. */
     unsigned threads;
 
     /* Number of planes. */
@@ -145,8 +145,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, co
                                                        ebpo_boolean_result *out, ebpo_error *error);
 
 /*
- * Classifies points[count][3] into out[count]. The error is about the first failed point,
- * which the message names.
+ * Classifies points[count][3] into out[count]. If queries of several points fail, the error is that
+ * of the first of these points, and the message has the index of the point.
  *
  * Threads: one at a time per expression.
  */
@@ -400,7 +400,8 @@ typedef struct ebpo_boolean_mesh_report {
  * vertices. The mesh is the same for any number of threads.
  *
  * Takes about 40 bytes for each face of one operand at a time and 25 bytes for each face of the
- * mesh, both of which a workspace may hold. Takes also 1,500 bytes for each face that is cut.
+ * mesh, both of which a workspace may hold. In addition, takes 1,500 bytes for each face that is
+ * cut.
  *
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
@@ -458,8 +459,8 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 /*
  * Makes the cells. Each operand is tested in a ball around the cell: first by the white and black
  * nodes of its tree, which usually decide while cells are larger than leaves, then by its faces. An
- * operand that cannot change the result in a cell is not tested in its children. An operand that is
- * used twice counts as two operands, so cells at its boundary are mixed.
+ * operand that cannot change the result in a cell is not tested in the cell's children. An operand
+ * that is used twice counts as two operands, so cells at its boundary are mixed.
  *
  * The cells stay valid after the expression is freed.
  *
@@ -503,8 +504,8 @@ typedef struct ebpo_boolean_volume {
     uint64_t in_cells, mixed_cells;
 
     /*
-     * Number of tests of an operand against a cell that were decided by the operand's box, by its
-     * white and black nodes, and by its faces.
+     * Number of tests of an operand against a cell. by_box: tests that the operand's box decided.
+     * by_nodes: that its white and black nodes decided. by_faces: that its faces decided.
      */
     uint64_t by_box, by_nodes, by_faces;
 
@@ -536,8 +537,8 @@ typedef enum ebpo_boolean_side {
 /*
  * Makes the surface of these cells: squares of the finest level, two triangles each, in doubles.
  * The mesh is closed (ebpo_mesh_report.balanced), with winding numbers 0 and 1. Where cells touch
- * only along an edge or at a corner, it is not a 2-manifold. The mesh may be written or converted:
- * an .ebpo.h5 file of the outer cells, and its envelopes, contain the result.
+ * only along an edge or at a corner, the mesh is not a 2-manifold. The mesh may be written or
+ * converted: an .ebpo.h5 file of the outer cells, and its envelopes, contain the result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells
  *

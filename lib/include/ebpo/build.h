@@ -76,8 +76,8 @@ EBPO_API const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection sel
 /* Distance of two normals for k-medoids. */
 typedef enum ebpo_normal_distance {
     /*
-     * Sum of squared differences of the two spherical coordinates (EBP 2017, equation 4). Has poles
-     * and a seam.
+     * Sum of squared differences of the two spherical coordinates (EBP 2017, equation 4). Near the
+     * poles and the seam of these coordinates, similar normals have large distances.
      */
     EBPO_NORMALS_SPHERICAL = 0,
 
@@ -118,10 +118,10 @@ typedef struct ebpo_build_options {
     uint32_t leaf_faces;
 
     /*
-     * For EBPO_SELECT_INHERIT, 0 to 1; also used for the planes of leaves (EBPO_PART_LEAF_PLANES)
-     * with this selection. A plane is kept if it removes at least this share of the cell, or if it
-     * cuts off a portion of the envelope that extends beyond the plane by a tenth of the cell. In
-     * levels 0 to 4 the share is epsilon / 10, or less where the solid is thin.
+     * Limit of EBPO_SELECT_INHERIT, from 0 to 1; with this selection also for the planes of leaves
+     * (EBPO_PART_LEAF_PLANES). A plane is kept if it removes at least this share of the cell, or if
+     * it cuts off a portion of the envelope that extends beyond the plane by a tenth of the cell.
+     * In levels 0 to 4 the share is epsilon / 10, or less where the solid is thin.
      */
     double epsilon;
 
@@ -139,6 +139,7 @@ typedef struct ebpo_build_options {
 
     unsigned threads;
 
+    /* Selection of the planes of envelopes. */
     ebpo_selection select;
 
     /*
@@ -155,10 +156,10 @@ typedef struct ebpo_build_options {
      */
     double k_root;
 
-    /* For EBPO_SELECT_KMEDOIDS. */
+    /* Distance of normals for EBPO_SELECT_KMEDOIDS. */
     ebpo_normal_distance normals;
 
-    /* For EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM: equal seeds give equal files. */
+    /* Seed for EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM; equal seeds give equal files. */
     uint64_t seed;
 
     /*
@@ -169,7 +170,7 @@ typedef struct ebpo_build_options {
 
     ebpo_progress progress;
 
-    /* Filled in if not NULL. */
+    /* Receives the times of the steps; NULL: times are not measured. */
     ebpo_build_times *times;
 } ebpo_build_options;
 
@@ -269,8 +270,8 @@ typedef struct ebpo_thesis_levels {
  * report    as for ebpo_build
  * options   as for ebpo_build; parts are ignored
  *
- * EBPO_E_ARGUMENT: an option is out of range, or the selection is none of the theses. Other errors:
- * as ebpo_build.
+ * EBPO_E_ARGUMENT: an option is out of range, or the selection is not one of the theses. Other
+ * errors are those of ebpo_build.
  *
  * Threads: one at a time per mesh.
  */

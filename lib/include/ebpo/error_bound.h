@@ -49,7 +49,7 @@ typedef struct ebpo_error_bound_options {
         sizeof(ebpo_error_bound_options), 0.05, 20000, 1, 0, 0, { NULL, NULL }, 0 \
     }
 
-/* Lengths are in the model's unit. */
+/* Error bound of a level, and statistics. Lengths are in the model's unit. */
 typedef struct ebpo_error_bound {
     size_t struct_size;
 

@@ -98,18 +98,25 @@ typedef enum ebpo_face_coding {
  * does not have its part.
  */
 typedef struct ebpo_level {
-    /* Groups of eight siblings. Level 0 has one group, of which only octant 0 exists. */
+    /*
+     * Number of groups of eight siblings. Level 0 has one group, of which only octant 0 (the root)
+     * exists.
+     */
     uint64_t group_count;
 
+    /* Number of nodes of each type. */
     uint64_t gray_count, leaf_count, white_count, black_count;
 
     /* [group_count] type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
     uint16_t *types;
 
-    /* [gray_count] number of planes that bound this envelope besides those of all ancestors */
+    /*
+     * [gray_count] number of planes that bound the envelope of this node, without the planes of all
+     * ancestors
+     */
     uint8_t *plane_counts;
 
-    /* [plane_count] codes (ebpo_plane_decode), in the order of the nodes */
+    /* [plane_count] plane codes (ebpo_plane_decode), in the order of the nodes */
     uint32_t *planes;
 
     uint64_t plane_count;
@@ -159,7 +166,7 @@ typedef struct ebpo_level {
     /* [leaf_count] number of planes of each leaf; part EBPO_PART_LEAF_PLANES */
     uint8_t *leaf_plane_counts;
 
-    /* [leaf_plane_count] codes, in the order of the leaves */
+    /* [leaf_plane_count] plane codes, in the order of the leaves */
     uint32_t *leaf_planes;
 
     uint64_t leaf_plane_count;
@@ -168,9 +175,9 @@ typedef struct ebpo_level {
     double gray_volume;
 
     /*
-     * Volume of the envelopes of this level's leaves. They are cut by the stored planes of the
-     * leaves, or only by the planes of their ancestors if no planes of leaves are stored. Planes
-     * that readers derive from faces cut off more.
+     * Volume of the envelopes of this level's leaves. The envelopes are cut by the stored planes of
+     * the leaves, or only by the planes of the leaves' ancestors if no planes of leaves are stored.
+     * With planes that readers derive from faces, the envelopes are smaller.
      */
     double leaf_volume;
 
@@ -181,7 +188,7 @@ typedef struct ebpo_level {
      */
     uint64_t pruned_count;
 
-    /* Owns all arrays. NULL: they were allocated with malloc. */
+    /* Workspace that owns all arrays. NULL: the arrays were allocated with malloc. */
     ebpo_workspace *workspace;
 
     /*
@@ -210,6 +217,7 @@ EBPO_API bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d);
 
 /* Summary of a level, from the header of the file. */
 typedef struct ebpo_level_summary {
+    /* Number of nodes of each type, of planes of gray nodes, and of stored planes of leaves. */
     uint64_t gray_count, leaf_count, white_count, black_count;
     uint64_t plane_count, leaf_plane_count;
 
@@ -219,9 +227,13 @@ typedef struct ebpo_level_summary {
     /* Number of references of this level's leaves to other faces, as in ebpo_level. */
     uint64_t ref_count;
 
+    /* As in ebpo_level. */
     double gray_volume, leaf_volume;
 
-    /* Number of pruned gray nodes. `white_count` of the next level includes eight for each. */
+    /*
+     * Number of pruned gray nodes. `white_count` of the next level includes eight nodes for each
+     * pruned node.
+     */
     uint64_t pruned_count;
 } ebpo_level_summary;
 
@@ -230,30 +242,38 @@ typedef struct ebpo_info {
     /* Version of the format. */
     int version_major, version_minor;
 
-    /* Name and version of the program that built the model; copies keep it. */
+    /*
+     * Name and version of the program that built the model; repacked files and subsets keep this
+     * text.
+     */
     char generator[64];
 
-    /* The mesh file that was converted. */
+    /* Name, format, SHA-256 and size of the mesh file that was converted. */
     char source_name[256], source_format[16];
     uint8_t source_sha256[32];
     uint64_t source_size;
 
-    /* "" if not given. */
+    /*
+     * Unit of the coordinates, coordinate reference system and date of the data; "" if not given.
+     */
     char unit[32], crs[256], date[32];
 
     /* True for a solid, false for a surface. */
     bool solid;
 
+    /*
+     * Rule that decides which points are inside. double_coordinates: true: doubles; false: floats.
+     */
     ebpo_rule rule;
     bool double_coordinates;
 
-    /* Counts of the mesh in the file. */
+    /* Number of vertices and faces of the mesh in the file. */
     uint64_t vertex_count, face_count;
 
-    /* Counts before repairs. */
+    /* Number of vertices and faces of the source, before repairs. */
     uint64_t source_vertex_count, source_face_count;
 
-    /* Root cell. */
+    /* Lowest corner and size of the root cell, in the model's unit. */
     double box_origin[3], box_size[3];
 
     /* Deepest level for which the coordinates of cells are exact. */
@@ -281,17 +301,22 @@ typedef struct ebpo_info {
     /* ebpo_normal_distance, for EBPO_SELECT_KMEDOIDS. */
     int normals;
 
-    /* For EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM; else 0. */
+    /* Seed of EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM; else 0. */
     uint64_t seed;
 
+    /* Repairs that were made before the conversion. */
     ebpo_repair_record repair_record;
 
-    /* Counts and measures of defects. The locations of defects are not stored. */
+    /*
+     * Counts of the findings of the mesh check, and measures. The locations of findings are not
+     * stored.
+     */
     ebpo_mesh_report report;
 
     /* ebpo_part bits */
     uint32_t parts;
 
+    /* Compression of the chunks, and content checksum (format-spec/README.md). */
     ebpo_codec codec;
     uint8_t content_sha256[32];
 
@@ -323,7 +348,7 @@ typedef struct ebpo_info {
     /* Levels 0 .. cut_levels - 1 were kept; 0: all. */
     int cut_levels;
 
-    /* Nodes that do not intersect kept_box (min, max) were omitted. */
+    /* True: nodes that do not intersect kept_box (min, then max) were omitted. */
     bool boxed;
     double kept_box[6];
 
@@ -336,13 +361,15 @@ typedef struct ebpo_info {
     /* content_sha256 of the original file; for a subset of a subset, of the first file. */
     uint8_t subset_of[32];
 
+    /* Summaries of levels 0 .. level_count - 1. */
     ebpo_level_summary level[EBPO_LEVELS_MAX];
 
-    /* Size of the file, and number of bytes before the first level. Set when reading. */
+    /* Size of the file, and number of bytes before the first level. Set when a file is opened. */
     uint64_t file_bytes, head_bytes;
 
     /*
-     * First level whose reading needs HDF5's chunk indexes. level_count: none. Set when reading.
+     * First level whose reading needs HDF5's chunk indexes. level_count: no level needs them. Set
+     * when a file is opened.
      */
     int index_level;
 
@@ -353,8 +380,9 @@ typedef struct ebpo_info {
     bool gates;
 
     /*
-     * The border of a surface, with EBPO_PART_BORDER: number of loops, of points in all loops, of
-     * points in the longest loop; area of the triangles that close the loops; checksum.
+     * The border of a surface, with EBPO_PART_BORDER: number of loops, number of points in all
+     * loops, number of points in the longest loop; area of the triangles that close the loops;
+     * checksum.
      */
     uint64_t border_loops, border_points, border_longest;
     double border_area;
@@ -373,7 +401,10 @@ typedef struct ebpo_info {
 typedef struct ebpo_border_loops {
     uint64_t loop_count, point_count;
 
-    /* [loop_count][2] number of points of each loop, at least 3; its weight, at least 1 */
+    /*
+     * [loop_count][2] of each loop: number of points, at least 3; weight (format-spec/border.md),
+     * at least 1
+     */
     uint32_t *loop;
 
     /* [point_count][3] coordinates, loop after loop */
@@ -400,9 +431,9 @@ typedef struct ebpo_surface {
     uint64_t patch_count, triangle_count, vertex_count, code_bytes, colour_count;
     uint64_t *patch; /* [patch_count][EBPO_PATCH_COLUMNS] */
     uint8_t *code;   /* [code_bytes] triangles, patch after patch */
-    uint16_t *point; /* [vertex_count][3] */
-    uint8_t *normal; /* [vertex_count][2] */
-    uint8_t *colour; /* [colour_count][3], or NULL */
+    uint16_t *point; /* [vertex_count][3] coordinates, coded */
+    uint8_t *normal; /* [vertex_count][2] unit normals, coded */
+    uint8_t *colour; /* [colour_count][3] red, green and blue; or NULL */
 } ebpo_surface;
 
 /*
@@ -424,7 +455,10 @@ typedef struct ebpo_tree {
      */
     uint32_t *face_source;
 
-    /* Owns vertex_source and face_source. NULL: they were allocated with malloc. */
+    /*
+     * Workspace that owns vertex_source and face_source. NULL: these arrays were allocated with
+     * malloc.
+     */
     ebpo_workspace *workspace;
 
     /* With EBPO_PART_BORDER; the arrays were allocated with malloc. */
@@ -460,8 +494,8 @@ typedef struct ebpo_write_options {
     ebpo_codec codec;
 
     /*
-     * 0: the default. For deflate: 6. For zstd: 3 for chunks of less than 4 KiB; 7 for larger
-     * chunks, with a minimum match length of six bytes.
+     * Compression level. 0: the default, which is 6 for deflate; for zstd, 3 for chunks of less
+     * than 4 KiB, and 7 for larger chunks, with a minimum match length of six bytes.
      */
     int codec_level;
 
@@ -475,7 +509,7 @@ typedef struct ebpo_write_options {
     /*
      * Selects the level whose gray nodes are the roots of subtrees (format-spec/subtrees.md): the
      * deepest level whose gray nodes have, on average, at least this number of faces; level 1 if
-     * there is none. The data of a subtree is contiguous, so that one read loads it.
+     * there is no such level. The data of a subtree is contiguous, so that one read loads it.
      *
      * 0 (default): as 1,024, but the file has no subtrees if no level reaches this number, or if
      * the mesh has fewer than 131,072 faces.
@@ -552,8 +586,8 @@ typedef struct ebpo_source {
     /*
      * With `prefetch`: number of bytes at the beginning of the file that are already available. If
      * this number is more than 0 and less than `size`, opening reads only these bytes; the chunk
-     * offsets of arrays with several chunks are then read when needed, or by ebpo_file_locate.
-     * Otherwise opening reads whatever it needs.
+     * offsets of arrays with several chunks are read later, when needed, or by ebpo_file_locate.
+     * With 0 or `size`, opening also reads all chunk offsets.
      */
     uint64_t prefetched;
 } ebpo_source;
@@ -563,13 +597,14 @@ typedef struct ebpo_source {
 /* ---- opening ---- */
 
 /*
- * An open file. This object does not change, so any number of threads may use it at the same time.
+ * An open file. An ebpo_file does not change, so any number of threads may use one file at the same
+ * time.
  */
 typedef struct ebpo_file ebpo_file;
 
 /*
  * Opens a file by its path or URL (http.h) and reads only its header: metadata and chunk offsets.
- * Neither this nor later reading uses libhdf5 or its plugins.
+ * Neither opening nor later reading uses libhdf5 or its plugins.
  *
  * Safe for untrusted files: for any bytes, memory accesses stay within allocations, and no code is
  * loaded or executed. Results are computed from the data in the file, so a manipulated file can
@@ -715,7 +750,7 @@ EBPO_API void ebpo_close(ebpo_file *file);
  */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
 
-/* Sums since opening, including the reading of the header. */
+/* Statistics of requests to the source since opening, including the reading of the header. */
 typedef struct ebpo_file_stats {
     size_t struct_size;
 
@@ -877,8 +912,9 @@ typedef struct ebpo_read_options {
     }
 
 /*
- * The caller owns the results of reading and frees them with the function for their type. On
- * failure they are cleared. All can return EBPO_E_IO and EBPO_E_FORMAT.
+ * Rules for the reading functions: the caller owns the results and frees them with the function for
+ * their type. On failure the results are cleared. All these functions can return EBPO_E_IO and
+ * EBPO_E_FORMAT.
  */
 
 /*
@@ -902,12 +938,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_mesh(const ebpo_file *file,
                                                        const ebpo_read_options *options,
                                                        ebpo_mesh *out, ebpo_error *error);
 
-/* Indices in the source. */
+/* Source indices: index of each vertex and face in the mesh that was converted. */
 typedef struct ebpo_maps {
-    /* [vertex_count] */
+    /* [vertex_count] source index of each vertex */
     uint32_t *vertex_source;
 
-    /* [face_count] */
+    /* [face_count] source index of each face */
     uint32_t *face_source;
 
     /* Owns both arrays; NULL: allocated with malloc. */
@@ -1030,7 +1066,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
  * Writes the whole content of a file to a new file with the layout of `write` (codec, subtrees;
  * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before the
  * replacement the new file is read again. It must have the content_sha256 of `file`, so the content
- * of `file` is checked too. The whole model is in memory, limited by the workspace of `read`.
+ * of `file` is checked too. The whole model is loaded into memory, which the workspace of `read`
+ * limits.
  *
  * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the content
  * is correct, but this library would write the arrays in another way (for example, another program

@@ -35,7 +35,7 @@ typedef struct ebpo_mesh_group {
     /* Number of faces. 0: the file contains the name, but the group has no faces. */
     uint64_t face_count;
 
-    /* Lowest source index of its faces. */
+    /* Lowest source index of the group's faces. */
     uint64_t first_face;
 } ebpo_mesh_group;
 

@@ -25,12 +25,12 @@
  * through no face, at any speed, and however thin the solid is. Faces count from both sides, so
  * surfaces work like solids.
  *
- * A *haptic step* is one cycle of the force computation. It uses only data in memory: a limited
- * number of faces in a box around the device. It takes no lock, allocates no memory and reads no
- * file. A separate thread loads the next box ahead of the device, and passes the box to the steps
- * by one atomic exchange. If the device leaves the box before the next one is loaded, the proxy
- * waits at the boundary of the box (EBPO_HAPTIC_WAITING), so deadlines are kept. If no further box
- * can be loaded, because reading failed or there are too many faces, steps report
+ * A *haptic step* is one cycle of the force computation. A step uses only data in memory: a limited
+ * number of faces in a box around the device. A step takes no lock, allocates no memory and reads
+ * no file. A separate thread loads the next box ahead of the device, and passes the box to the
+ * steps by one atomic exchange. If the device leaves the box before the next one is loaded, the
+ * proxy waits at the boundary of the box (EBPO_HAPTIC_WAITING), so deadlines are kept. If no
+ * further box can be loaded, because reading failed or there are too many faces, steps report
  * EBPO_HAPTIC_STOPPED.
  *
  * Methods: EBP 2017, section 4.5; Zilles and Salisbury 1995 (proxy that is a point, "god-object");
@@ -62,15 +62,15 @@ typedef struct ebpo_haptic_options {
     /*
      * Radius of the ball in the model's unit, at least 0. 0: a point. `faces` must be large enough
      * for all faces within the radius plus `search_radius` of the device. A step tests at most 512
-     * of these, in the order in which the ball may touch them; the next steps continue with the
-     * others.
+     * of these faces, in the order in which the ball may touch them; the next steps continue with
+     * the other faces.
      */
     double radius;
 
     /*
      * Additional distance that the proxy keeps from faces because of rounding, in the model's unit.
-     * 0: 2^-20 of the diagonal of the model's root cell. Else at least 2^-30 of this diagonal, and
-     * at least 2^-42 of the coordinates and of the radius.
+     * 0: 2^-20 of the diagonal of the model's root cell. Another value must be at least 2^-30 of
+     * this diagonal, and at least 2^-42 of the coordinates and of the radius.
      */
     double skin;
 
@@ -83,8 +83,8 @@ typedef struct ebpo_haptic_options {
     double search_radius;
 
     /*
-     * Stiffness: force per unit of depth. Damping: force per unit of device speed (units per
-     * second) during contact. Both at least 0.
+     * stiffness: force per unit of depth. damping: force per unit of device speed (units per
+     * second) during contact. Both are at least 0.
      */
     double stiffness, damping;
 
@@ -132,7 +132,7 @@ typedef struct ebpo_haptic_options {
  * position. EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of reading
  * (base.h).
  *
- * Threads: any; one more is started.
+ * Threads: any; the function starts another thread.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
                                                    const ebpo_haptic_options *options,
@@ -201,10 +201,10 @@ typedef struct ebpo_haptic_ball_result {
 
     /*
      * In contact: length of the vector from proxy to device; with EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_PATH_UNFINISHED, only of the part of this vector that faces prevent. Otherwise
-     * minus the distance from the ball to the nearest face; or minus `search_radius` if no face is
-     * within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face that was not tested may be
-     * nearer.
+     * EBPO_HAPTIC_PATH_UNFINISHED, length of that part of the vector that faces prevent. Without
+     * contact: minus the distance from the ball to the nearest face, or minus `search_radius` if no
+     * face is within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face that was not tested
+     * may be nearer.
      */
     double depth;
 
@@ -240,7 +240,7 @@ typedef struct ebpo_haptic_ball_result {
 EBPO_API void ebpo_haptic_step_ball(ebpo_haptic *haptic, const double device[3],
                                     ebpo_haptic_ball_result *out);
 
-/* Maximum number of points of a path. */
+/* Maximum number of points (or poses) of a proxy's path in one step. */
 enum { EBPO_HAPTIC_PATH_MAX = 17 };
 
 /*
@@ -266,8 +266,8 @@ EBPO_API uint32_t ebpo_haptic_tool_path(const ebpo_haptic *haptic,
 typedef struct ebpo_haptic_probe_result {
     /*
      * Signed distance, negative inside a solid. With EBPO_HAPTIC_ACCURATE: correct except for a few
-     * rounding errors of the coordinates. Otherwise NAN: only the bounds are known. ebpo_map_colour
-     * (map.h) converts a distance to a colour.
+     * rounding errors of the coordinates. Without this flag: NAN, only the bounds are known.
+     * ebpo_map_colour (map.h) converts a distance to a colour.
      */
     double distance;
 
@@ -359,12 +359,13 @@ typedef struct ebpo_haptic_tool_result {
  * A rotation counts as its angle times the arm of the tool, the root mean square distance of the
  * points from the tool's position. Among all motions that the contacts allow, the proxy makes the
  * motion that ends nearest to the device. Force and torque are those of a spring of `stiffness` for
- * the prevented motion (for an angle, stiffness times arm^2). They are reduced as in
- * ebpo_haptic_step_ball to bound the energy, with rotations as lengths.
+ * the prevented motion (for an angle, stiffness times arm^2). As in ebpo_haptic_step_ball, force
+ * and torque are reduced to bound the energy; rotations count as lengths.
  *
  * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near a face since their
- * last test take almost no time. If many points are near and the work exceeds a step, the next
- * steps continue it (EBPO_HAPTIC_PATH_UNFINISHED), and the tool does not move until then.
+ * last test take almost no time. If many points are near faces and the work exceeds a step, the
+ * next steps continue the work (EBPO_HAPTIC_PATH_UNFINISHED), and the tool does not move until the
+ * work is done.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
@@ -396,34 +397,38 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const 
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_check(ebpo_haptic *haptic, ebpo_error *error);
 
-/* Sums since the object was made. */
+/* Statistics of a haptic object since it was made. */
 typedef struct ebpo_haptic_stats {
     size_t struct_size;
 
+    /* Number of steps. */
     uint64_t step_count;
 
     /* Number of steps with each of these flags. */
     uint64_t contacts, waiting, path_unfinished, faces_omitted;
 
     /*
-     * Number of boxes loaded, of boxes used by steps, and of boxes cancelled because of too many
-     * faces.
+     * loads: number of boxes loaded. taken: number of boxes that steps used. too_many: number of
+     * boxes that were not completed, because they had too many faces.
      */
     uint64_t loads, taken, too_many;
 
-    /* Faces of the current box; maximum number of faces tested in a step. */
+    /*
+     * faces: number of faces of the current box. work_max: maximum number of faces tested in a
+     * step.
+     */
     uint64_t faces, work_max;
 
     /*
-     * Energy given to the device by forces minus energy taken from the device; the maximum of this
-     * difference over time; longest step of the device.
+     * energy: energy given to the device by forces minus energy taken from the device. energy_max:
+     * maximum of this difference over time. longest_step: longest motion of the device in one step.
      */
     double energy, energy_max, longest_step;
 
     /* Memory of the boxes in bytes. */
     uint64_t memory;
 
-    /* Seconds of loading: total, and maximum for one box. */
+    /* load_seconds: time of loading, in total. load_seconds_max: maximum for one box. */
     double load_seconds, load_seconds_max;
 
     /* Number of steps with EBPO_HAPTIC_STOPPED. */

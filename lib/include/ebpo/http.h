@@ -14,8 +14,8 @@
  * requests of up to 4 MiB, several at a time.
  *
  * Every response is checked: its range, its size, and the version of the file, which must be the
- * version of the opened file. The version is the size and the ETag, weak or not; without ETag,
- * Last-Modified.
+ * version of the opened file. The version is the size with the ETag (weak or not) or, if there is
+ * no ETag, with Last-Modified.
  *
  * Without libcurl the functions return EBPO_E_UNSUPPORTED.
  */
@@ -60,8 +60,8 @@ typedef struct ebpo_http_options {
     unsigned connections;
 
     /*
-     * Memory limit in bytes for prefetched and recently read data. It is exceeded while readers
-     * wait for responses of up to 4 MiB. Not part of a model's budget.
+     * Memory limit in bytes for prefetched and recently read data. While readers wait for responses
+     * of up to 4 MiB, the limit may be exceeded. This memory is not part of a model's budget.
      */
     uint64_t memory;
 
@@ -97,8 +97,8 @@ typedef struct ebpo_http_options {
     const char *user_agent;
 
     /*
-     * Headers "Name: value", terminated by NULL, sent with every request; or NULL. They are not
-     * sent after a redirect to another host, port or scheme.
+     * Headers "Name: value", an array terminated by NULL, sent with every request; or NULL. These
+     * headers are not sent after a redirect to another host, port or scheme.
      */
     const char *const *headers;
 
@@ -134,7 +134,7 @@ typedef struct ebpo_http_options {
             false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL, 0, 0 \
     }
 
-/* Sums since opening. */
+/* Statistics of network transfers since opening. */
 typedef struct ebpo_http_stats {
     size_t struct_size;
 
@@ -150,12 +150,15 @@ typedef struct ebpo_http_stats {
     /* Bytes received in the bodies of responses. */
     uint64_t bytes;
 
-    /* Number of requests that the cache folder served completely, and bytes served from it. */
+    /*
+     * cache_hits: number of requests that the cache folder served completely. cache_bytes: bytes
+     * served from the cache folder.
+     */
     uint64_t cache_hits, cache_bytes;
 
     /*
-     * Bytes in the cache folder at opening: of this version of the file, and of other files and
-     * versions.
+     * Bytes in the cache folder at opening. cache_held: of this version of the file. cache_others:
+     * of other files and versions.
      */
     uint64_t cache_held, cache_others;
 

@@ -30,7 +30,10 @@ typedef struct ebpo_limit_options {
         sizeof(ebpo_limit_options), 0, { NULL, NULL }, 0 \
     }
 
-/* Volumes are in cubic units of the model, or in root cells if requested. */
+/*
+ * Result of ebpo_limit_level. Volumes are in cubic units of the model, or as fractions of the root
+ * cell (ebpo_limit_options).
+ */
 typedef struct ebpo_limit {
     size_t struct_size;
 
@@ -40,7 +43,7 @@ typedef struct ebpo_limit {
      */
     double volume;
 
-    /* Volume of the level's gray nodes. */
+    /* Volume of the hulls of the level's gray nodes alone. */
     double gray_volume;
 
     /* Number of computed hulls. */

@@ -56,14 +56,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int lev
 
 /* One node of a level's envelopes. */
 typedef struct ebpo_lod_node {
+    /* Path from the root to the node, as in ebpo_stream_node (stream.h). */
     uint64_t octcode;
 
     /* Volume of the envelope, in cubic units of the model. */
     double volume;
 
     /*
-     * Winding number. Black: in the cell. Leaf: at the lowest corner. 0 for gray nodes, and for
-     * nodes of surfaces.
+     * Winding number. Black nodes: that of all points in the cell. Leaves: that of the lowest
+     * corner. 0 for gray nodes, and for nodes of surfaces.
      */
     int32_t winding;
 
@@ -93,7 +94,7 @@ typedef struct ebpo_lod_node {
 typedef struct ebpo_lod_nodes {
     uint64_t node_count, polygon_count;
 
-    /* [node_count] */
+    /* [node_count] descriptions of the nodes */
     ebpo_lod_node *nodes;
 
     /* [polygon_count] number of corners of each polygon, in the order of the nodes */

@@ -27,8 +27,8 @@ typedef struct ebpo_map_options {
     size_t struct_size;
 
     /*
-     * Points farther away than this get INFINITY; a smaller value is faster. In the model's unit;
-     * at least 0.
+     * Points farther away from the model than this get INFINITY; a smaller value is faster. In the
+     * model's unit; at least 0.
      */
     double max_distance;
 
@@ -66,8 +66,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_points(ebpo_model *model, const doub
                                                    double *distances, ebpo_error *error);
 
 /*
- * Points in rows, columns and layers: origin + i step[0] + j step[1] + k step[2], each product and
- * each sum rounded in this order. A plane has count[2] == 1.
+ * Points in rows, columns and layers: origin + i step[0] + j step[1] + k step[2] for i, j, k from 0
+ * to count - 1 each. Each product and each sum is rounded, in this order. A plane has count[2] ==
+ * 1.
  */
 typedef struct ebpo_lattice {
     double origin[3], step[3][3];
@@ -117,18 +118,25 @@ enum { EBPO_MAP_PERCENTILES = 7 };
 typedef struct ebpo_map_stats {
     size_t struct_size;
 
-    /* Number of finite values, and of values beyond max_distance (not finite). */
+    /*
+     * count: number of finite values. beyond: number of values that are not finite, because the
+     * point is beyond max_distance.
+     */
     uint64_t count, beyond;
 
-    /* Number of values below 0, and equal to 0. */
+    /* inside: number of values below 0. on: number of values equal to 0. */
     uint64_t inside, on;
 
+    /* Least and greatest value. */
     double min, max;
 
     /* Maximum absolute value: the one-sided Hausdorff distance of the points. */
     double farthest;
 
-    /* Mean of the values; mean of absolute values; root mean square; standard deviation. */
+    /*
+     * mean: mean of the values. mean_unsigned: mean of the absolute values. rms: root mean square.
+     * standard_deviation: of the values.
+     */
     double mean, mean_unsigned, rms, standard_deviation;
 
     /*
@@ -193,6 +201,7 @@ typedef struct ebpo_map_hausdorff {
     /* Point on a face of the mesh, at distance lo from the model. */
     double location[3];
 
+    /* Number of distances that were computed. */
     uint64_t queries;
 } ebpo_map_hausdorff;
 
@@ -250,7 +259,8 @@ EBPO_API void ebpo_map_colour(ebpo_map_palette palette, double distance, double 
 
 /*
  * Adds distances and colours of vertices to a mesh, as attributes `distance` (float64) and `red`,
- * `green`, `blue` (uint8). They replace attributes of these names; ebpo_mesh_write_ply writes them.
+ * `green`, `blue` (uint8). Attributes of these names are replaced. ebpo_mesh_write_ply writes the
+ * attributes.
  *
  * distances   [vertex_count]
  * range       above 0 and finite

@@ -40,6 +40,7 @@ typedef enum ebpo_attribute_type {
  * with malloc. Free the mesh with ebpo_mesh_free.
  */
 typedef struct ebpo_mesh {
+    /* Number of vertices and of faces (triangles). */
     uint64_t vertex_count;
     uint64_t face_count;
 
@@ -57,7 +58,7 @@ typedef struct ebpo_mesh {
     /*
      * Numbers of faces of the source that reading changed.
      * - polygons_triangulated: polygons of more than three corners.
-     * - polygons_concave: concave polygons among these.
+     * - polygons_concave: concave polygons among polygons_triangulated.
      * - strips: triangle strips.
      * - polygons_dropped: omitted faces of fewer than three corners.
      */
@@ -166,7 +167,10 @@ typedef struct ebpo_mesh_read_options {
      */
     uint64_t attributes;
 
-    /* 1, with `attributes`: also reads the bytes of these images. 0: does not read them. */
+    /*
+     * 1, with `attributes`: also reads the bytes of the texture images. 0: does not read these
+     * bytes.
+     */
     uint64_t embed_textures;
 } ebpo_mesh_read_options;
 
@@ -179,10 +183,10 @@ typedef struct ebpo_mesh_read_options {
  * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes, else by the file
  * name, else by the first word (OBJ).
  *
- * Polygons are triangulated, including concave ones and those that touch themselves (slits, bridges
- * to holes, pinched corners). A polygon whose outline crosses itself, such as a folded quad, is
- * counted in `polygons_guessed`; if it has at most 64 corners, it gets the triangles of least area.
- * Triangle strips are converted to triangles.
+ * Polygons are triangulated, including concave polygons and polygons that touch themselves (slits,
+ * bridges to holes, pinched corners). A polygon whose outline crosses itself, such as a folded
+ * quad, is counted in `polygons_guessed`; if it has at most 64 corners, it gets the triangles of
+ * least area. Triangle strips are converted to triangles.
  *
  * Binary coordinates keep every bit. Text of a PLY file is rounded correctly to the type in the
  * header. Text of other formats becomes floats if floats represent every coordinate, and doubles
@@ -191,8 +195,8 @@ typedef struct ebpo_mesh_read_options {
  * unreferenced vertices are omitted. In PLY files, unreferenced vertices are omitted if their
  * coordinates are not finite. ebpo_mesh_ignored describes data that was omitted or rounded.
  *
- * Safe for untrusted files. The whole file is read into memory, or with `workspace` into one of its
- * arrays.
+ * Safe for untrusted files. The whole file is read into memory; with `workspace`, into an array of
+ * the workspace, which may be a temporary file.
  *
  * EBPO_E_IO: also if another program changes the file during reading. EBPO_E_FORMAT: not a mesh, or
  * damaged. EBPO_E_LIMIT: too large. EBPO_E_UNSUPPORTED: a variant that is not supported, such as
@@ -239,8 +243,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, co
 
 #define EBPO_FINDING_LOCATIONS 4
 
-/* Number of findings of one kind, and the source indices of the first ones. */
+/*
+ * Number of findings of one kind, and the source indices of the first findings. A *finding* is a
+ * property of one edge, vertex or face that is often a defect, such as an edge that only one face
+ * uses.
+ */
 typedef struct ebpo_finding {
+    /* Number of findings of this kind. */
     uint64_t count;
 
     /* First min(count, EBPO_FINDING_LOCATIONS) indices, ascending. */
@@ -273,8 +282,8 @@ typedef struct ebpo_mesh_report {
     ebpo_finding misoriented_edges;
 
     /*
-     * Edges that are not used equally often in both directions. They are among the three previous
-     * kinds.
+     * Edges that are not used equally often in both directions. Each of these edges also belongs to
+     * one of the three previous kinds.
      */
     ebpo_finding unbalanced_edges;
 
@@ -301,6 +310,7 @@ typedef struct ebpo_mesh_report {
     /* Vertices at the position of an earlier vertex. */
     ebpo_finding repeated_positions;
 
+    /* Number of edges. */
     uint64_t edges;
 
     /*
@@ -318,7 +328,7 @@ typedef struct ebpo_mesh_report {
     bool genus_known;
     int64_t genus;
 
-    /* Area, in square units of the source. */
+    /* Sum of the areas of all faces, in square units of the source. */
     double area;
 
     /*
@@ -330,7 +340,7 @@ typedef struct ebpo_mesh_report {
     /* Mean edge length of EBP 2017, equation 3. */
     double mean_edge;
 
-    /* Bounds of the referenced vertices. */
+    /* Bounding box of the referenced vertices. */
     double min[3], max[3];
 } ebpo_mesh_report;
 
@@ -365,12 +375,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned t
 
 /* Repairs that were made. ebpo_build stores them in the file. */
 typedef struct ebpo_repair_record {
-    /* Requested steps. */
+    /* True for each repair that was requested. */
     bool weld, orient, fill_holes, drop_duplicates;
 
     /* Vertices removed because an earlier vertex has the same position. */
     uint64_t welded_vertices;
 
+    /* Faces that were reversed. */
     uint64_t flipped_faces;
 
     /*
@@ -379,9 +390,10 @@ typedef struct ebpo_repair_record {
      */
     uint64_t unorientable_components;
 
+    /* Holes that were closed by faces. */
     uint64_t filled_holes;
 
-    /* Faces that fill holes; at the end of the list of faces. */
+    /* Faces that fill holes. These faces are the last ones of the mesh. */
     uint64_t added_faces;
 
     /* Chains of boundary edges that are not simple loops. */
@@ -405,16 +417,17 @@ typedef struct ebpo_repair_record {
 } ebpo_repair_record;
 
 /*
- * Rules for the repair functions: each function adds its counts to `record`. The caller clears
- * `record` first; NULL is allowed. The functions use all cores.
+ * Rules for the repair functions: each function adds its counts to `record`, which the caller has
+ * cleared; `record` may be NULL. The functions use all cores.
  *
  * EBPO_E_FORMAT: a vertex index is out of range. EBPO_E_LIMIT: more than 2^32 - 2 faces. EBPO_E_IO.
  * On failure the mesh is unchanged.
  */
 
 /*
- * Merges vertices of equal position (-0 equals 0), including unreferenced ones. The first vertex of
- * each group stays, and the order is kept. Faces that then use a vertex twice stay.
+ * Merges vertices of equal position (-0 equals 0), including unreferenced ones. Of vertices at one
+ * position, the first one stays; the order of vertices is kept. Faces that then use a vertex twice
+ * stay.
  *
  * Threads: one at a time per mesh.
  */
@@ -435,8 +448,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_r
  * distance   in the mesh's unit; above 0, and less than the longest side of the bounding box of all
  *            vertices
  *
- * EBPO_E_ARGUMENT: the distance is out of range, or below 2^-49 of that side. On failure the mesh
- * is valid; vertices of equal position may have been merged.
+ * EBPO_E_ARGUMENT: the distance is out of range, or below 2^-49 of the box's longest side. On
+ * failure the mesh is valid; vertices of equal position may have been merged.
  *
  * Threads: one at a time per mesh.
  */
@@ -490,11 +503,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  *
  * A patch may be open at edges that are used more than twice. Example: each of two stacked cubes
  * has its own faces in the common square, so four faces use each side of the square. The square of
- * a cube is one patch and its other sides are another one, and both are open. Such patches are
- * joined at these edges. The faces at an edge are sorted by their angle around the edge, and each
- * face gets the direction opposite to that of the previous face. The angles are compared exactly;
- * faces at the same angle are ordered by source index. Faces that already alternate are unchanged.
- * Joined patches are a shell if they use each edge equally often in both directions.
+ * a cube is one patch, the other five sides of the cube are another patch, and both patches are
+ * open. Such patches are joined at these edges. The faces at an edge are sorted by their angle
+ * around the edge, and each face gets the direction opposite to that of the previous face. The
+ * angles are compared exactly; faces at the same angle are ordered by source index. Faces that
+ * already alternate are unchanged. Joined patches are a shell if they use each edge equally often
+ * in both directions.
  *
  * A shell gets a positive volume, or a negative one if it is inside an odd number of other shells.
  * A shell is inside another one if its least and greatest vertices along each axis are inside:
@@ -553,10 +567,10 @@ typedef struct ebpo_prepare_options {
 
     ebpo_progress progress;
 
-    /* 1: calls ebpo_mesh_flip, too. */
+    /* 1: also calls ebpo_mesh_flip. 0: does not call it. */
     uint64_t flip;
 
-    /* 1: calls ebpo_mesh_drop_duplicates, too. */
+    /* 1: also calls ebpo_mesh_drop_duplicates. 0: does not call it. */
     uint64_t drop_duplicates;
 
     /* Above 0: calls ebpo_mesh_weld_within with this distance, and not ebpo_mesh_weld. */
@@ -572,13 +586,13 @@ typedef struct ebpo_prepare_options {
 typedef struct ebpo_prepared {
     size_t struct_size;
 
-    /* True if the mesh was repaired. The two reports may then differ. */
+    /* True if the mesh was repaired. In this case `before` and `report` may differ. */
     bool was_repaired;
 
     /* Repairs that were made. */
     ebpo_repair_record record;
 
-    /* Reports on the original mesh and on the current mesh (for ebpo_build). */
+    /* before: report on the original mesh. report: report on the current mesh, for ebpo_build. */
     ebpo_mesh_report before;
     ebpo_mesh_report report;
 } ebpo_prepared;
@@ -619,9 +633,10 @@ typedef struct ebpo_component {
     uint64_t vertex_count;
     uint64_t face_count;
 
-    /* Lowest source index of its faces. */
+    /* Lowest source index of the component's faces. */
     uint64_t first_face;
 
+    /* True if the component uses each edge equally often in both directions. */
     bool closed;
 
     /* Number of cavities that were joined to this component. */
@@ -632,7 +647,7 @@ typedef struct ebpo_component {
 
 /*
  * Finds the components, in the order of their first faces in the source. Unreferenced vertices
- * belong to none.
+ * belong to no component.
  *
  * mesh   borrowed until ebpo_components_free
  *

@@ -71,18 +71,22 @@ typedef struct ebpo_model_options {
     uint64_t memory;
 
     /*
-     * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: the
-     * level is chosen by the budget. If everything fits, everything is loaded at once, except for
-     * a remote file that has a table of subtrees and is larger than 2 MiB.
+     * Levels 0 to cut_level stay in memory, and the subtrees (nodes with all nodes and faces below
+     * them) below this level are loaded on demand. -1: the level is chosen by the budget. If
+     * everything fits, everything is loaded at once, except for a remote file that has a table of
+     * subtrees and is larger than 2 MiB.
      */
     int cut_level;
 
-    /* Used only if not everything fits, or if cut_level is given. */
+    /*
+     * How subtrees are loaded; used only if not everything fits in memory, or if cut_level is
+     * given.
+     */
     ebpo_loading loading;
 
     /*
-     * A background thread loads the subtrees around the last query point, nearest first (EBP 2017,
-     * 4.2.3).
+     * True: a background thread loads the subtrees around the last query point, nearest first (EBP
+     * 2017, 4.2.3).
      */
     bool prefetch;
 
@@ -99,9 +103,9 @@ typedef struct ebpo_model_options {
     ebpo_budget *budget;
 
     /*
-     * For surfaces with EBPO_PART_BORDER, from 1/1024 to 1023/1024. They have an inside, and signed
-     * distances, by the generalized winding number w: the sum of the solid angles of all faces,
-     * divided by 4 pi. The file's winding rule defines the inside: nonzero: |w| > threshold;
+     * For surfaces with EBPO_PART_BORDER, from 1/1024 to 1023/1024. Such surfaces have an inside,
+     * and signed distances, by the generalized winding number w: the sum of the solid angles of all
+     * faces, divided by 4 pi. The file's winding rule defines the inside: nonzero: |w| > threshold;
      * positive: w > threshold; evenodd: |w - e| > threshold, where e is the nearest even integer.
      * Decisions are exact. Where w equals the boundary of the rule, or 512 bits do not decide, a
      * point is outside, and ebpo_model_stats.ties counts it.
@@ -114,7 +118,7 @@ typedef struct ebpo_model_options {
         sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL, 0.5 \
     }
 
-/* The part of a file that is in memory, prepared for fast queries. Threads may share a model. */
+/* A file prepared for fast queries, completely or partly in memory. Threads may share a model. */
 typedef struct ebpo_model ebpo_model;
 
 /*
@@ -144,6 +148,7 @@ typedef struct ebpo_model_plan {
     /* True if everything will be in memory. */
     bool resident;
 
+    /* Deepest level that will stay in memory. */
     int cut_level;
 
     /* Budget that ebpo_model_new will use. 0: none. */
@@ -202,7 +207,7 @@ typedef struct ebpo_model_stats {
     /* True if everything is in memory. */
     bool resident;
 
-    /* 0 if resident. */
+    /* Deepest level that stays in memory; 0 if everything is in memory. */
     int cut_level;
 
     /* Current and peak memory in bytes: tree, caches, buffers for loading. */
@@ -264,7 +269,10 @@ typedef struct ebpo_model_stats {
      */
     uint64_t skeleton_bytes;
 
-    /* Decisions of points in a surface (ebpo_model_options.threshold) that were ties. */
+    /*
+     * Number of points whose winding number equals the boundary of the rule, or was not decided
+     * (ebpo_model_options.threshold).
+     */
     uint64_t ties;
 } ebpo_model_stats;
 
@@ -280,10 +288,11 @@ EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_st
 /* ---- one budget for several models ---- */
 
 /*
- * Makes a budget for ebpo_model_options.budget. It limits the memory of all its models, as
- * ebpo_model_options.memory does for one. The least recently used subtrees and chunks of any model
- * are removed first; levels above the cut levels and models entirely in memory stay. Models do not
- * share data, even those of the same file: use one model for several instances of a file.
+ * Makes a budget for ebpo_model_options.budget. The budget limits the memory of all its models
+ * together, as ebpo_model_options.memory limits the memory of one model. The least recently used
+ * subtrees and chunks of any model are removed first; levels above the cut levels and models
+ * entirely in memory stay. Models do not share data, even those of the same file: use one model for
+ * several instances of a file.
  *
  * bytes   greater than 0
  *
@@ -533,16 +542,17 @@ typedef struct ebpo_distance_options {
 /* Result of ebpo_distance. Lengths are in the model's unit. */
 typedef struct ebpo_distance_result {
     /*
-     * Correctly rounded. Negative inside a solid (-0.0 if it underflows), unless unsigned_distance
-     * is true. INFINITY without a face: no face is within max_distance. INFINITY with a face: the
-     * distance is larger than every double. NAN: not determined, see `lo` and `hi`.
+     * Distance, correctly rounded. Negative inside a solid (-0.0 if it underflows), unless
+     * unsigned_distance is true. INFINITY without a face: no face is within max_distance. INFINITY
+     * with a face: the distance is larger than every double. NAN: not determined, see `lo` and
+     * `hi`.
      */
     double distance;
 
     /* Bounds of the exact unsigned distance; equal for exact results. */
     double lo, hi;
 
-    /* Nearest point, rounded. NAN: none. */
+    /* Point of the model nearest to the given point, rounded. NAN: no such point was determined. */
     double point[3];
 
     /* Unit normal of the face, outward by its orientation. (0, 0, 0) for a face without area. */
@@ -605,13 +615,13 @@ typedef struct ebpo_within_options {
 
 /* A face and its distance; valid until the callback returns. */
 typedef struct ebpo_near_face {
-    /* Correctly rounded, unsigned. */
+    /* Unsigned distance of the face, correctly rounded. */
     double distance;
 
     /* As in ebpo_distance_result. */
     double point[3], normal[3];
 
-    /* Index as in ebpo_distance_result, and index in the file. */
+    /* face: index as in ebpo_distance_result. file_face: index in the file. */
     uint64_t face, file_face;
 
     uint64_t reserved[3];
@@ -669,7 +679,7 @@ typedef struct ebpo_ray_hit {
 
 /*
  * Finds the first triangle (including its boundary) that intersects the ray origin + t direction, t
- * from 0 to t_max. Of several triangles at the same t, the result is the first one in the file.
+ * from 0 to t_max. Of several triangles at the same t, the first one in the file is the result.
  * *hit is false if no triangle intersects the ray.
  *
  * direction   of any length except 0
@@ -704,10 +714,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Sides of triangles that count. Only the normal of a triangle decides, also if the ray hits an
- * edge or a vertex. An edge or a vertex belongs to all its triangles, so there are no gaps between
- * triangles. Triangles without area, and those whose plane contains the ray, count only with
- * EBPO_RAY_BOTH.
+ * Triangles that count as hit, by the side from which the ray comes. Only the normal of a triangle
+ * decides, also if the ray hits an edge or a vertex. An edge or a vertex belongs to all its
+ * triangles, so there are no gaps between triangles. Triangles without area, and those whose plane
+ * contains the ray, count only with EBPO_RAY_BOTH.
  */
 typedef enum ebpo_ray_sides {
     EBPO_RAY_BOTH = 0,  /* all triangles */
@@ -886,7 +896,7 @@ typedef struct ebpo_triangles {
     /* [count] corners, in the model's unit: exactly the stored values */
     const double (*corners)[3][3];
 
-    /* [count] indices as in ebpo_distance_result, and indices in the file */
+    /* [count] faces: indices as in ebpo_distance_result; file_faces: indices in the file */
     const uint64_t *faces, *file_faces;
 
     uint64_t reserved[4];
@@ -933,8 +943,8 @@ typedef struct ebpo_solid_volume {
     double lo, hi;
 
     /*
-     * Integral of the winding number: the volume if winding numbers are only 0 and 1. A region with
-     * winding number 2 counts twice; a region with -1 is subtracted.
+     * Integral of the winding number over space; equal to the volume if winding numbers are only 0
+     * and 1. A region with winding number 2 counts twice; a region with -1 is subtracted.
      */
     double integral;
 } ebpo_solid_volume;
@@ -961,6 +971,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *
 typedef struct ebpo_mass {
     size_t struct_size;
 
+    /* Sum of the areas of all faces. */
     double area;
 
     /*
@@ -975,7 +986,7 @@ typedef struct ebpo_mass {
     /* Centroid of the solid. If the volume is unknown, the winding number is the density. */
     double centroid[3];
 
-    /* About the centroid, for density 1. */
+    /* Inertia tensor about the centroid, for density 1. */
     double inertia[3][3];
 
     /*

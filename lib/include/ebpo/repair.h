@@ -81,12 +81,12 @@ typedef struct ebpo_repairs {
     /* Number of tries. */
     uint64_t count;
 
-    /* In the order in which they were tried: fewer steps first. */
+    /* The tries in their order: fewer steps first. */
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the try without doubts, which is the last try. -1: every try has doubts, or there
-     * are no doubts about the unrepaired mesh, which then needs no repair (even if dropping
+     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1: every try
+     * has doubts, or the unrepaired mesh has no doubts and needs no repair (even if dropping
      * repeated faces was tried).
      */
     int64_t chosen;

@@ -44,7 +44,7 @@ typedef struct ebpo_stream_options {
  * guaranteed to contain the envelope; the polygons are not.
  */
 typedef struct ebpo_stream_node {
-    /* A leading 1, then three bits for each level. */
+    /* Path from the root to the node: a leading 1, then three bits for each level. */
     uint64_t octcode;
 
     ebpo_node_type type;
@@ -52,7 +52,10 @@ typedef struct ebpo_stream_node {
     /* Exact bounds of the cell. */
     double min[3], max[3];
 
-    /* Winding number. White and black: in the cell. Leaf: leaf_winding (file.h). Gray: 0. */
+    /*
+     * Winding number. White and black nodes: that of all points in the cell. Leaf: leaf_winding
+     * (file.h). Gray: 0.
+     */
     int32_t winding;
 
     /*
@@ -78,13 +81,13 @@ typedef struct ebpo_stream_node {
     /* With `polygons`: counts for gray nodes, leaves and black nodes; else 0. */
     uint32_t vertex_count, polygon_count;
 
-    /* [vertex_count] */
+    /* [vertex_count] coordinates, in the model's unit */
     const double (*vertices)[3];
 
     /* [polygon_count + 1] first index of each polygon in `corners` */
     const uint32_t *polygon_first;
 
-    /* Indices of vertices, counter-clockwise seen from outside. */
+    /* Indices of the polygons' corners in `vertices`, counter-clockwise seen from outside. */
     const uint32_t *corners;
 
     /*
@@ -99,9 +102,9 @@ typedef struct ebpo_stream_node {
 
 /* Properties of a level that a stream has read. */
 typedef struct ebpo_stream_level {
-    int level;
+    int level; /* 0: the root */
 
-    /* Nodes of all types. */
+    /* Number of nodes of all types. */
     uint64_t node_count;
 
     /* Bytes of the file for levels 0 to `level`, including the header. */

@@ -63,7 +63,7 @@ typedef struct ebpo_subset_options {
     /* True: omits data that does not intersect the closed box min .. max. */
     bool boxed;
 
-    /* In the model's unit: finite, min <= max on each axis. */
+    /* The box, in the model's unit: finite, min <= max on each axis. */
     double min[3], max[3];
 
     /*
@@ -124,11 +124,11 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  *
  * Guarantee for every node that was pruned because of max_error: no point of the node's envelope,
  * including the interior, is farther than max_error from the solid and its faces (for a surface:
- * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is pruned, too, if the
- * planes of its ancestors alone satisfy max_error: in the new file it is a pruned gray node without
+ * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is also pruned if the planes
+ * of its ancestors alone satisfy max_error; in the new file this leaf is a pruned gray node without
  * planes. Kept leaves have the same error bound as in `file`, which may be larger than max_error. A
  * smaller max_error keeps all nodes that a larger max_error keeps. With max_error or target_bytes,
- * the whole model is opened in memory (see ebpo_subset_memory).
+ * the whole model is loaded into memory (see ebpo_subset_memory).
  *
  * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives

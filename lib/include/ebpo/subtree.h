@@ -8,9 +8,9 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Little more of the file is read than these data; remote files (http.h) take a few requests. The
- * octcode (locational code) of a node is a leading 1 and three bits for each level (stream.h);
- * ebpo_octcode_at returns the octcode of the cell that contains a point.
+ * Little more of the file is read than the data that is returned; remote files (http.h) take a few
+ * requests. The octcode (locational code) of a node is a leading 1 and three bits for each level
+ * (stream.h); ebpo_octcode_at returns the octcode of the cell that contains a point.
  */
 #ifndef EBPO_SUBTREE_H
 #define EBPO_SUBTREE_H
@@ -120,16 +120,16 @@ typedef struct ebpo_subtree_nodes {
     /* [level_count + 1] first node of each level */
     const uint64_t *level_first;
 
-    /* [node_count] */
+    /* [node_count] octcodes of the nodes */
     const uint64_t *octcodes;
 
     /* [node_count] ebpo_node_type */
     const uint8_t *types;
 
     /*
-     * [node_count] winding number. White, black: in the cell. Leaf: at the lowest corner, after
-     * a shift by infinitely small positive numbers (format-spec/README.md, section 10). Gray: 0.
-     * NULL: the model is a surface.
+     * [node_count] winding number. White, black: that of all points in the cell. Leaf: that of the
+     * lowest corner, after a shift by infinitely small positive numbers (format-spec/README.md,
+     * section 10). Gray: 0. NULL: the model is a surface.
      */
     const int32_t *windings;
 
@@ -147,7 +147,7 @@ typedef struct ebpo_subtree_nodes {
      */
     const uint32_t *plane_first;
 
-    /* Codes (ebpo_plane_decode), in coordinates of the node's cell. */
+    /* Plane codes (ebpo_plane_decode), in coordinates of the node's cell. */
     const uint32_t *planes;
 
     /*
@@ -157,7 +157,9 @@ typedef struct ebpo_subtree_nodes {
      */
     const uint32_t *above_first;
 
-    /* Codes (ebpo_plane_decode); the codes of a node are in coordinates of the node's cell. */
+    /*
+     * Plane codes (ebpo_plane_decode); the codes of a node are in coordinates of the node's cell.
+     */
     const uint32_t *above_planes;
 
     /* Total memory of the subtree in bytes. */
@@ -209,9 +211,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
  * All faces that intersect the subtree's cell, in the order of the file. Leaves may also list faces
  * that are outside the cell by a rounding error. Shared faces come first: a leaf before this
  * subtree already lists them. All other faces are owned. So if the tree is divided into disjoint
- * subtrees, exactly one of the subtrees that list a face owns it. The tree as a whole owns all
- * faces. In a subset (ebpo_subset), faces that are only below pruned nodes are missing. Arrays are
- * valid until the subtree is closed.
+ * subtrees, exactly one of the subtrees that list a face owns the face. The tree as a whole owns
+ * all faces. In a subset (ebpo_subset), faces that are only below pruned nodes are missing. Arrays
+ * are valid until the subtree is closed.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size;
@@ -241,7 +243,7 @@ typedef struct ebpo_subtree_faces {
     /* [face_count] source indices; NULL: not requested, or not in the file (EBPO_PART_MAPS) */
     const uint32_t *source;
 
-    /* [node_count + 1] index in `list` of each node's first face; only leaves have faces */
+    /* [node_count + 1] index in `list` of the first face of each node; only leaves list faces */
     const uint32_t *list_first;
 
     /* Face indices in this subtree, ascending within each leaf. */

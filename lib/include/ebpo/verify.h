@@ -29,7 +29,7 @@ typedef struct ebpo_verify_report {
      */
     ebpo_verify_count structure;
 
-    /* Content checksum. */
+    /* The content checksum (content_sha256) is the one computed from the arrays. */
     ebpo_verify_count content;
 
     /*
@@ -38,7 +38,10 @@ typedef struct ebpo_verify_report {
      */
     ebpo_verify_count containment;
 
-    /* A child's envelope is contained in its parent's, including leaf planes. */
+    /*
+     * The envelope of each node, including leaves with stored planes, is contained in the envelope
+     * of its parent.
+     */
     ebpo_verify_count nesting;
 
     /*
@@ -81,7 +84,8 @@ typedef struct ebpo_verify_options {
 
     /*
      * Number of cells whose labels are checked, at least one of each level and type. 0: all cells
-     * if there are at most 2^22, else 2^20; 4096 if this would take more than a few seconds.
+     * if there are at most 2^22 cells, else 2^20 cells; 4,096 cells if these numbers would take
+     * more than a few seconds.
      */
     uint64_t label_samples;
 
