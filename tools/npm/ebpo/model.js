@@ -8,7 +8,7 @@ import { nodeArrays, ViewStream } from './view_stream.js';
 
 const PENDING = -11;
 const BATCH = 16384; // points of one call
-const TURN = 50; // milliseconds after which a long query lets other events run
+const TURN = 50; // milliseconds for which a long query runs before it lets other events run
 const SIDES = { both: 0, front: 1, back: 2 };
 const LARGE = 4 << 20; // bytes of one request when the whole file is read
 const NO_FACE = 0xffffffff;
@@ -46,7 +46,7 @@ export class Model {
   #object;
   #source;
   #version;
-  #flights = new Set(); // ranges that are being fetched
+  #flights = new Set(); // ranges that are being fetched, each with the promise `done`
   #samplers = new Map(); // query objects with the samplers of attributes
   #idle = []; // query objects that are not in use
   #used = new Set(); // query objects in use
@@ -55,7 +55,7 @@ export class Model {
   #disposed = false;
   #info;
 
-  /** Use open(). */
+  /** Makes a model whose file is not open yet; callers use open(). */
   constructor(heap, source, { memory = 0, whole = false } = {}) {
     this.#heap = heap;
     this.#source = source;
@@ -144,8 +144,8 @@ export class Model {
       this.#heap.call('ebpo_js_end', this.#object, operation);
   }
 
-  /** Calls until the bytes of all models that the call needs have arrived. `completed` returns the number of results that need
-   * no more bytes. */
+  /** Repeats call(), and fetches the bytes of all models that it needs, until its status is not pending. `completed` returns
+   * the number of results that need no more bytes. */
   static async repeat(models, call, object, signal, completed = () => 0) {
     signal?.throwIfAborted();
     const begin = () => models.map((model) => model.#begin()), end = (operations) => models.forEach((model, i) => model.#end(operations[i]));
@@ -204,7 +204,7 @@ export class Model {
     return (n, Type) => this.#heap.result(query, n, Type);
   }
 
-  /** Evaluates call(query), and returns read(array). */
+  /** Repeats call(query) until no bytes are missing, and returns read(array) of its results; array(n, Type): result array n. */
   async #run({ call, read, completed }, signal) {
     const query = this.#take();
     try {

@@ -9,8 +9,8 @@
 #include "module.h"
 
 /* Array 0: values of the n-th array of attributes, in its type and the order of the file. Array 1:
- * ends of lists of different lengths, doubles; empty for other arrays. `values` is 0: only the
- * ends. */
+ * ends of lists of different lengths, doubles; empty for other arrays. With `values` 0, array 0 is
+ * empty. */
 int EBPO_JS(ebpo_js_attribute)(ebpo_js_object *object, uint32_t n, int values)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -65,16 +65,16 @@ int EBPO_JS(ebpo_js_sampler)(ebpo_js_object *object, const char *names)
 int EBPO_JS(ebpo_js_sample)(ebpo_js_object *object, const double *points, const double *faces,
                             uint32_t count)
 {
-    uint64_t *numbers = malloc((count + (size_t)1) * sizeof *numbers);
+    uint64_t *indices = malloc((count + (size_t)1) * sizeof *indices);
     ebpo_js_clear(object);
     double *out =
         ebpo_js_extend(object, 0, (uint64_t)count * ebpo_sampler_columns(object->sampler), 8);
-    ebpo_status status = numbers && out ? EBPO_OK : EBPO_E_MEMORY;
+    ebpo_status status = indices && out ? EBPO_OK : EBPO_E_MEMORY;
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
-        numbers[i] = faces[i] >= 0 ? (uint64_t)faces[i] : EBPO_NO_FACE;
+        indices[i] = faces[i] >= 0 ? (uint64_t)faces[i] : EBPO_NO_FACE;
     if (status == EBPO_OK)
-        status = ebpo_sample(object->sampler, points, numbers, count, out, &object->error);
-    free(numbers);
+        status = ebpo_sample(object->sampler, points, indices, count, out, &object->error);
+    free(indices);
     return status;
 }
 

@@ -1,5 +1,5 @@
-/* Queries pairs of models, for the WebAssembly module with collide. Both models are in one
- * instance. */
+/* Queries pairs of models, for the WebAssembly module that includes collide.h. Both models are in
+ * the memory of one instance of the module. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,19 +59,20 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     ebpo_js_object *object = user;
     uint32_t(*faces)[2] = ebpo_js_extend(object, 0, count, sizeof *faces);
     uint8_t *kinds = ebpo_js_extend(object, 1, count, sizeof *kinds);
-    uint32_t(*numbers)[2] = ebpo_js_extend(object, 2, count, sizeof *numbers);
-    for (uint64_t i = 0; i < count && faces && kinds && numbers; i++) {
+    uint32_t(*file_faces)[2] = ebpo_js_extend(object, 2, count, sizeof *file_faces);
+    for (uint64_t i = 0; i < count && faces && kinds && file_faces; i++) {
         faces[i][0] = (uint32_t)pairs[i].face_a;
         faces[i][1] = (uint32_t)pairs[i].face_b;
-        numbers[i][0] = (uint32_t)pairs[i].file_face_a;
-        numbers[i][1] = (uint32_t)pairs[i].file_face_b;
+        file_faces[i][0] = (uint32_t)pairs[i].file_face_a;
+        file_faces[i][1] = (uint32_t)pairs[i].file_face_b;
         kinds[i] = (uint8_t)pairs[i].kind;
     }
-    return faces && kinds && numbers;
+    return faces && kinds && file_faces;
 }
 
-/* Array 0: faces [2], uint32. Array 1: ebpo_pair_kind, uint8. Array 2: indices of the faces in the
- * files [2], uint32. Empty: the models do not touch. */
+/* Gets one pair of intersecting faces. Array 0: faces [2] (face_a and face_b of ebpo_face_pair),
+ * uint32. Array 1: ebpo_pair_kind, uint8. Array 2: indices of the faces in the files [2], uint32.
+ * Empty arrays: no faces intersect. */
 int EBPO_JS(ebpo_js_pair_first)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -85,6 +86,7 @@ int EBPO_JS(ebpo_js_pair_first)(ebpo_js_pair *pair, const double *poses)
     return status;
 }
 
+/* Gets all pairs of intersecting faces, in the arrays of ebpo_js_pair_first. */
 int EBPO_JS(ebpo_js_pair_all)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -108,7 +110,8 @@ static bool take_segments(void *user, const ebpo_contact_segment *segments, uint
     return points && faces;
 }
 
-/* Array 0: segments [2][3], doubles. Array 1: faces [2], uint32. */
+/* Gets the segments in which faces cross. Array 0: segments [2][3], doubles. Array 1: faces [2],
+ * uint32. */
 int EBPO_JS(ebpo_js_pair_contacts)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -119,7 +122,7 @@ int EBPO_JS(ebpo_js_pair_contacts)(ebpo_js_pair *pair, const double *poses)
     return pair->object.error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
 }
 
-/* Array 0: ebpo_relation and contact, int32. */
+/* Array 0: `relation` and `contact` of ebpo_relation_result, int32. */
 int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -131,16 +134,17 @@ int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
     return status == EBPO_OK ? ebpo_js_put(&pair->object, 0, out, sizeof out) : status;
 }
 
-/* Array 0: bounds of the distance, and the nearest points, doubles. Array 1: faces [2], uint32. */
+/* Array 0: both bounds of the distance, then the nearest points [2][3], doubles. Array 1: faces
+ * [2], uint32. */
 int EBPO_JS(ebpo_js_pair_distance)(ebpo_js_pair *pair, const double *poses, double tolerance)
 {
     ebpo_collide_options options = read_options(poses);
-    ebpo_collide_distance_options clearance = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_options distance_options = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result result;
-    clearance.tolerance = tolerance;
+    distance_options.tolerance = tolerance;
     ebpo_js_clear(&pair->object);
-    ebpo_status status =
-        ebpo_collide_distance(pair->collider, &options, &clearance, &result, &pair->object.error);
+    ebpo_status status = ebpo_collide_distance(pair->collider, &options, &distance_options, &result,
+                                               &pair->object.error);
     if (status != EBPO_OK)
         return status;
     double out[8] = { result.distance.lo, result.distance.hi };

@@ -5,6 +5,7 @@
 #include "format/chunks.h"
 #include "module.h"
 
+/* Makes the model of an opened file. `memory` and `cut_level`: as in ebpo_model_options. */
 int EBPO_JS(ebpo_js_load)(ebpo_js_object *object, double memory, int cut_level)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -40,7 +41,7 @@ ebpo_js_object *EBPO_JS(ebpo_js_query)(const ebpo_js_object *model)
     return NULL;
 }
 
-/* Begins another query. */
+/* Discards the results and the decoded chunks of the last query, before another query. */
 void EBPO_JS(ebpo_js_start)(ebpo_js_object *object)
 {
     ebpo_js_clear(object);

@@ -10,7 +10,11 @@
 /* Functions that JavaScript calls by this name. */
 #define EBPO_JS(name) __attribute__((export_name(#name), used)) name
 
-enum { EBPO_JS_ARRAYS = 24, EBPO_JS_NODE_ARRAYS = 13, EBPO_JS_NUMBERS = 10 };
+enum {
+    EBPO_JS_ARRAYS = 24,      /* result arrays of an object */
+    EBPO_JS_NODE_ARRAYS = 13, /* arrays that ebpo_js_put_node uses, from array 0 on */
+    EBPO_JS_NUMBERS = 10      /* results of a query of one point or ray */
+};
 
 /* A growing array. */
 typedef struct ebpo_js_array {
@@ -18,8 +22,8 @@ typedef struct ebpo_js_array {
     size_t bytes, capacity;
 } ebpo_js_array;
 
-/* A model; or a query, stream, view or sampler, which borrows `async`, `file` and `model` of a
- * model. */
+/* Either a model, which owns `async`, `file` and `model`; or an object for queries, streams, views
+ * and samplers, which borrows these three from a model. Members that are not used are NULL. */
 typedef struct ebpo_js_object {
     ebpo_async *async;
     ebpo_file *file;
@@ -43,9 +47,10 @@ void ebpo_js_clear(ebpo_js_object *object);
 /* Makes `chunks`, unless it exists. */
 EBPO_MUST_USE ebpo_status ebpo_js_need_chunks(ebpo_js_object *object);
 
-/* Returns EBPO_E_ABSENT if the file has no mesh. */
+/* Returns EBPO_OK if the file has a mesh, else EBPO_E_ABSENT with an error. */
 EBPO_MUST_USE ebpo_status ebpo_js_need_mesh(ebpo_js_object *object);
 
+/* Frees the result arrays, but not the object. */
 void ebpo_js_free_arrays(ebpo_js_object *object);
 
 /* Appends bytes to result array n. Returns EBPO_E_MEMORY with an error if they do not fit. */

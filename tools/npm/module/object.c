@@ -70,7 +70,8 @@ void ebpo_js_free_arrays(ebpo_js_object *object)
         free(object->array[n].data);
 }
 
-/* Returns the result arrays, whose members JavaScript reads: ebpo_js_array has three of 4 bytes. */
+/* Returns the result arrays. JavaScript reads their members: each ebpo_js_array has three members
+ * of 4 bytes. */
 const ebpo_js_array *EBPO_JS(ebpo_js_table)(const ebpo_js_object *object) { return object->array; }
 
 const char *EBPO_JS(ebpo_js_message)(const ebpo_js_object *object) { return object->error.message; }
@@ -189,7 +190,7 @@ static EBPO_PRINTF(2, 3) ebpo_status put_text(ebpo_js_object *object, const char
     return ebpo_js_put(object, 0, text, (size_t)length);
 }
 
-/* Appends a member of a JSON object. */
+/* Appends a member of a JSON object and a comma; so do the next functions. */
 static ebpo_status put_string(ebpo_js_object *object, const char *name, const char *value)
 {
     ebpo_status status = put_text(object, "\"%s\":\"", name);

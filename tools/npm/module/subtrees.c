@@ -1,11 +1,12 @@
-/* Subtrees for the WebAssembly module. */
+/* Reads subtrees (subtree.h), for the WebAssembly module. */
 #include <ebpo/subtree.h>
 
 #include "module.h"
 
-/* Result arrays of ebpo_js_subtree; empty if the file or the request has none. */
+/* Result arrays of ebpo_js_subtree: members of ebpo_subtree_nodes and ebpo_subtree_faces. Empty if
+ * the file or the request does not have the data. */
 enum {
-    SUBTREE_FACTS, /* double [3]: level, 1: has faces, shared faces */
+    SUBTREE_FACTS, /* double [3]: level; 1: has faces; number of shared faces */
     LEVEL_FIRST,   /* uint64 */
     OCTCODES,      /* uint64 */
     TYPES,         /* uint8 */
@@ -25,6 +26,7 @@ enum {
 
 _Static_assert(LIST < EBPO_JS_ARRAYS, "result arrays");
 
+/* Appends data[count], items of `size` bytes, to result array n. NULL: no items. */
 static bool put_items(ebpo_js_object *object, unsigned n, const void *data, uint64_t count,
                       size_t size)
 {

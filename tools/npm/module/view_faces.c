@@ -15,7 +15,9 @@
 
 enum { LISTS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
 
-/* A leaf: its level, group and octant, and its subtree, or -1. */
+/* A leaf: its level, the index of its group (the eight children of a node) in the level, its octant
+ * in the group, and the index of its subtree; subtree -1: the file does not store the level by
+ * subtree. */
 typedef struct wanted_leaf {
     double level, group, octant, subtree;
 } wanted_leaf;
@@ -23,14 +25,17 @@ typedef struct wanted_leaf {
 /* Result arrays of ebpo_js_leaf_faces. */
 enum {
     FACE_COUNTS,  /* uint32 of each leaf */
-    FACE_NUMBERS, /* uint32: faces of the leaves, one leaf after the other, ascending */
+    FACE_NUMBERS, /* uint32: faces (indices in the file), leaf after leaf, ascending in each leaf */
     FACE_CORNERS, /* double or float [9] of each face */
     FACE_COLOURS, /* uint8 [3][3] of each face: red, green and blue of the corners */
-    FACE_ROWS     /* uint32: vertices of the faces */
+    FACE_ROWS     /* uint32 [3] of each face: vertices, in the file */
 };
 
-enum { GAP_GROUPS = 32 }; /* groups between two leaves that are read rather than counted again */
+/* Maximum number of groups between two leaves that are read with the leaves, because a further run
+ * of groups would cost more (its nodes before the first group must be counted). */
+enum { GAP_GROUPS = 32 };
 
+/* Compares by level, then by group, for qsort. */
 static int compare_leaves(const void *a, const void *b)
 {
     const wanted_leaf *x = *(const wanted_leaf *const *)a, *y = *(const wanted_leaf *const *)b;
@@ -47,6 +52,7 @@ typedef struct leaf_reading {
     ebpo_level level;
 } leaf_reading;
 
+/* Makes runs of groups that contain all leaves. */
 static void make_runs(leaf_reading *r)
 {
     r->run_count = 0;
@@ -65,7 +71,7 @@ static void make_runs(leaf_reading *r)
 static bool visit_leaves(const leaf_reading *r, int level,
                          void (*visit)(void *, uint32_t, uint64_t), void *user)
 {
-    uint64_t at = 0, before = 0; /* group, and leaves before it, in the lists */
+    uint64_t at = 0, before = 0; /* index of the group in r->level; number of leaves before it */
     uint32_t i = 0;
     unsigned octants = level ? 8 : 1;
     for (uint32_t k = 0; k < r->run_count; k++)
@@ -86,11 +92,15 @@ static bool visit_leaves(const leaf_reading *r, int level,
 typedef struct face_lists {
     const wanted_leaf *wanted;
     leaf_reading *reading;
-    uint64_t *ref_begin;              /* [leaves of the level] */
-    uint32_t *first, *fresh, *counts; /* [leaves of the request]; `counts` are references */
-    uint32_t **refs;
+    uint64_t
+        *ref_begin; /* [leaves of the level + 1] index in leaf_refs of a leaf's first reference */
+    /* [leaves of the request] first new face, number of new faces, number of references (faces that
+     * an earlier leaf lists, too; see ebpo_level) */
+    uint32_t *first, *fresh, *counts;
+    uint32_t **refs; /* [leaves of the request] references of each leaf */
 } face_lists;
 
+/* Stores the list of leaf i of the reading, which is leaf `at` of the level. */
 static void take_list(void *user, uint32_t i, uint64_t at)
 {
     face_lists *f = user;
@@ -130,7 +140,7 @@ static ebpo_status read_lists(ebpo_js_object *object, face_lists *f)
     return status;
 }
 
-/* Puts the numbers of the leaves' faces. */
+/* Appends the indices of each leaf's faces: the references, then the new faces. */
 static ebpo_status put_lists(ebpo_js_object *object, const face_lists *f, uint32_t count)
 {
     bool ok = true;
@@ -146,6 +156,8 @@ static ebpo_status put_lists(ebpo_js_object *object, const face_lists *f, uint32
     return ok ? EBPO_OK : EBPO_E_MEMORY;
 }
 
+/* Reads the face lists of all wanted leaves, level by level, and appends them to the result arrays.
+ */
 static ebpo_status find_faces(ebpo_js_object *object, const wanted_leaf *wanted, uint32_t count)
 {
     const wanted_leaf **leaf = malloc((count + 1) * sizeof *leaf);
@@ -235,11 +247,11 @@ static ebpo_status put_corners(ebpo_js_object *object)
     return status == EBPO_OK ? coloured : status;
 }
 
-/* Reads the faces of leaves: `wanted` is [count] level, group, octant, and subtree or -1. */
+/* Reads the faces of the leaves wanted[count] into the result arrays. */
 int EBPO_JS(ebpo_js_leaf_faces)(ebpo_js_object *object, const wanted_leaf *wanted, uint32_t count)
 {
     uint64_t *subtrees = malloc((count + 1) * sizeof *subtrees);
-    uint32_t rows = 0;
+    uint32_t subtree_count = 0;
     ebpo_js_clear(object);
     ebpo_status status =
         subtrees ? ebpo_js_need_mesh(object) : (object->error.status = EBPO_E_MEMORY);
@@ -250,12 +262,13 @@ int EBPO_JS(ebpo_js_leaf_faces)(ebpo_js_object *object, const wanted_leaf *wante
         return status;
     }
     for (uint32_t i = 0; i < count; i++)
-        if (wanted[i].subtree >= 0 && (!rows || subtrees[rows - 1] != (uint64_t)wanted[i].subtree))
-            subtrees[rows++] = (uint64_t)wanted[i].subtree;
-    if (rows)
-        ebpo_subtree_table_hint(object->chunks, subtrees, rows);
+        if (wanted[i].subtree >= 0 &&
+            (!subtree_count || subtrees[subtree_count - 1] != (uint64_t)wanted[i].subtree))
+            subtrees[subtree_count++] = (uint64_t)wanted[i].subtree;
+    if (subtree_count)
+        ebpo_subtree_table_hint(object->chunks, subtrees, subtree_count);
     ebpo_hints hints = EBPO_HINTS_INIT(object->file);
-    for (uint32_t i = 0; i < rows; i++)
+    for (uint32_t i = 0; i < subtree_count; i++)
         ebpo_subtrees_hint(object->chunks, &hints, subtrees[i], 1, LISTS, 0, true);
     ebpo_hint_all(&hints);
     free(subtrees);

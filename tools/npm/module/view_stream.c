@@ -3,7 +3,7 @@
 
 #include "module.h"
 
-/* Result arrays from VIEW_LEVELS on; those before are of ebpo_js_put_node. */
+/* Result arrays of views. The arrays before VIEW_LEVELS are those of ebpo_js_put_node. */
 enum {
     VIEW_LEVELS = EBPO_JS_NODE_ARRAYS, /* uint8 */
     VIEW_FLAGS,                        /* uint8: 1: complete, 2: seen */
@@ -17,7 +17,7 @@ enum {
 
 _Static_assert(VIEW_FACTS < EBPO_JS_ARRAYS, "result arrays");
 
-/* Numbers of the options; see options_of in view_stream.js. */
+/* Indices of the options in the array of numbers that options_of in view_stream.js makes. */
 enum {
     PRIORITY,
     UNSEEN,
@@ -104,8 +104,8 @@ static ebpo_status put_facts(ebpo_js_object *object, double end, double count)
     return ebpo_js_put(object, VIEW_FACTS, facts, sizeof facts);
 }
 
-/* Reads at most `most` next nodes. Returns those before bytes that are missing; EBPO_E_PENDING: the
- * first one needs bytes. */
+/* Reads at most `most` next nodes into the result arrays; fewer if a node needs missing bytes.
+ * EBPO_E_PENDING: the first node needs missing bytes. */
 int EBPO_JS(ebpo_js_view_next)(ebpo_js_object *object, double most)
 {
     ebpo_status status = EBPO_OK;
@@ -126,7 +126,7 @@ int EBPO_JS(ebpo_js_view_next)(ebpo_js_object *object, double most)
     return status;
 }
 
-/* The results of a visit of the cut. */
+/* Nodes of the cut that were put into the result arrays. ok: false: not enough memory. */
 typedef struct cut_nodes {
     ebpo_js_object *object;
     double count;
@@ -141,7 +141,7 @@ static bool take_cut(void *user, const ebpo_view_node *node)
     return cut->ok;
 }
 
-/* Puts the nodes of the cut, as ebpo_js_view_next, without faces. */
+/* Puts the nodes of the cut (view.h) into the arrays of ebpo_js_view_next, without faces. */
 int EBPO_JS(ebpo_js_view_cut)(ebpo_js_object *object)
 {
     cut_nodes cut = { .object = object, .ok = true };
@@ -150,7 +150,8 @@ int EBPO_JS(ebpo_js_view_cut)(ebpo_js_object *object)
     return cut.ok ? put_facts(object, EBPO_VIEW_NODE, cut.count) : EBPO_E_MEMORY;
 }
 
-/* Array 0, doubles: nodes; of the cut: white, black, leaves, gray; waiting; pixels; bytes read. */
+/* Array 0: members of ebpo_view_stats as doubles: delivered nodes; white nodes, black nodes, leaves
+ * and gray nodes of the cut; waiting nodes; pixels; bytes read. */
 int EBPO_JS(ebpo_js_view_stats)(ebpo_js_object *object)
 {
     ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
