@@ -47,20 +47,23 @@ EBPO_API const char *ebpo_export_format_name(ebpo_export_format format);
 typedef struct ebpo_export_options {
     size_t struct_size;
 
-    /* Levels of ebpo_lod_level, as closed polyhedra. None if first_level > last_level. */
+    /*
+     * Levels to export, as closed polyhedra (ebpo_lod_level). If first_level > last_level, no
+     * levels are exported.
+     */
     int first_level, last_level;
 
     /*
-     * True: exports the mesh. XDMF and VTKHDF contain it in the file's order, with source indices;
-     * other formats in the source's order if the file has source indices.
+     * True: exports the mesh. In XDMF and VTKHDF, the mesh is in the file's order, with source
+     * indices; in other formats it is in the source's order if the file has source indices.
      *
      * Colours (colours.h) are exported if present. XDMF and VTKHDF: arrays `rgba` of 4 bytes, for
      * vertices and faces. glTF: COLOR_0, linear, with alpha although the material is opaque. OBJ:
-     * red, green and blue after a vertex, 0 to 1. STL has no colours; glTF and OBJ have none for
-     * faces.
+     * red, green and blue after a vertex, 0 to 1. STL has no colours; glTF and OBJ have no colours
+     * of faces.
      *
-     * Colours of levels are exported in the same way if the file has them; each vertex has the
-     * colour of its node. In VTKHDF, items without colours are white.
+     * Colours of levels are exported in the same way if the file has the part `colours`; each
+     * vertex has the colour of its node. In VTKHDF, items without colours are white.
      */
     bool mesh;
 
@@ -106,7 +109,8 @@ typedef struct ebpo_export_report {
     ebpo_export_block block[EBPO_LEVELS_MAX + 1];
 
     /*
-     * glTF: vertices are relative to this point, which is the translation of the nodes. Others: 0.
+     * glTF: vertices are relative to this point, which is the translation of the nodes. Other
+     * formats: 0.
      */
     double origin[3];
 
@@ -120,9 +124,9 @@ typedef struct ebpo_export_report {
 #define EBPO_EXPORT_REPORT_INIT EBPO_SIZED(ebpo_export_report)
 
 /*
- * Writes the name of the second file of `path` to `out`, of `space` bytes; "" if there is none.
- * Returns false if the name does not fit, or if the format does not support it (XDMF: a name with
- * ":").
+ * Writes the name of the second file that ebpo_export writes for `path` to `out`, of `space` bytes;
+ * "" if the format has no second file. Returns false if the name does not fit, or if the format
+ * does not support the name (XDMF: a name with ":").
  *
  * Threads: any.
  */

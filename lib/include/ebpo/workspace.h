@@ -19,9 +19,9 @@ extern "C" {
 
 /*
  * Holds the arrays of models that are read, built or verified. Arrays are in memory while they fit
- * into half of the budget. The others are in unnamed temporary files, which disappear with the
- * process. These files are mapped, and their resident part stays within the budget. Results do not
- * depend on the workspace.
+ * into half of the budget. All other arrays are in unnamed temporary files, which disappear with
+ * the process. These files are mapped, and their resident part stays within the budget. Results do
+ * not depend on the workspace.
  */
 typedef struct ebpo_workspace ebpo_workspace;
 
@@ -66,17 +66,20 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_new(const ebpo_workspace_optio
  */
 EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 
-/* Sizes in bytes. */
+/* Statistics of a workspace; all sizes are in bytes. */
 typedef struct ebpo_workspace_stats {
     size_t struct_size;
 
     /* Budget. */
     uint64_t memory;
 
-    /* Arrays in memory: current size and peak. */
+    /* Arrays in memory: held: current size; held_peak: peak. */
     uint64_t held, held_peak;
 
-    /* Arrays in files: current size, peak, and sum over all arrays. */
+    /*
+     * Arrays in files: filed: current size; filed_peak: peak; filed_total: sum over all arrays so
+     * far.
+     */
     uint64_t filed, filed_peak, filed_total;
 } ebpo_workspace_stats;
 
