@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""interrupt.py SIGNAL OUT COMMAND...: sends SIGNAL when a temporary file for OUT exists. Prints the exit
-status of the command and the remaining files.
+"""interrupt.py SIGNAL OUT[:FILE] COMMAND...: sends SIGNAL when a temporary file for OUT exists, or a temporary
+folder for OUT that has the complete FILE. Prints the exit status of the command and the remaining files.
 """
 import os
 import signal
@@ -15,10 +15,11 @@ def leftovers(out):
 
 
 def main():
-    number, out, command = getattr(signal, "SIG" + sys.argv[1]), sys.argv[2], sys.argv[3:]
+    number, command = getattr(signal, "SIG" + sys.argv[1]), sys.argv[3:]
+    out, _, file = sys.argv[2].partition(":")
     signal.signal(number, signal.SIG_DFL)
     process = subprocess.Popen(command)
-    while process.poll() is None and not leftovers(out):
+    while process.poll() is None and not any(not file or os.path.exists(os.path.join(f, file)) for f in leftovers(out)):
         time.sleep(0.002)
     seen = process.poll() is None
     process.send_signal(number)

@@ -4,23 +4,23 @@
 #include <signal.h>
 #include <string.h>
 
-static void (*volatile also)(void);
-static void (*volatile scratch)(void);
+static void (*volatile command_cleanup)(void);
+static void (*volatile scratch_cleanup)(void);
 
-void signals_also(void (*clean_up)(void)) { also = clean_up; }
+void signals_set_cleanup(void (*clean_up)(void)) { command_cleanup = clean_up; }
 
-void signals_scratch(void (*clean_up)(void)) { scratch = clean_up; }
+void signals_set_scratch_cleanup(void (*clean_up)(void)) { scratch_cleanup = clean_up; }
 
 static void give_up(int number)
 {
     ebpo_abandon_outputs();
-    if (also)
-        also();
-    if (scratch)
-        scratch();
+    if (command_cleanup)
+        command_cleanup();
+    if (scratch_cleanup)
+        scratch_cleanup();
     /* SA_RESETHAND restored the default action, so that the parent process sees the signal. It is
-     * raised before this handler returns, as another thread may be about to open the output again
-     * by its name. */
+     * raised before this handler returns, and outputs are removed once more just before, because
+     * another thread may have opened an output again. */
     sigset_t only;
     sigemptyset(&only);
     sigaddset(&only, number);

@@ -5,12 +5,13 @@
 
 void signals_install(void);
 
-/* Registers a function that is called once when one of these signals arrives. It must be safe in a
- * signal handler. */
-void signals_also(void (*clean_up)(void));
+/* Registers the function that removes the files of the running command when one of these signals
+ * arrives; NULL: none. It replaces the function of an earlier call, and must be async-signal-safe.
+ */
+void signals_set_cleanup(void (*clean_up)(void));
 
-/* Registers a second such function, which removes temporary files that exist during a whole
- * command. */
-void signals_scratch(void (*clean_up)(void));
+/* Registers a second function, which then removes the temporary copies of standard input and
+ * output. Both functions are called. */
+void signals_set_scratch_cleanup(void (*clean_up)(void));
 
 #endif

@@ -82,7 +82,7 @@ static int make_folder(const char *command)
         return fail_stream(command, "cannot create a temporary folder",
                            "set TMPDIR to a writable folder");
     snprintf(folder, sizeof folder, "%s", made);
-    signals_scratch(clean_up);
+    signals_set_scratch_cleanup(clean_up);
     return EXIT_OK;
 }
 

@@ -178,14 +178,14 @@ ebpo_status pieces_begin(const char *folder, bool of_groups, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     making_fd = open(making_folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    signals_also(remove_folder);
+    signals_set_cleanup(remove_folder);
     return EBPO_OK;
 }
 
 void pieces_end(void)
 {
     remove_folder();
-    signals_also(NULL);
+    signals_set_cleanup(NULL);
     if (making_fd >= 0)
         close(making_fd);
     free(making_folder);

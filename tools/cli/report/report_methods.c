@@ -8,6 +8,7 @@
 #include "cli/mesh_input.h"
 #include "cli/mesh_advice.h"
 #include "cli/report/report_data.h"
+#include "cli/report/report_output.h"
 #include "cli/selection_args.h"
 #include "cli/words.h"
 
@@ -174,13 +175,13 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection,
 static int build_method(comparison *c, const char *mesh, int selection,
                         const plane_setting *setting)
 {
-    char path[sizeof c->folder + 64];
+    char path[sizeof c->folder + OUTPUT_NAME_MAX], stem[64];
     ebpo_error error = EBPO_ERROR_INIT;
     build_result out = { 0 };
     bool unlimited =
         c->v->unlimited && ebpo_selection_describe((ebpo_selection)selection)->from_leaves;
-    snprintf(path, sizeof path, "%s/%s%s.ebpo.h5", c->folder, selection_words[selection],
-             setting->word);
+    snprintf(stem, sizeof stem, "%s%s", selection_words[selection], setting->word);
+    output_add_model(c->folder, stem, path, sizeof path);
     if (build_one(c, mesh, selection, setting, path, false, &out, &error) != EBPO_OK)
         return command_failed("report", &error);
     int code = add_file(c, path);

@@ -3,6 +3,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +14,11 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 
-static char temporary_folder[4096]; /* for the signal handler */
+/* for the signal handler: the temporary folder, and the names of the model files that may be in it
+ */
+static char temporary_folder[4096];
+static char model_names[OUTPUT_MODELS_MAX][OUTPUT_NAME_MAX];
+static volatile sig_atomic_t model_count;
 
 static int fail_output(int code, const char *path, const char *what)
 {
@@ -52,7 +57,7 @@ static bool is_selection_file(const char *name)
     return false;
 }
 
-/* Returns true for the file names of a report; other files belong to the user. */
+/* Returns true for a regular file with a name of a report. Other files belong to the user. */
 static bool is_report_file(const char *folder, const char *name)
 {
     char path[8192];
@@ -72,8 +77,8 @@ static bool is_operand(const char *folder, const char *name, const char *const *
     return false;
 }
 
-/* Checks the existing folder, which would be deleted: it must be a report, and no operand may be in
- * it. */
+/* Checks the existing folder `place`, which the new report will replace. All its files must have
+ * names of a report, one of them must be report.json, and no operand may be in the folder. */
 static int check_folder(const char *place, DIR *folder, const char *const *operand)
 {
     char text[600];
@@ -93,8 +98,8 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
         }
         if (!is_report_file(place, name)) {
             snprintf(text, sizeof text,
-                     "is a folder with a file that is not of a report, '%.255s'; give another "
-                     "folder with -o",
+                     "is a folder with a file that does not belong to a report, '%.255s'; give "
+                     "another folder with -o",
                      name);
             return fail_output(EXIT_FAILED, place, text);
         }
@@ -121,7 +126,8 @@ static int check_place(const char *place, const char *const *operand)
     return code;
 }
 
-/* Removes the files, and the folder if it is then empty. */
+/* Removes the files, or only files with names of a report, and the folder if it is then empty.
+ * Returns true if the folder was removed. */
 static bool remove_folder(const char *folder, bool report_files_only)
 {
     char path[8192];
@@ -140,30 +146,43 @@ static bool remove_folder(const char *folder, bool report_files_only)
 
 /* Removes a file of the temporary folder. Called in a signal handler, so it uses only
  * async-signal-safe calls, and does not list the folder. */
-static void abandon_file(const char *stem, const char *ending)
+static void abandon_file(const char *name)
 {
     size_t length = strlen(temporary_folder);
     temporary_folder[length] = '/';
-    strcpy(temporary_folder + length + 1, stem);
-    strcat(temporary_folder, ending);
+    strcpy(temporary_folder + length + 1, name);
     unlink(temporary_folder);
     temporary_folder[length] = 0;
 }
 
+/* Removes the temporary folder and its files. Called in a signal handler. */
 static void abandon_files(void)
 {
     if (!temporary_folder[0])
         return;
     for (int i = 0; fixed_names[i]; i++)
-        abandon_file(fixed_names[i], "");
-    for (int i = 0; selection_words[i]; i++)
-        abandon_file(selection_words[i], MODEL_ENDING);
-    abandon_file("target", MODEL_ENDING); /* a trial of report_targets.c */
+        abandon_file(fixed_names[i]);
+    for (int i = 0; i < model_count; i++)
+        abandon_file(model_names[i]);
     rmdir(temporary_folder);
 }
 
-/* If there is not enough memory to list the folder, removes the files of a report by their names.
- */
+void output_add_model(const char *folder, const char *stem, char *path, size_t capacity)
+{
+    char name[OUTPUT_NAME_MAX];
+    snprintf(name, sizeof name, "%s" MODEL_ENDING, stem);
+    snprintf(path, capacity, "%s/%s", folder, name);
+    for (int i = 0; i < model_count; i++)
+        if (strcmp(model_names[i], name) == 0)
+            return;
+    if (model_count < OUTPUT_MODELS_MAX) {
+        memcpy(model_names[model_count], name, strlen(name) + 1);
+        model_count++;
+    }
+}
+
+/* Removes the folder with all its files. If there is not enough memory to list the folder, removes
+ * the files with known names. */
 void output_remove(const char *folder)
 {
     if (folder[0] && !remove_folder(folder, false))
@@ -171,7 +190,8 @@ void output_remove(const char *folder)
     temporary_folder[0] = 0;
 }
 
-/* Makes a folder with a hidden name: the library refuses the name of an existing report. */
+/* Makes the temporary folder. `place` may be an existing report, and ebpo_folder_begin fails if its
+ * argument exists, so the argument is a hidden name beside `place`, .NAME.new. */
 static bool make_folder(const char *place, size_t length, char *folder, size_t capacity)
 {
     char *making, hidden[4200];
@@ -212,13 +232,13 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
         return EXIT_FAILED;
     chmod(folder, 0755);
     memcpy(temporary_folder, folder, strlen(folder) + 1);
-    signals_also(abandon_files);
+    signals_set_cleanup(abandon_files);
     return EXIT_OK;
 }
 
-/* Removes the replaced report, and reports files that the user has added to it since it was
- * checked. */
-static bool report_other_files(const char *older)
+/* Removes the folder of the replaced report. Files that the user has added since check_folder are
+ * kept, with a warning. Returns true. */
+static bool remove_replaced(const char *older)
 {
     if (!remove_folder(older, true))
         fprintf(stderr, "ebpo report: warning: other files of the replaced report are now in %s\n",
@@ -234,12 +254,13 @@ bool output_commit(const char *place, const char *folder)
     while (length > 1 && place[length - 1] == '/')
         length--;
     snprintf(target, sizeof target, "%.*s", (int)length, place);
-    /* Replaces atomically, so that a report always exists; some file systems cannot. */
+    /* Exchanges the folders atomically, so that a report always exists under this name. Some file
+     * systems cannot exchange; the two renames below replace the exchange there. */
     errno = 0;
 #ifdef EBPO_HAVE_RENAMEAT2
     if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {
         temporary_folder[0] = 0;
-        return report_other_files(folder);
+        return remove_replaced(folder);
     }
 #endif
     snprintf(older, sizeof older, "%s.old", folder);
@@ -251,5 +272,5 @@ bool output_commit(const char *place, const char *folder)
         return false;
     }
     temporary_folder[0] = 0;
-    return !moved || report_other_files(older);
+    return !moved || remove_replaced(older);
 }

@@ -6,11 +6,21 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "cli/report/report_data.h"
+
+enum {
+    OUTPUT_NAME_MAX = 80, /* bytes of the longest name of a model file, including the final 0 */
+    OUTPUT_MODELS_MAX = METHODS_MAX + 1 /* a file for each method, and one temporary model */
+};
+
 /* Makes the temporary folder. Returns an exit code; errors have been reported on stderr.
  * EXIT_FAILED: `place` exists and is not a report, or the folder cannot be made; EXIT_USAGE: one of
  * the operands (NULL-terminated) is in the report that would be replaced. A folder is a report if
  * all of its files have names of a report and it has report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
+/* Sets `path` to the path of the model file STEM.ebpo.h5 in the temporary folder. A signal removes
+ * this file. Must be called before the file is made. */
+void output_add_model(const char *folder, const char *stem, char *path, size_t capacity);
 /* Renames the folder to `place` and replaces an existing report. Returns false after a failure,
  * reported on stderr. */
 bool output_commit(const char *place, const char *folder);

@@ -1,12 +1,12 @@
-/* Makes subsets for a target, which is an error or a size, and compares the result with the
- * request.
- */
+/* Makes subsets for targets, and compares each subset with its target. A target is the greatest
+ * error or the greatest size that a subset may have. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "cli/bench/bench_run.h"
 #include "cli/report/report_data.h"
+#include "cli/report/report_output.h"
 
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
 static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
@@ -51,8 +51,9 @@ static ebpo_status measure_error(const comparison *c, ebpo_model *model, const c
     return status;
 }
 
-/* Computes the error of the whole file. Leaves cannot be refined: no subset is closer than the last
- * level of the file, which --levels may have omitted. *out: 0 if it is not known. */
+/* Sets *out to the error of the whole file, or 0 if it is not known. No subset has a smaller error,
+ * because leaves cannot be refined. The error of the last level is the error of the file; it is
+ * computed here if --levels omits that level. */
 static ebpo_status find_file_error(const comparison *c, method *m, ebpo_file *file,
                                    ebpo_model *model, double *out, ebpo_error *error)
 {
@@ -78,10 +79,10 @@ static ebpo_status measure_target(comparison *c, method *m, ebpo_file *file, ebp
                                   target_kind kind, double requested, double file_error,
                                   ebpo_error *error)
 {
-    char path[sizeof c->folder + 16];
+    char path[sizeof c->folder + OUTPUT_NAME_MAX];
     target_result *n = &m->targets[m->target_count];
     *n = (target_result){ kind, requested, { NAN, NAN, NAN, NAN, NAN } };
-    snprintf(path, sizeof path, "%s/target.ebpo.h5", c->folder);
+    output_add_model(c->folder, "target", path, sizeof path);
     uint64_t begin = tool_clock();
     ebpo_status status = cut_subset(c, file, n, path, error);
     n->metric[METRIC_SUBSET_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
