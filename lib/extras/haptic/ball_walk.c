@@ -71,9 +71,9 @@ static void try_line(motion_search *t, const double m[3], const double n[3], dou
     double square = ebpo_vec3_dot(line, line);
     if (!(square > 0x1p-40))
         return;
-    double part = ebpo_vec3_dot(t->want, line) / square;
+    double fraction = ebpo_vec3_dot(t->want, line) / square;
     for (int i = 0; i < 3; i++)
-        motion[i] = part * line[i];
+        motion[i] = fraction * line[i];
     try_motion(t, motion, slack / sqrt(square));
 }
 
@@ -154,42 +154,42 @@ static bool moves_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 
 /* Returns a lower bound of the fraction of the path after which the ball touches faces in `e`.
  * Returns minus the overlap if the ball may touch faces at the beginning, and INFINITY if it
- * touches none before the fraction w->part. */
+ * touches none before the fraction w->fraction. */
 static double earliest_contact(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
-    double part = 0;
+    double fraction = 0;
     for (int step = 0; step < STEPS; step++) {
         double off[3];
         for (int i = 0; i < 3; i++) {
-            double x = w->from[i] + part * w->motion[i];
+            double x = w->from[i] + fraction * w->motion[i];
             off[i] = x > e->max[i] ? x - e->max[i] : x < e->min[i] ? x - e->min[i] : 0;
         }
         double distance = sqrt(ebpo_vec3_dot(off, off)),
                gap = distance - (w->contact_distance + 2 * w->band);
         if (gap <= 0)
-            return part > 0 ? part : moves_away(w, e) ? INFINITY : gap;
+            return fraction > 0 ? fraction : moves_away(w, e) ? INFINITY : gap;
         double slope = ebpo_vec3_dot(off, w->motion) / distance;
         if (!(slope < 0))
             return INFINITY;
-        part -= gap / slope;
-        if (!(part <= w->part))
+        fraction -= gap / slope;
+        if (!(fraction <= w->fraction))
             return INFINITY;
     }
-    return part;
+    return fraction;
 }
 
 /* Adds a node to the queue if the ball may touch its faces before the contact found so far. */
 static void push_node(ebpo_ball_walk *w, uint64_t node)
 {
     double key = earliest_contact(w, &w->box->node[node]);
-    if (key < w->part)
+    if (key < w->fraction)
         ebpo_near_push(&w->queue, key, node);
 }
 
 void ebpo_ball_begin(ebpo_ball_walk *w)
 {
     w->stage = EBPO_BALL_SEARCHES;
-    w->part = 1;
+    w->fraction = 1;
     w->contacts.count = 0;
     w->work_limited = false;
     w->queue.count = 0;
@@ -204,13 +204,14 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
         double away[3];
-        double part = ebpo_ball_first_contact(&motion, (const double(*)[3])w->box->corner[f], away);
+        double fraction =
+            ebpo_ball_first_contact(&motion, (const double(*)[3])w->box->corner[f], away);
         work->faces++;
-        if (part > w->part)
+        if (fraction > w->fraction)
             continue;
-        if (part < w->part)
+        if (fraction < w->fraction)
             w->contacts.count = 0;
-        w->part = part;
+        w->fraction = fraction;
         ebpo_held_planes_add(&w->contacts, away);
     }
 }
@@ -220,11 +221,11 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
  * short. */
 static bool end_before_waiting(ebpo_ball_walk *w)
 {
-    if (w->part <= 0)
+    if (w->fraction <= 0)
         return true;
     if (!(w->queue.item[0].key >= least_part))
         return false;
-    w->part = w->queue.item[0].key;
+    w->fraction = w->queue.item[0].key;
     w->contacts.count = 0;
     w->work_limited = true;
     return true;
@@ -234,8 +235,8 @@ static bool end_before_waiting(ebpo_ball_walk *w)
 static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     uint32_t held = work->faces; /* work->faces when a face first held the ball in its position */
-    while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
-        if (w->part <= 0 &&
+    while (w->queue.count > 0 && w->queue.item[0].key < w->fraction) {
+        if (w->fraction <= 0 &&
             (w->contacts.count == EBPO_PLANES_LIMIT || work->faces >= held + HELD_FACES))
             break;
         if (work->faces + EBPO_FACE_BOX_LEAF + KEPT_FACES > EBPO_BALL_FACES ||
@@ -246,7 +247,7 @@ static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
         }
         uint64_t node = ebpo_near_pop(&w->queue).node;
         if (node >= w->box->leaves) {
-            held = w->part > 0 ? work->faces : held;
+            held = w->fraction > 0 ? work->faces : held;
             inspect_leaf(w, node - w->box->leaves, work);
             continue;
         }
@@ -261,9 +262,9 @@ static void begin_check(ebpo_ball_walk *w)
 {
     w->stage = EBPO_BALL_CHECKS;
     for (int i = 0; i < 3; i++)
-        w->to[i] = w->from[i] + w->part * w->motion[i];
+        w->to[i] = w->from[i] + w->fraction * w->motion[i];
     w->depth = 0;
-    if (w->part > 0 && w->box && w->box->count > 0)
+    if (w->fraction > 0 && w->box && w->box->count > 0)
         w->stack[w->depth++] = 1;
 }
 

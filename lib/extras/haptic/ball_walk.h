@@ -45,7 +45,7 @@ typedef struct ebpo_ball_walk {
     double from[3], motion[3]; /* as in ebpo_ball_motion */
     double contact_distance;   /* ebpo_ball_motion.radius */
     double band, slack, least_slack; /* as in ebpo_ball_motion */
-    double part;               /* fraction of the path until the first contact; 1: no contact */
+    double fraction;           /* fraction of the path until the first contact; 1: no contact */
     ebpo_held_planes contacts; /* normals of the contacts at this point of the path */
     bool work_limited;         /* the path ends before the contact, because the limit
                                 * of work was reached */

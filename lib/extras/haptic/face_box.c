@@ -53,7 +53,7 @@ ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error 
     /* NAN, so that nodes intersect nothing and the box contains nothing */
     memset(out->node, 0xff, nodes * sizeof *out->node);
     for (int i = 0; i < 3; i++)
-        out->centres.min[i] = out->centres.max[i] = NAN;
+        out->allowed.min[i] = out->allowed.max[i] = NAN;
     return EBPO_OK;
 }
 
@@ -111,16 +111,16 @@ static void make_tree(ebpo_face_box *box)
 }
 
 ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
-                               const ebpo_extent *centres, double margin, bool *fits,
+                               const ebpo_extent *allowed, double margin, bool *fits,
                                ebpo_error *error)
 {
     loading l = { box, true };
     double min[3], max[3];
     box->count = 0;
-    box->centres = *centres;
+    box->allowed = *allowed;
     for (int i = 0; i < 3; i++) {
-        min[i] = centres->min[i] - margin;
-        max[i] = centres->max[i] + margin;
+        min[i] = allowed->min[i] - margin;
+        max[i] = allowed->max[i] + margin;
     }
     ebpo_vec3_copy(min, box->loaded.min);
     ebpo_vec3_copy(max, box->loaded.max);
@@ -255,24 +255,24 @@ double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, ui
 typedef struct nearest_edge_point {
     double square, offset[3]; /* vector from the nearest point to p */
     int edge;                 /* edge from corner `edge` to the next one */
-    double part;              /* position on the edge */
+    double fraction;          /* position on the edge: 0 at its first corner, 1 at its last */
 } nearest_edge_point;
 
 /* Replaces *best by the nearest point of edge k if that point is nearer. */
 static void try_edge(const double p[3], const double face[3][3], int k, nearest_edge_point *best)
 {
     const double *a = face[k], *b = face[(k + 1) % 3];
-    double e[3], d[3], part = 0;
+    double e[3], d[3], fraction = 0;
     ebpo_vec3_subtract(b, a, e);
     ebpo_vec3_subtract(p, a, d);
     double length = ebpo_vec3_dot(e, e);
     if (length > 0)
-        part = fmin(fmax(ebpo_vec3_dot(d, e) / length, 0), 1);
+        fraction = fmin(fmax(ebpo_vec3_dot(d, e) / length, 0), 1);
     for (int i = 0; i < 3; i++)
-        d[i] -= part * e[i];
+        d[i] -= fraction * e[i];
     double square = ebpo_vec3_dot(d, d);
     if (square < best->square) {
-        *best = (nearest_edge_point){ .square = square, .edge = k, .part = part };
+        *best = (nearest_edge_point){ .square = square, .edge = k, .fraction = fraction };
         for (int i = 0; i < 3; i++)
             best->offset[i] = d[i];
     }
@@ -318,37 +318,41 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
         out->away[i] = out->distance > 0 ? best.offset[i] / out->distance : 0;
         out->weight[i] = 0;
     }
-    out->weight[best.edge] = 1 - best.part;
-    out->weight[(best.edge + 1) % 3] = best.part;
+    out->weight[best.edge] = 1 - best.fraction;
+    out->weight[(best.edge + 1) % 3] = best.fraction;
 }
 
 /* Greatest number of steps of Newton's method. */
 enum { STEPS = 24 };
 
-/* Along a line the distance from a face, which is a convex set, is a convex function. Its graph is
- * above its tangents, so a step of Newton's method never passes the point at which the ball first
- * touches the face. */
-double ebpo_ball_first_contact(const ebpo_ball_motion *w, const double face[3][3], double away[3])
+static const double no_contact = 2; /* every fraction of the path is at most 1 */
+
+/* Searches with Newton's method. Along a line the distance from a face, which is a convex set, is a
+ * convex function. Its graph is above its tangents, so a step of Newton's method never passes the
+ * point at which the ball first touches the face. */
+double ebpo_ball_first_contact(const ebpo_ball_motion *ball, const double face[3][3],
+                               double away[3])
 {
-    double part = 0;
+    double fraction = 0;
     for (int step = 0; step < STEPS; step++) {
         double x[3];
         ebpo_face_near near;
         for (int i = 0; i < 3; i++)
-            x[i] = w->from[i] + part * w->motion[i];
+            x[i] = ball->from[i] + fraction * ball->motion[i];
         ebpo_face_nearest(x, face, &near);
-        double gap = near.distance - w->radius, slope = ebpo_vec3_dot(near.away, w->motion);
+        double gap = near.distance - ball->radius;
+        double slope = ebpo_vec3_dot(near.away, ball->motion);
         for (int i = 0; i < 3; i++)
             away[i] = near.away[i];
-        if (slope >= -(gap > 0 ? w->slack : w->least_slack))
-            return 2;
-        if (gap <= w->band)
-            return part;
-        part -= gap / slope;
-        if (!(part <= 1))
-            return 2;
+        if (slope >= -(gap > 0 ? ball->slack : ball->least_slack))
+            return no_contact;
+        if (gap <= ball->band)
+            return fraction;
+        fraction -= gap / slope;
+        if (!(fraction <= 1))
+            return no_contact;
     }
-    return part;
+    return fraction;
 }
 
 /* Returns the exact sign of the volume of the tetrahedron a, b, c, d: -1, 0 or 1. Returns any other
@@ -371,24 +375,25 @@ static int volume_sign(const double a[3], const double b[3], const double c[3], 
     return value > bound ? 1 : value < -bound ? -1 : ebpo_orient3d_expansion(a, b, c, d);
 }
 
-/* Returns false if the segment and the face, which are in one plane, have no common point. Tests in
- * the projection along an axis if the line of an edge or of pq separates them. Returns true if this
- * cannot be decided without allocating memory. */
+/* Returns false if the segment pq and the face, which are in one plane, certainly have no common
+ * point, and true if they may have one. Projects along `axis`, and searches the lines of the face's
+ * edges and of pq for a line that separates the segment and the face. */
 static bool intersects_in_plane(const double p[3], const double q[3], const double face[3][3],
                                 int axis)
 {
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
     double a[2] = { p[u], p[v] }, b[2] = { q[u], q[v] }, corner[3][2];
-    int turn[3];
+    int orientations[3]; /* of p, q and each corner */
     for (int k = 0; k < 3; k++) {
         corner[k][0] = face[k][u];
         corner[k][1] = face[k][v];
-        turn[k] = ebpo_orient2d_expansion(a, b, corner[k]);
+        orientations[k] = ebpo_orient2d_expansion(a, b, corner[k]);
     }
     int orientation = ebpo_orient2d_expansion(corner[0], corner[1], corner[2]);
     if (orientation != 1 && orientation != -1)
         return orientation != 0;
-    if (turn[0] == turn[1] && turn[1] == turn[2] && (turn[0] == 1 || turn[0] == -1))
+    if (orientations[0] == orientations[1] && orientations[1] == orientations[2] &&
+        (orientations[0] == 1 || orientations[0] == -1))
         return false;
     for (int k = 0; k < 3; k++)
         if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -orientation &&
@@ -504,57 +509,57 @@ typedef enum crossing {
     DEGENERATE /* the segment crosses an edge or a corner, or touches a face */
 } crossing;
 
-/* Counts the crossings along the segment from side->at to `to`. If the result is CROSSED, *side is
- * now the point `to` with its winding number. With other results *side is unchanged. */
-static crossing cross_faces(ebpo_known_winding *side, const ebpo_face_box *box, const double to[3],
+/* Counts the crossings along the segment from start->at to `to`. If the result is CROSSED, *start
+ * is now the point `to` with its winding number. With other results *start is unchanged. */
+static crossing cross_faces(ebpo_known_winding *start, const ebpo_face_box *box, const double to[3],
                             uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
 {
     ebpo_extent around;
     uint32_t count;
     int32_t change = 0;
-    extent_of_segment(side->at, to, &around);
+    extent_of_segment(start->at, to, &around);
     bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
     *work += count;
     if (!all)
         return TOO_MANY;
     for (uint32_t i = 0; i < count; i++) {
-        int sign = segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
+        int sign = segment_crosses(start->at, to, (const double(*)[3])box->corner[found[i]]);
         if (sign == CROSSES_DEGENERATE)
             return DEGENERATE;
         change += sign;
     }
-    side->winding += change;
-    ebpo_vec3_copy(to, side->at);
+    start->winding += change;
+    ebpo_vec3_copy(to, start->at);
     return CROSSED;
 }
 
 /* Sets `via` to a pseudorandom point near the middle of the path, for a detour. Each call returns a
  * different point. */
-static void choose_detour(ebpo_known_winding *side, const double to[3], const ebpo_extent *within,
+static void choose_detour(ebpo_known_winding *start, const double to[3], const ebpo_extent *within,
                           double via[3])
 {
     double length = 0;
     for (int i = 0; i < 3; i++)
-        length = fmax(length, fabs(to[i] - side->at[i]));
+        length = fmax(length, fabs(to[i] - start->at[i]));
     for (int i = 0; i < 3; i++) {
-        side->random = side->random * 1664525u + 1013904223u;
-        double off = (double)(side->random >> 8) * 0x1p-24 - 0.5;
-        via[i] = 0.5 * (side->at[i] + to[i]) + 0.75 * off * length;
+        start->random = start->random * 1664525u + 1013904223u;
+        double off = (double)(start->random >> 8) * 0x1p-24 - 0.5;
+        via[i] = 0.5 * (start->at[i] + to[i]) + 0.75 * off * length;
         via[i] = fmin(fmax(via[i], within->min[i]), within->max[i]);
     }
 }
 
-bool ebpo_known_winding_move(ebpo_known_winding *side, const ebpo_face_box *box,
+bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box,
                              const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
                              uint64_t *work)
 {
     double to[3];
     ebpo_vec3_copy(place, to);
-    side->known = side->known && ebpo_extent_holds(&box->centres, side->at);
-    if (!side->known || !ebpo_extent_holds(&box->centres, place))
+    start->known = start->known && ebpo_extent_holds(&box->allowed, start->at);
+    if (!start->known || !ebpo_extent_holds(&box->allowed, place))
         return false;
     for (int move = 0; move < MOVES_MAX; move++) {
-        switch (cross_faces(side, box, to, found, most, visits, work)) {
+        switch (cross_faces(start, box, to, found, most, visits, work)) {
         case CROSSED:
             if (to[0] == place[0] && to[1] == place[1] && to[2] == place[2])
                 return true;
@@ -562,9 +567,9 @@ bool ebpo_known_winding_move(ebpo_known_winding *side, const ebpo_face_box *box,
             break;
         case TOO_MANY:
             for (int i = 0; i < 3; i++)
-                to[i] = side->at[i] + 0.25 * (to[i] - side->at[i]);
+                to[i] = start->at[i] + 0.25 * (to[i] - start->at[i]);
             break;
-        case DEGENERATE: choose_detour(side, to, &box->centres, to); break;
+        case DEGENERATE: choose_detour(start, to, &box->allowed, to); break;
         }
     }
     return false;

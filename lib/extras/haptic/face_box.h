@@ -27,8 +27,9 @@ static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
 }
 
 typedef struct ebpo_face_box {
-    ebpo_extent centres;      /* positions around which all faces within the margin are loaded */
-    ebpo_extent loaded;       /* `centres`, widened by the margin: all faces that intersect this
+    ebpo_extent allowed;      /* allowed positions of the proxy: all faces within the margin of
+                               * these positions are loaded */
+    ebpo_extent loaded;       /* `allowed`, widened by the margin: all faces that intersect this
                                * extent are loaded */
     uint64_t count, capacity; /* number of loaded faces; greatest possible number */
     uint64_t leaves;          /* number of leaves of the tree: a power of two */
@@ -46,10 +47,10 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity);
 /* Returns the number of leaves of a tree over `count` faces. */
 uint64_t ebpo_face_box_leaves(uint64_t count);
 
-/* Loads the faces within `margin` of the centres. *fits is false if the box has too little memory
- * for these faces. */
+/* Loads the faces within `margin` of the box `allowed`. *fits is false if the box has too little
+ * memory for these faces. */
 EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
-                                             const ebpo_extent *centres, double margin, bool *fits,
+                                             const ebpo_extent *allowed, double margin, bool *fits,
                                              ebpo_error *error);
 
 /* Finds the faces whose boxes intersect `around`, and writes their indices in box->corner to
@@ -92,7 +93,8 @@ typedef struct ebpo_ball_motion {
 /* Returns the fraction of the path, 0 to 1, after which the ball touches the face; the result may
  * be slightly too small. Returns 2 if the ball does not touch the face. `away` is as in
  * ebpo_face_near, at that point of the path. */
-double ebpo_ball_first_contact(const ebpo_ball_motion *w, const double face[3][3], double away[3]);
+double ebpo_ball_first_contact(const ebpo_ball_motion *ball, const double face[3][3],
+                               double away[3]);
 
 /* Returns false if the segment pq and the face, both with their ends and edges, certainly have no
  * common point. Returns true if they have a common point, or if coordinates are so large or small
@@ -130,7 +132,7 @@ typedef struct ebpo_known_winding {
  * `most` faces and `visits` nodes. found[most] is workspace. Adds the number of faces to *work.
  * Returns true if the point is now at `place`. If not, the point is at the last position whose
  * winding number was found, or, if it is outside the box, `known` is false. */
-bool ebpo_known_winding_move(ebpo_known_winding *side, const ebpo_face_box *box,
+bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box,
                              const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
                              uint64_t *work);
 

@@ -48,12 +48,12 @@ static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const doubl
     ebpo_vec3_subtract(device, t->proxy, depth);
     double length = sqrt(ebpo_vec3_dot(slid, slid));
     double friction = t->options.friction * sqrt(ebpo_vec3_dot(depth, depth));
-    double part = length > friction ? 1 - friction / length : 0;
+    double fraction = length > friction ? 1 - friction / length : 0;
     for (int i = 0; i < 3; i++)
-        goal[i] = from[i] + part * slid[i] + (part > 0 ? depth[i] : 0);
+        goal[i] = from[i] + fraction * slid[i] + (fraction > 0 ? depth[i] : 0);
     ebpo_vec3_copy(from, t->proxy);
     t->path_count = 1;
-    if (part > 0)
+    if (fraction > 0)
         return ebpo_haptic_move_ball(t, goal, work);
     if (length > 0 && memcmp(from, t->contact_position, sizeof t->contact_position) == 0)
         t->holding_planes = t->contact_planes; /* the proxy is back at `from` */
@@ -315,10 +315,10 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
  * the proxy, and the loader makes no further box if that box contains the new position. */
 static bool has_box(ebpo_haptic *t)
 {
-    if (ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy) || ebpo_haptic_take_box(t))
+    if (ebpo_extent_holds(&t->box[t->current_box].allowed, t->proxy) || ebpo_haptic_take_box(t))
         return true;
     ebpo_haptic_try_previous_box(t);
-    return ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy);
+    return ebpo_extent_holds(&t->box[t->current_box].allowed, t->proxy);
 }
 
 /* Waits until a box contains the proxy. */
@@ -358,9 +358,9 @@ ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error 
         ebpo_haptic_report(t, device);
         return status;
     }
-    t->side.known = false;
+    t->probed_point.known = false;
     if (t->tool) {
-        ebpo_rigid initial = { .turn = { 0, 0, 0, 1 } };
+        ebpo_rigid initial = { .rotation = { 0, 0, 0, 1 } };
         ebpo_vec3_copy(place, initial.place);
         ebpo_tool_put(t->tool, &initial);
     }

@@ -122,7 +122,7 @@ static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *o
 static bool is_far_from_newest(const ebpo_haptic *t, const ebpo_extent *e)
 {
     for (int i = 0; i < 3; i++)
-        if (!(fabs(e->min[i] + e->max[i] - t->newest_centres.min[i] - t->newest_centres.max[i]) <=
+        if (!(fabs(e->min[i] + e->max[i] - t->newest_allowed.min[i] - t->newest_allowed.max[i]) <=
               2 * reload_shift * t->half_side))
             return true;
     return false;
@@ -146,10 +146,10 @@ static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *
 {
     uint64_t began = ebpo_clock();
     ebpo_face_box *box = &t->box[t->loader_box];
-    ebpo_extent centres;
+    ebpo_extent allowed;
     for (bool fits = false; !fits;) {
-        place_box(t, goal, &centres);
-        ebpo_status status = ebpo_face_box_load(box, t->loading, &centres, t->margin, &fits, error);
+        place_box(t, goal, &allowed);
+        ebpo_status status = ebpo_face_box_load(box, t->loading, &allowed, t->margin, &fits, error);
         if (status != EBPO_OK)
             return status;
         if (fits)
@@ -163,7 +163,7 @@ static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *
                 "(ebpo_haptic_options.faces), or use a smaller radius or search radius",
                 (unsigned long long)t->options.faces);
     }
-    t->newest_centres = centres;
+    t->newest_allowed = allowed;
     /* computed before pass_box, after which the haptic step owns the box */
     bool can_grow = box->count < box->capacity / 4;
     pass_box(t, began);
@@ -179,11 +179,11 @@ static void *loader_run(void *user)
     ebpo_error error = EBPO_ERROR_INIT;
     while (status == EBPO_OK && !atomic_load(&t->stop)) {
         double goal[3];
-        ebpo_extent centres;
+        ebpo_extent allowed;
         predict_device(t, goal);
-        place_box(t, goal, &centres);
+        place_box(t, goal, &allowed);
         bool moved = false;
-        if (is_far_from_newest(t, &centres))
+        if (is_far_from_newest(t, &allowed))
             status = load_boxes(t, goal, &error);
         else if (t->options.kind == EBPO_HAPTIC_PROBE)
             status = query_position(t, &moved, &error);
@@ -202,7 +202,7 @@ static void *loader_run(void *user)
 ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error)
 {
     for (int i = 0; i < 3; i++) {
-        t->newest_centres.min[i] = t->newest_centres.max[i] = NAN; /* NAN: no position is near */
+        t->newest_allowed.min[i] = t->newest_allowed.max[i] = NAN; /* NAN: no position is near */
         t->last_query[i] = NAN;
         t->speed_position[i] = atomic_load(&t->device_reported[i]);
     }

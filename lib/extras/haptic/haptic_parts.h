@@ -69,11 +69,11 @@ struct ebpo_haptic {
     ebpo_haptic_stats stats;
     uint32_t found[EBPO_HAPTIC_FACES];                    /* workspace: faces around the proxy */
     ebpo_near_node nearest_queue[EBPO_HAPTIC_VISITS + 2]; /* workspace of the search for faces */
-    double gap[EBPO_HAPTIC_FACES]; /* distances of the faces in `found` from the ball */
-    double away[3];                /* direction away from the nearest face, if one was found */
-    ebpo_context *proxy_context;   /* for placing the proxy */
-    ebpo_known_winding side;       /* winding number of a probe's position */
-    unsigned step_result;          /* index in known[] of the result that steps use */
+    double gap[EBPO_HAPTIC_FACES];   /* distances of the faces in `found` from the ball */
+    double away[3];                  /* direction away from the nearest face, if one was found */
+    ebpo_context *proxy_context;     /* for placing the proxy */
+    ebpo_known_winding probed_point; /* last probe's position and winding number */
+    unsigned step_result;            /* index in known[] of the result that steps use */
 
     /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
@@ -93,8 +93,8 @@ struct ebpo_haptic {
     unsigned loader_box;                /* index of the box that the loading thread may write */
     unsigned loader_result;             /* index in known[] of the result that it may write */
     double last_query[3];               /* position of the last query for a probe */
-    ebpo_extent newest_centres;         /* `centres` of the newest box */
-    double half_side;                   /* half of the side of `centres` of the next box */
+    ebpo_extent newest_allowed;         /* `allowed` of the newest box */
+    double half_side;                   /* half of the side of `allowed` of the next box */
     double speed_position[3], speed[3]; /* position at speed_time, and speed before it */
     uint64_t speed_time;                /* time of the last measurement, in ns */
     pthread_t thread;

@@ -86,14 +86,14 @@ static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_r
     const ebpo_probe_query *known = &t->known[t->step_result];
     const ebpo_face_box *box = &t->box[t->current_box];
     for (int attempt = 0; attempt < 2; attempt++) {
-        if (ebpo_known_winding_move(&t->side, box, place, t->found, EBPO_HAPTIC_FACES,
+        if (ebpo_known_winding_move(&t->probed_point, box, place, t->found, EBPO_HAPTIC_FACES,
                                     EBPO_HAPTIC_VISITS, &out->work))
             return true;
-        if (t->side.known || !known->valid || known->on_face)
+        if (t->probed_point.known || !known->valid || known->on_face)
             return false;
-        ebpo_vec3_copy(known->place, t->side.at);
-        t->side.winding = known->winding;
-        t->side.known = true;
+        ebpo_vec3_copy(known->place, t->probed_point.at);
+        t->probed_point.winding = known->winding;
+        t->probed_point.known = true;
     }
     return false;
 }
@@ -107,16 +107,16 @@ static int32_t classify_position(ebpo_haptic *t, const double place[3],
     if (!t->solid)
         return EBPO_OUT;
     if (ebpo_held_levels_winding(&t->levels, place, &winding)) {
-        ebpo_vec3_copy(place, t->side.at);
-        t->side.winding = winding;
-        t->side.known = true;
-    } else if (ebpo_extent_holds(&box->centres, place) &&
+        ebpo_vec3_copy(place, t->probed_point.at);
+        t->probed_point.winding = winding;
+        t->probed_point.known = true;
+    } else if (ebpo_extent_holds(&box->allowed, place) &&
                ebpo_is_on_face(box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS)) {
         return EBPO_ON;
     } else if (!find_side(t, place, out)) {
         return EBPO_MAYBE;
     }
-    return ebpo_rule_inside(t->model->info->rule, t->side.winding) ? EBPO_IN : EBPO_OUT;
+    return ebpo_rule_inside(t->model->info->rule, t->probed_point.winding) ? EBPO_IN : EBPO_OUT;
 }
 
 /* Sets the interval of the signed distance. close: the nearest face or the exact distance is known,

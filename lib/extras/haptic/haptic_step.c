@@ -32,7 +32,7 @@ bool ebpo_haptic_take_box(ebpo_haptic *t)
     unsigned received =
         atomic_exchange_explicit(&t->waiting_box, t->previous_box, memory_order_acq_rel);
     t->previous_box = received & ~(unsigned)EBPO_HAPTIC_FRESH;
-    if (!ebpo_extent_holds(&t->box[t->previous_box].centres, t->proxy))
+    if (!ebpo_extent_holds(&t->box[t->previous_box].allowed, t->proxy))
         return false; /* the box was made for another position */
     swap_boxes(t);
     t->stats.taken++;
@@ -41,7 +41,7 @@ bool ebpo_haptic_take_box(ebpo_haptic *t)
 
 void ebpo_haptic_try_previous_box(ebpo_haptic *t)
 {
-    if (ebpo_extent_holds(&t->box[t->previous_box].centres, t->proxy))
+    if (ebpo_extent_holds(&t->box[t->previous_box].allowed, t->proxy))
         swap_boxes(t);
 }
 
@@ -172,7 +172,7 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
                       .nearest = INFINITY,
                       .out = out };
     out->face = EBPO_NO_FACE;
-    if (!ebpo_extent_holds(&a.box->centres, t->proxy)) {
+    if (!ebpo_extent_holds(&a.box->allowed, t->proxy)) {
         if (!has_no_face_close(t))
             out->flags |= EBPO_HAPTIC_FACES_OMITTED;
     } else if (a.box->count > 0) {
@@ -211,35 +211,35 @@ static bool are_apart(const ebpo_extent *a, const ebpo_extent *b)
     return false;
 }
 
-static void shorten_motion(double motion[3], double part)
+static void shorten_motion(double motion[3], double fraction)
 {
     for (int i = 0; i < 3; i++)
-        motion[i] *= part;
+        motion[i] *= fraction;
 }
 
 /* Returns the fraction, 0 to 1, of the path from p that is in `e`; p must be in `e`. The fraction
  * is rounded down, so that the computed end is in `e`, too. */
 static double part_inside(const double p[3], const double motion[3], const ebpo_extent *e)
 {
-    double part = 1;
+    double fraction = 1;
     for (int i = 0; i < 3; i++) {
         double to = p[i] + motion[i];
         if (to > e->max[i])
-            part = fmin(part, (e->max[i] - p[i]) / motion[i]);
+            fraction = fmin(fraction, (e->max[i] - p[i]) / motion[i]);
         else if (to < e->min[i])
-            part = fmin(part, (e->min[i] - p[i]) / motion[i]);
+            fraction = fmin(fraction, (e->min[i] - p[i]) / motion[i]);
     }
-    return part < 1 ? fmax(0, part * (1 - 0x1p-20)) : 1;
+    return fraction < 1 ? fmax(0, fraction * (1 - 0x1p-20)) : 1;
 }
 
 double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double distance)
 {
-    const ebpo_extent *centres = &t->box[t->current_box].centres;
+    const ebpo_extent *allowed = &t->box[t->current_box].allowed;
     ebpo_extent all;
     box_of_path(t->proxy, motion, distance, &all);
     if (are_apart(&all, &t->root))
         return 1;
-    return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, motion, centres) : 0;
+    return ebpo_extent_holds(allowed, t->proxy) ? part_inside(t->proxy, motion, allowed) : 0;
 }
 
 /* Shortens the piece to the part around which all faces are loaded. Returns false if no box
@@ -247,12 +247,12 @@ double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], dou
 static bool cut_to_loaded_part(path_step *s)
 {
     ebpo_haptic *t = s->t;
-    double part = ebpo_haptic_loaded_part(t, s->motion, t->contact_distance + t->band);
-    if (part < 1) {
+    double fraction = ebpo_haptic_loaded_part(t, s->motion, t->contact_distance + t->band);
+    if (fraction < 1) {
         t->end_flags = EBPO_HAPTIC_WAITING;
-        shorten_motion(s->motion, part);
+        shorten_motion(s->motion, fraction);
     }
-    if (part <= 0 && !ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy)) {
+    if (fraction <= 0 && !ebpo_extent_holds(&t->box[t->current_box].allowed, t->proxy)) {
         s->flags |= EBPO_HAPTIC_WAITING;
         return false;
     }
@@ -291,7 +291,7 @@ static bool begin_piece(path_step *s)
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
     /* NULL: the whole piece is away from all faces (cut_to_loaded_part) */
-    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL;
+    w->box = ebpo_extent_holds(&box->allowed, t->proxy) ? box : NULL;
     w->contact_distance = t->contact_distance;
     w->band = t->band;
     w->slack = s->slack * share;
@@ -317,7 +317,7 @@ static void reserve_space(ebpo_held_planes *along, const double motion[3])
 static void add_planes(ebpo_haptic *t)
 {
     const ebpo_ball_walk *w = &t->walk;
-    if (w->part > 0)
+    if (w->fraction > 0)
         t->contact_planes.count = 0;
     else if (t->contact_planes.count + w->contacts.count > EBPO_PLANES_LIMIT)
         reserve_space(&t->contact_planes, w->motion);
@@ -332,8 +332,8 @@ static bool end_piece(path_step *s)
 {
     ebpo_haptic *t = s->t;
     const ebpo_ball_walk *w = &t->walk;
-    bool touches = !w->work_limited && w->part < 1;
-    if (w->part > 0) {
+    bool touches = !w->work_limited && w->fraction < 1;
+    if (w->fraction > 0) {
         ebpo_vec3_copy(w->to, t->proxy);
         ebpo_vec3_copy(w->to, t->path[t->path_count++]);
     }

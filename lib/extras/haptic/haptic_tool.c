@@ -42,7 +42,7 @@ static tool_piece make_piece(ebpo_haptic *t, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
     const ebpo_face_box *box = &t->box[t->current_box];
-    bool known = ebpo_extent_holds(&box->centres, tool->proxy.place);
+    bool known = ebpo_extent_holds(&box->allowed, tool->proxy.place);
     return (tool_piece){ t,
                          tool,
                          known ? box : NULL,
@@ -112,9 +112,9 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     const ebpo_ball_motion w = { from, motion, stop_distance * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
-        double part = ebpo_ball_first_contact(
+        double fraction = ebpo_ball_first_contact(
             &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
-        tool->part = fmin(tool->part, part);
+        tool->fraction = fmin(tool->fraction, fraction);
     }
     tool->close_points[tool->close_count++] =
         (ebpo_close_point){ point, (uint32_t)tool->pool_count, count };
@@ -221,8 +221,8 @@ static bool check_close_point(const tool_piece *p, const ebpo_close_point *close
     for (uint32_t i = 0; i < close->count; i++) {
         const double(*face)[3] = (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
         ebpo_face_nearest(to, face, &near[i]);
-        if (tool->part > 0 && (near[i].distance < least_distance * p->skin + p->t->band ||
-                               ebpo_segment_may_intersect(from, to, face)))
+        if (tool->fraction > 0 && (near[i].distance < least_distance * p->skin + p->t->band ||
+                                   ebpo_segment_may_intersect(from, to, face)))
             return false;
     }
     add_contacts(p, close, near);
@@ -235,8 +235,8 @@ static void begin_check(ebpo_tool *tool)
     tool->next_index = 0;
     tool->next.count = 0;
     tool->end = tool->proxy;
-    if (tool->part > 0)
-        ebpo_rigid_move(&tool->proxy, tool->motion, tool->part, tool->arm, &tool->end);
+    if (tool->fraction > 0)
+        ebpo_rigid_move(&tool->proxy, tool->motion, tool->fraction, tool->arm, &tool->end);
     ebpo_rigid_matrix(&tool->end, tool->end_matrix);
 }
 
@@ -246,7 +246,7 @@ static void end_piece(const tool_piece *p)
     ebpo_tool *tool = p->tool;
     for (uint64_t i = 0; i < tool->cluster_count; i++)
         tool->cluster[i].travelled +=
-            tool->part * max_motion(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
+            tool->fraction * max_motion(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
     tool->contacts = tool->next;
     tool->proxy = tool->end;
     tool->stage = EBPO_TOOL_IDLE;
@@ -258,17 +258,17 @@ static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *fla
 {
     ebpo_tool *tool = t->tool;
     double most = fmin(0.25, sqrt(8 * max_bend * t->options.skin / tool->radius));
-    double angle = sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / tool->arm, part = 1;
+    double angle = sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / tool->arm, fraction = 1;
     if (angle > most)
-        part = most / angle;
+        fraction = most / angle;
     double length = ebpo_screw_length(motion);
-    if (part * length > t->max_piece)
-        part = t->max_piece / length;
-    if (part >= 1)
+    if (fraction * length > t->max_piece)
+        fraction = t->max_piece / length;
+    if (fraction >= 1)
         return;
     *flags |= EBPO_HAPTIC_PATH_UNFINISHED;
     for (int k = 0; k < EBPO_SCREW; k++)
-        motion[k] *= part;
+        motion[k] *= fraction;
 }
 
 /* Begins a piece along `wanted`, which is shortened if necessary. Returns false, and sets a bit of
@@ -280,16 +280,16 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
         tool->motion[k] = wanted[k];
     tool->flags = 0;
     limit_angle(t, tool->motion, &tool->flags);
-    double part =
+    double fraction =
         ebpo_haptic_loaded_part(t, tool->motion, tool->radius + search_distance * t->options.skin);
-    if (part < 1) {
+    if (fraction < 1) {
         tool->flags |= EBPO_HAPTIC_WAITING;
-        if (part <= 0) {
+        if (fraction <= 0) {
             *flags |= EBPO_HAPTIC_WAITING;
             return false;
         }
         for (int k = 0; k < EBPO_SCREW; k++)
-            tool->motion[k] *= part;
+            tool->motion[k] *= fraction;
     }
     ebpo_rigid_matrix(&tool->proxy, tool->from_matrix);
     ebpo_rigid end;
@@ -297,7 +297,7 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     ebpo_rigid_matrix(&end, tool->to_matrix);
     tool->stage = EBPO_TOOL_SEARCHES;
     tool->next_index = tool->close_count = tool->pool_count = 0;
-    tool->part = 1;
+    tool->fraction = 1;
     return true;
 }
 
@@ -336,7 +336,7 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
     *arrived = true;
     if (t->max_piece < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
         t->max_piece *= 2;
-    return tool->part < 1 ? 0 : tool->flags;
+    return tool->fraction < 1 ? 0 : tool->flags;
 }
 
 /* --- the step --- */
@@ -353,9 +353,9 @@ static void apply_friction(const ebpo_haptic *t, const double want[EBPO_SCREW],
         held[k] = want[k] - motion[k];
     double length = ebpo_screw_length(motion);
     double friction = t->options.friction * ebpo_screw_length(held);
-    double part = length > friction ? 1 - friction / length : 0;
+    double fraction = length > friction ? 1 - friction / length : 0;
     for (int k = 0; k < EBPO_SCREW; k++)
-        motion[k] *= part;
+        motion[k] *= fraction;
 }
 
 /* Computes the motion that the contacts allow, and begins a piece along it. Returns false if the
@@ -480,7 +480,7 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
     ebpo_vec3_copy(device.place, t->device);
     ebpo_vec3_copy(tool->proxy.place, out->proxy);
     for (int k = 0; k < 4; k++)
-        out->turn[k] = tool->proxy.turn[k];
+        out->turn[k] = tool->proxy.rotation[k];
     out->flags = flags | (bad_input ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
     if ((flags & EBPO_HAPTIC_WAITING) && tool->stage == EBPO_TOOL_IDLE)
         ebpo_haptic_try_previous_box(t);
@@ -494,7 +494,7 @@ uint32_t ebpo_haptic_tool_path(const ebpo_haptic *t, double path[EBPO_HAPTIC_PAT
     for (uint32_t i = 0; i < count; i++) {
         ebpo_vec3_copy(t->tool->path[i].place, path[i]);
         for (int k = 0; k < 4; k++)
-            path[i][3 + k] = t->tool->path[i].turn[k];
+            path[i][3 + k] = t->tool->path[i].rotation[k];
     }
     return count;
 }

@@ -1,14 +1,17 @@
-/* Computes the motion of a tool, a rigid set of points: the contacts that hold it, and its forces.
+/* Computes the motion of a tool (a rigid set of points), the contacts that hold the tool, and its
+ * forces.
  *
  * Points are split at the middle of their longest side into clusters of few points. A rotation is
- * measured as a length: its angle times the tool's arm.
+ * measured as a length: its angle times the arm, the root mean square distance of the tool's points
+ * from its centre.
  *
- * Contacts constrain the motion of a tool: of the motions that bring no point closer to a face than
- * allowed, the tool makes the motion nearest to the wanted motion. Hildreth's method finds this
- * motion for a few active contacts, which are added one at a time, the most violated contact first.
+ * Contacts constrain the motion of a tool: some motions bring no point closer to a face than
+ * allowed, and the tool makes the one of these that is nearest to the wanted motion. Hildreth's
+ * method finds this motion for a few active contacts, which are added one at a time, the most
+ * violated contact first.
  *
- * Forces are passive: a force is reduced if with it the device could receive more energy than it
- * gave. */
+ * Forces are passive: a force is reduced if it could give the device more energy than the device
+ * has given. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,7 +21,7 @@
 #include "core/error.h"
 #include "extras/haptic/tool.h"
 
-static double passive_product(const double *a, const double *b, int n)
+static double dot_product(const double *a, const double *b, int n)
 {
     double sum = 0;
     for (int i = 0; i < n; i++)
@@ -28,18 +31,18 @@ static double passive_product(const double *a, const double *b, int n)
 
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n)
 {
-    p->energy += passive_product(force, moved, n);
-    p->longest_step = fmax(p->longest_step, sqrt(passive_product(moved, moved, n)));
+    p->energy += dot_product(force, moved, n);
+    p->longest_step = fmax(p->longest_step, sqrt(dot_product(moved, moved, n)));
 }
 
-/* Returns the greatest force F with which the energy that the device receives in total, p->energy,
- * never exceeds A = stiffness s^2, where s is the longest motion of the device in one haptic step.
- * Let g = -p->energy. In a step of length s' the device receives at most F s', and F s' - g must
- * not exceed stiffness max(s, s')^2. This holds for all s' in two cases. First, if F^2 <= 4
- * stiffness g. Second, if F <= 2 stiffness s and F s - g <= A, because for s' >= s the right side
- * then grows faster than the left side. A spring that was pressed steadily to the depth d has F =
- * stiffness d and g of at least stiffness d^2 / 2; then one of the two cases holds, and the force
- * is not reduced. */
+/* Returns the greatest allowed force F. With an allowed force, the energy that the device has
+ * received in total, p->energy, stays at most A = stiffness s^2; s is the longest motion of the
+ * device in one haptic step. Let g = -p->energy, the energy that the device has given so far. In a
+ * step of length s' the device receives at most F s', and F s' - g must not exceed stiffness max(s,
+ * s')^2. This holds for all s' in two cases. First, if F^2 <= 4 stiffness g. Second, if F <= 2
+ * stiffness s and F s - g <= A, because for s' >= s the right side then grows faster than the left
+ * side. A spring that was pressed steadily to the depth d has F = stiffness d and g of at least
+ * stiffness d^2 / 2; then one of the two cases holds, and the force is not reduced. */
 static double max_force(const ebpo_passive *p)
 {
     double k = p->stiffness, g = -p->energy, s = p->longest_step;
@@ -53,35 +56,35 @@ void ebpo_passive_push(const ebpo_passive *p, double damping, const double *dept
 {
     for (int i = 0; i < n; i++)
         force[i] = p->stiffness * depth[i] - damping * moved[i];
-    double into = passive_product(force, depth, n), square = passive_product(depth, depth, n);
-    if (into < 0 && square > 0) /* remove the part that pulls towards the faces */
+    double into = dot_product(force, depth, n), square = dot_product(depth, depth, n);
+    if (into < 0 && square > 0) /* remove the component that pulls towards the faces */
         for (int i = 0; i < n; i++)
             force[i] -= into / square * depth[i];
-    double length = sqrt(passive_product(force, force, n)), most = max_force(p);
+    double length = sqrt(dot_product(force, force, n)), most = max_force(p);
     if (length > most)
         for (int i = 0; i < n; i++)
             force[i] *= most / length;
 }
 
-bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *out)
+bool ebpo_rigid_read(const double place[3], const double rotation[4], ebpo_rigid *out)
 {
     double most = 0, square = 0, unit[4];
     bool valid = true;
     for (int i = 0; i < 3; i++)
         valid &= fabs(place[i]) <= 0x1p200;
     for (int i = 0; i < 4; i++) {
-        valid &= isfinite(turn[i]) != 0;
-        most = fmax(most, fabs(turn[i]));
+        valid &= isfinite(rotation[i]) != 0;
+        most = fmax(most, fabs(rotation[i]));
     }
     if (!valid || !(most >= 0x1p-500))
         return false;
     for (int i = 0; i < 4; i++) {
-        unit[i] = turn[i] / most;
+        unit[i] = rotation[i] / most;
         square += unit[i] * unit[i];
     }
     ebpo_vec3_copy(place, out->place);
     for (int i = 0; i < 4; i++)
-        out->turn[i] = unit[i] / sqrt(square);
+        out->rotation[i] = unit[i] / sqrt(square);
     return true;
 }
 
@@ -97,34 +100,34 @@ static void rigid_multiply(const double a[4], const double b[4], double out[4])
 void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
                         double out[EBPO_SCREW])
 {
-    const double back[4] = { -a->turn[0], -a->turn[1], -a->turn[2], a->turn[3] };
+    const double back[4] = { -a->rotation[0], -a->rotation[1], -a->rotation[2], a->rotation[3] };
     double q[4];
     ebpo_vec3_subtract(b->place, a->place, out);
-    rigid_multiply(b->turn, back, q);
-    double sine = sqrt(ebpo_vec3_dot(q, q)), side = q[3] < 0 ? -1 : 1;
-    double angle = 2 * atan2(sine, side * q[3]);
+    rigid_multiply(b->rotation, back, q);
+    double sine = sqrt(ebpo_vec3_dot(q, q)), sign = q[3] < 0 ? -1 : 1;
+    double angle = 2 * atan2(sine, sign * q[3]);
     for (int i = 0; i < 3; i++)
-        out[3 + i] = sine > 0 ? arm * (side * angle / sine) * q[i] : 0;
+        out[3 + i] = sine > 0 ? arm * (sign * angle / sine) * q[i] : 0;
 }
 
-void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part,
+void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double fraction,
                      double arm, ebpo_rigid *out)
 {
-    double by[4], q[4], place[3];
-    double angle = part * sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / arm;
+    double rotation[4], q[4], place[3];
+    double angle = fraction * sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / arm;
     for (int i = 0; i < 3; i++) {
-        place[i] = from->place[i] + part * motion[i];
-        by[i] = angle > 0 ? sin(angle / 2) / angle * (part * motion[3 + i] / arm) : 0;
+        place[i] = from->place[i] + fraction * motion[i];
+        rotation[i] = angle > 0 ? sin(angle / 2) / angle * (fraction * motion[3 + i] / arm) : 0;
     }
-    by[3] = cos(angle / 2);
-    rigid_multiply(by, from->turn, q);
+    rotation[3] = cos(angle / 2);
+    rigid_multiply(rotation, from->rotation, q);
     *out = *from;
     (void)ebpo_rigid_read(place, q, out);
 }
 
 void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
 {
-    const double *q = r->turn;
+    const double *q = r->rotation;
     for (int i = 0; i < 3; i++) {
         int j = (i + 1) % 3, k = (i + 2) % 3;
         out[i][i] = 1 - 2 * (q[j] * q[j] + q[k] * q[k]);
@@ -172,13 +175,13 @@ void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *con
         swap_contacts(all, i, (i - 1) / 2);
 }
 
-/* State of Hildreth's method. */
+/* State of Hildreth's method. The active contacts are those that the method uses. */
 typedef struct hold_state {
     const ebpo_tool_contacts *all;
     int active[ACTIVE_MAX], count; /* indices of the active contacts */
     double force[ACTIVE_MAX];      /* multiplier of each active contact */
     double square[ACTIVE_MAX];     /* grip . grip of each active contact */
-    bool release;
+    bool release;                  /* see ebpo_tool_hold */
 } hold_state;
 
 /* Returns the length by which the motion violates a contact; negative if it does not. */
@@ -192,15 +195,15 @@ static double violation_of(const hold_state *h, const ebpo_tool_contact *c,
 /* Iterates over the active contacts until no multiplier changes much. */
 static void hold_sweep(hold_state *h, double tolerance, double motion[EBPO_SCREW])
 {
-    for (int turn = 0; turn < SWEEPS; turn++) {
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
         double most = 0;
         for (int i = 0; i < h->count; i++) {
             const ebpo_tool_contact *c = &h->all->at[h->active[i]];
-            double by = fmax(violation_of(h, c, motion) / h->square[i], -h->force[i]);
-            h->force[i] += by;
+            double change = fmax(violation_of(h, c, motion) / h->square[i], -h->force[i]);
+            h->force[i] += change;
             for (int k = 0; k < EBPO_SCREW; k++)
-                motion[k] += by * c->grip[k];
-            most = fmax(most, fabs(by) * h->square[i]);
+                motion[k] += change * c->grip[k];
+            most = fmax(most, fabs(change) * h->square[i]);
         }
         if (most <= tolerance / 8)
             return;
@@ -223,7 +226,7 @@ static int most_violated(const hold_state *h, double tolerance, const double mot
     for (int i = 0; i < h->count; i++)
         if (h->active[i] == found)
             return -1; /* only more iterations could reduce the violation; if it is too great, the
-                        * check of the points finds it */
+                        * second pass (EBPO_TOOL_CHECKS) detects it */
     return found;
 }
 

@@ -23,31 +23,33 @@ typedef struct ebpo_passive {
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n);
 
 /* Computes the force: stiffness times `depth` (the vector from device to proxy), minus `damping`
- * times `moved`, limited so that it is passive. The force never opposes `depth`. All vectors have n
+ * times `moved`, limited so that it is passive. The force never has a component against
+ * `depth`. All vectors have n
  * components. */
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);
 
-/* --- rigid motions; a rotation is measured as a length: its angle times the tool's arm --- */
+/* --- rigid motions; a rotation is measured as a length: its angle times the arm, the root mean
+ * square distance of the tool's points from its centre --- */
 
 /* The position of a tool. */
 typedef struct ebpo_rigid {
-    double place[3]; /* position of the tool's centre */
-    double turn[4];  /* rotation, a unit quaternion x, y, z, w */
+    double place[3];    /* position of the tool's centre */
+    double rotation[4]; /* rotation, a unit quaternion x, y, z, w */
 } ebpo_rigid;
 
 /* Number of components of a rigid motion: translation, then rotation vector times the arm. */
 enum { EBPO_SCREW = 6 };
 
 /* Returns false if values are not finite or the quaternion is invalid. */
-bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *out);
+bool ebpo_rigid_read(const double place[3], const double rotation[4], ebpo_rigid *out);
 
 /* Computes the motion from a to b, in the world's axes, by the shorter rotation. */
 void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
                         double out[EBPO_SCREW]);
 
-/* Moves `from` by the fraction `part`, 0 to 1, of the motion. */
-void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part,
+/* Sets `out` to `from`, moved by a fraction, 0 to 1, of the motion. */
+void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double fraction,
                      double arm, ebpo_rigid *out);
 
 void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3]);
@@ -88,8 +90,8 @@ typedef struct ebpo_tool_contacts {
     int count;
 } ebpo_tool_contacts;
 
-/* Adds a contact. If the heap is full, replaces the contact with the largest gap, if that is
- * larger. */
+/* Adds a contact. If the heap is full, the contact replaces the one with the largest gap, or is
+ * ignored if its own gap is not smaller. */
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
 /* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts. The error
@@ -148,7 +150,7 @@ typedef struct ebpo_tool {
     /* The current piece of path; the next haptic step continues it. */
     ebpo_tool_stage stage;
     double motion[EBPO_SCREW]; /* motion of the whole piece */
-    double part;               /* fraction of the piece that is free */
+    double fraction;           /* fraction of the piece that is free */
     ebpo_rigid end;            /* position of the tool at this fraction */
     double from_matrix[3][3];  /* rotation at the beginning of the piece */
     double to_matrix[3][3];    /* rotation at the end of the whole piece */

@@ -1,9 +1,9 @@
 /* Writes paint files: annotations of a model (layers, strokes, notes). The table ebpo_paint_columns
  * (paint_open.c) lists their arrays.
  *
- * A file is written under a temporary name and published when it is complete. The file of a paint
- * is replaced only if it has not changed since it was read or last saved. So a change by another
- * program is not lost.
+ * A file is written under a temporary name and published when it is complete. An existing
+ * file is replaced only if it has not changed since the annotations were read from it or last saved
+ * to it. So a change by another program is not lost.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -168,8 +168,9 @@ static uint64_t header_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* Stores the version of the file that was just saved, with which the next save compares the file at
- * `path`. Takes ownership of `path` and of the open file `fd`. */
+/* Stores the version of the saved file. The next save compares the file at `path` with this
+ * version, to detect a change by another program. Takes ownership of `path` and of the open file
+ * `fd`. */
 static void remember_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
@@ -189,8 +190,8 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error
     char *target;
     int fd = -1;
     ebpo_status status = ebpo_target_path(path, &target, error);
-    /* to_own_file: `path` is the file that was read or last saved; first: the paint has no file yet
-     */
+    /* to_own_file: `path` is the file that was read or last saved; first: the annotations have no
+     * file yet */
     bool to_own_file = target && f->path && strcmp(f->path, target) == 0, first = !f->path;
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&publish, path, error);

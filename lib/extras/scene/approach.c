@@ -5,10 +5,10 @@
  * instances changes by at most their motion. The first search goes forward in time from one
  * evaluation to the next. Between two evaluations the motion is shorter than the distance minus the
  * clearance, so no contact is missed.
- * The second search divides the interval into parts, and keeps them in a heap, ordered by a lower
- * bound of the distance in each part. It halves the first part until the result is within the
- * tolerance. Routes jump only at ends of parts. A result is a pair of guaranteed bounds. A search
- * that needs too many evaluations returns its current bounds.
+ * The second search divides the interval of time into shorter ones, and keeps these in a heap,
+ * ordered by a lower bound of the distance in each interval. It halves the first interval of the
+ * heap until the result is within the tolerance. Routes jump only at ends of intervals. A result is
+ * a pair of guaranteed bounds. A search that needs too many evaluations returns its current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -25,20 +25,20 @@
 /* The search for the first approach of each pair. */
 typedef struct approach_search {
     const ebpo_scene *scene;
-    ebpo_scene_approach_options how;
-    double from, to;
+    ebpo_scene_approach_options options;
+    double from, to; /* the interval of time */
 } approach_search;
 
 /* Sets *next to the time of the next evaluation, so that the motion from result->time to *next is
- * shorter than `gap`. Sets *next to result->time if no later time is possible. */
+ * shorter than `max_motion`. Sets *next to result->time if no later time is possible. */
 static ebpo_status next_evaluation(const approach_search *search,
                                    const ebpo_scene_evaluations *evaluations,
-                                   const ebpo_scene_approach_result *result, double gap,
+                                   const ebpo_scene_approach_result *result, double max_motion,
                                    double *next, ebpo_error *error)
 {
     double low = result->time, high = search->to, at = high, length = 0;
     ebpo_status status = ebpo_scene_evaluations_motion(evaluations, low, at, &length, error);
-    if (status != EBPO_OK || length < gap) {
+    if (status != EBPO_OK || length < max_motion) {
         *next = at;
         return status;
     }
@@ -46,7 +46,7 @@ static ebpo_status next_evaluation(const approach_search *search,
     for (int n = 0; n < 70 && status == EBPO_OK && (low == result->time || n < 8); n++) {
         at = low + (high - low) / 2;
         status = ebpo_scene_evaluations_motion(evaluations, result->time, at, &length, error);
-        if (length < gap)
+        if (length < max_motion)
             low = at;
         else
             high = at;
@@ -55,9 +55,9 @@ static ebpo_status next_evaluation(const approach_search *search,
     return status;
 }
 
-/* Called if even the shortest step is too long. Sets *next to the next representable time if the
- * pair jumps there: the motion is INFINITY. Otherwise rounding alone exceeds the gap, and *next
- * stays unchanged. */
+/* Called if the motion to the next representable time is already too long. If this motion is
+ * INFINITY, because a route jumps at that time, sets *next to that time. Otherwise the bound of the
+ * rounding alone is too long, and *next stays unchanged. */
 static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
                                   const ebpo_scene_approach_result *result, double *next,
                                   ebpo_error *error)
@@ -73,7 +73,7 @@ static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
 /* Returns true if the pair is within its clearance, plus the tolerance. */
 static bool is_reached(const approach_search *search, const ebpo_scene_approach_result *result)
 {
-    return ebpo_scene_is_within(result->hi, result->clearance, search->how.tolerance);
+    return ebpo_scene_is_within(result->hi, result->clearance, search->options.tolerance);
 }
 
 static ebpo_status approach_evaluate(const approach_search *search,
@@ -83,9 +83,10 @@ static ebpo_status approach_evaluate(const approach_search *search,
     ebpo_status status =
         ebpo_scene_evaluate(evaluations, result->time, &result->lo, &result->hi, error);
     result->evaluations++;
-    if (status != EBPO_OK || is_reached(search, result) || evaluations->gap > result->clearance)
+    if (status != EBPO_OK || is_reached(search, result) ||
+        evaluations->omitted_distance > result->clearance)
         return status;
-    return ebpo_scene_fail_omitted(search->scene, evaluations->pair, evaluations->lacking,
+    return ebpo_scene_fail_omitted(search->scene, evaluations->pair, evaluations->omitted_in,
                                    result->time, false, error);
 }
 
@@ -108,7 +109,7 @@ static ebpo_status follow_pair(const approach_search *search, ebpo_scene_evaluat
             status = move_past_jump(evaluations, result, &next, error);
         if (status != EBPO_OK)
             return status;
-        if (result->evaluations >= search->how.max_evaluations || !(next > result->time)) {
+        if (result->evaluations >= search->options.max_evaluations || !(next > result->time)) {
             result->reached = -1;
             return EBPO_OK;
         }
@@ -116,17 +117,17 @@ static ebpo_status follow_pair(const approach_search *search, ebpo_scene_evaluat
     }
 }
 
-static ebpo_status find_approach(const void *how, const ebpo_scene_pair *pair, void *result,
+static ebpo_status find_approach(const void *context, const ebpo_scene_pair *pair, void *result,
                                  ebpo_error *error)
 {
-    const approach_search *search = how;
+    const approach_search *search = context;
     ebpo_scene_approach_result *approach = result;
     ebpo_scene_evaluations evaluations;
     *approach = (ebpo_scene_approach_result){
         .a = pair->a, .b = pair->b, .time = search->from, .clearance = pair->clearance
     };
     ebpo_status status = ebpo_scene_evaluations_begin(&evaluations, search->scene, pair,
-                                                      search->how.tolerance, error);
+                                                      search->options.tolerance, error);
     if (status == EBPO_OK)
         status = follow_pair(search, &evaluations, approach, error);
     ebpo_collider_free(evaluations.collider);
@@ -139,17 +140,17 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 {
     EBPO_DEFAULT_FP;
     approach_search t = {
-        .scene = scene, .how = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to
+        .scene = scene, .options = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to
     };
     void *approaches = NULL;
     uint64_t count = 0;
-    ebpo_status status = ebpo_scene_take_approach_options(&t.how, options, error);
+    ebpo_status status = ebpo_scene_take_approach_options(&t.options, options, error);
     ebpo_scene_search search = { find_approach,
                                  &t,
                                  sizeof(ebpo_scene_approach_result),
                                  1,
-                                 t.how.threads,
-                                 &t.how.progress,
+                                 t.options.threads,
+                                 &t.options.progress,
                                  "following routes" };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, from, to, &search, &approaches, &count, error);
@@ -167,48 +168,49 @@ typedef struct least_search {
     uint64_t max_evaluations;
 } least_search;
 
-/* A part of the interval of time; no route jumps inside it. */
-typedef struct time_part {
+/* A part of the searched interval of time. No route jumps inside it. */
+typedef struct time_interval {
     double from, to;
     double at_from, at_to; /* lower bounds of the distance at both ends */
-    double motion;         /* bound of the change of the distance in the part */
-    double least;          /* lower bound of the distance in the part */
-} time_part;
+    double motion;         /* upper bound of the change of the distance from one end to the other */
+    double least;          /* lower bound of the distance in the interval */
+} time_interval;
 
-typedef struct part_search {
+typedef struct interval_search {
     ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
-    /* The least lower bound of the distance at times when faces that a subset file omits may be
-     * nearer than all others. The lower bound of the result cannot exceed it. INFINITY: none. */
+    /* At some of the evaluated times, a face that a file omits may be the nearest one. The limit is
+     * the least lower bound of the distance at these times, and the result's lower bound is at most
+     * the limit. INFINITY: there is no such time. */
     double limit;
-    EBPO_SCENE_LIST(time_part, parts); /* a heap; parts[0] has the least `least` */
-} part_search;
+    EBPO_SCENE_LIST(time_interval, intervals); /* a heap; intervals[0] has the least `least` */
+} interval_search;
 
-/* --- parts --- */
+/* --- intervals of time --- */
 
-static bool is_less(const time_part *a, const time_part *b) { return a->least < b->least; }
+static bool is_less(const time_interval *a, const time_interval *b) { return a->least < b->least; }
 
-EBPO_HEAP(heap, time_part, is_less)
+EBPO_HEAP(heap, time_interval, is_less)
 
-static ebpo_status put_part(part_search *s, const time_part *p, ebpo_error *error)
+static ebpo_status put_interval(interval_search *s, const time_interval *p, ebpo_error *error)
 {
-    uint64_t count = s->parts_count;
-    if (!ebpo_grow(&s->parts, &s->parts_capacity, count + 1, sizeof *s->parts))
-        return ebpo_fail_memory(error, (count + 1) * sizeof *s->parts);
-    heap_add(s->parts, s->parts_count++, p);
+    uint64_t count = s->intervals_count;
+    if (!ebpo_grow(&s->intervals, &s->intervals_capacity, count + 1, sizeof *s->intervals))
+        return ebpo_fail_memory(error, (count + 1) * sizeof *s->intervals);
+    heap_add(s->intervals, s->intervals_count++, p);
     return EBPO_OK;
 }
 
 /* --- evaluations --- */
 
 /* Evaluates the distance at a time, sets *lo, and updates the upper bound of the result. */
-static ebpo_status least_distance_evaluate(part_search *s, double time, double *lo,
+static ebpo_status least_distance_evaluate(interval_search *s, double time, double *lo,
                                            ebpo_error *error)
 {
     double hi;
     ebpo_status status = ebpo_scene_evaluate(&s->evaluations, time, lo, &hi, error);
     s->out->evaluations++;
-    if (status == EBPO_OK && s->evaluations.gap < hi)
+    if (status == EBPO_OK && s->evaluations.omitted_distance < hi)
         s->limit = fmin(s->limit, *lo);
     if (status == EBPO_OK && hi < s->out->hi) {
         s->out->hi = hi;
@@ -217,9 +219,9 @@ static ebpo_status least_distance_evaluate(part_search *s, double time, double *
     return status;
 }
 
-/* Adds a part. From one end of the part to the other, the distance changes by at most p.motion in
- * total, so between the ends it is at least (at_from + at_to - motion) / 2. */
-static ebpo_status add_part(part_search *s, time_part p, ebpo_error *error)
+/* Adds an interval. From one end of the interval to the other, the distance changes by at most
+ * p.motion in total, so between the ends it is at least (at_from + at_to - motion) / 2. */
+static ebpo_status add_interval(interval_search *s, time_interval p, ebpo_error *error)
 {
     ebpo_status status =
         ebpo_scene_evaluations_motion(&s->evaluations, p.from, p.to, &p.motion, error);
@@ -227,43 +229,44 @@ static ebpo_status add_part(part_search *s, time_part p, ebpo_error *error)
         return status;
     p.least = fmin(fmin(p.at_from, p.at_to), (p.at_from + p.at_to - p.motion) / 2);
     p.least = p.least > 0 ? p.least * (1 - 0x1p-50) : 0;
-    return put_part(s, &p, error);
+    return put_interval(s, &p, error);
 }
 
-static ebpo_status least_distance_halve(part_search *s, const time_part *p, double middle,
+static ebpo_status least_distance_halve(interval_search *s, const time_interval *p, double middle,
                                         ebpo_error *error)
 {
     double at_middle;
     ebpo_status status = least_distance_evaluate(s, middle, &at_middle, error);
     if (status == EBPO_OK)
-        status = add_part(s, (time_part){ p->from, middle, p->at_from, at_middle, 0, 0 }, error);
+        status =
+            add_interval(s, (time_interval){ p->from, middle, p->at_from, at_middle, 0, 0 }, error);
     return status == EBPO_OK
-               ? add_part(s, (time_part){ middle, p->to, at_middle, p->at_to, 0, 0 }, error)
+               ? add_interval(s, (time_interval){ middle, p->to, at_middle, p->at_to, 0, 0 }, error)
                : status;
 }
 
 /* Returns the time of the next key, at which routes may jump. If both instances follow one route,
  * their distance does not jump, and `to` is returned. */
-static double next_jump(const part_search *s, double from, double to)
+static double next_jump(const interval_search *s, double from, double to)
 {
     return s->evaluations.shares_route
                ? to
                : ebpo_scene_pair_next(s->evaluations.scene, s->evaluations.pair, from, to);
 }
 
-/* Makes parts between consecutive keys, so that routes jump only between parts. */
-static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_error *error)
+/* Makes intervals between consecutive keys, so that routes jump only between intervals. */
+static ebpo_status begin_intervals(interval_search *s, double from, double to, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (double at = from; status == EBPO_OK;) {
         double next = next_jump(s, at, to), end = next > at ? nextafter(next, -INFINITY) : at;
-        time_part p = { .from = at, .to = end };
+        time_interval p = { .from = at, .to = end };
         status = least_distance_evaluate(s, at, &p.at_from, error);
         p.at_to = p.at_from;
         if (status == EBPO_OK && end > at)
             status = least_distance_evaluate(s, end, &p.at_to, error);
         if (status == EBPO_OK)
-            status = add_part(s, p, error);
+            status = add_interval(s, p, error);
         if (!(next > at))
             break;
         at = next;
@@ -271,21 +274,21 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
     return status;
 }
 
-/* Returns true if the lower bound of the first part p is within the tolerance or cannot be
- * improved, because omitted faces limit it, evaluations are used up, or the part is too short. */
-static bool is_done(const part_search *s, const time_part *p, double middle,
-                    const least_search *how)
+/* Returns true if the lower bound of the first interval p is within the tolerance or cannot be
+ * improved, because omitted faces limit it, evaluations are used up, or p is too short. */
+static bool is_done(const interval_search *s, const time_interval *p, double middle,
+                    const least_search *search)
 {
     double hi = s->out->hi;
-    double least_gap = hi - s->limit; /* hi - lo cannot be less, because of omitted faces */
-    return ebpo_scene_is_within(hi, p->least, how->tolerance) ||
-           s->limit - p->least <= least_gap / 8 || s->out->evaluations >= how->max_evaluations ||
-           p->motion <= how->tolerance / 8 || !(middle > p->from && middle < p->to);
+    double min_width = hi - s->limit; /* hi - lo cannot be less, because of omitted faces */
+    return ebpo_scene_is_within(hi, p->least, search->tolerance) ||
+           s->limit - p->least <= min_width / 8 || s->out->evaluations >= search->max_evaluations ||
+           p->motion <= search->tolerance / 8 || !(middle > p->from && middle < p->to);
 }
 
-/* Sets *out to true if at least half of the part's motion is a bound of rounding, which does not
- * become smaller if the part is halved. */
-static ebpo_status is_rounding(const part_search *s, const time_part *p, bool *out,
+/* Sets *out to true if at least half of the motion bound of the interval p comes from rounding,
+ * which does not become smaller if p is halved. */
+static ebpo_status is_rounding(const interval_search *s, const time_interval *p, bool *out,
                                ebpo_error *error)
 {
     double least = 0;
@@ -295,15 +298,16 @@ static ebpo_status is_rounding(const part_search *s, const time_part *p, bool *o
     return status;
 }
 
-/* Halves the first part of the heap until its lower bound is good enough. */
-static ebpo_status least_distance_narrow(part_search *s, const least_search *how, ebpo_error *error)
+/* Halves the first interval of the heap until its lower bound is good enough. */
+static ebpo_status least_distance_narrow(interval_search *s, const least_search *search,
+                                         ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK) {
-        time_part p = heap_take(s->parts, s->parts_count--);
+        time_interval p = heap_take(s->intervals, s->intervals_count--);
         double middle = p.from + (p.to - p.from) / 2;
         s->out->lo = fmin(p.least, s->out->hi);
-        bool done = is_done(s, &p, middle, how);
+        bool done = is_done(s, &p, middle, search);
         if (!done)
             status = is_rounding(s, &p, &done, error);
         if (done)
@@ -317,20 +321,22 @@ static ebpo_status least_distance_narrow(part_search *s, const least_search *how
 static ebpo_status find_least(const void *context, const ebpo_scene_pair *pair, void *result,
                               ebpo_error *error)
 {
-    const least_search *how = context;
+    const least_search *search = context;
     ebpo_scene_least *out = result;
-    part_search s = { .limit = INFINITY, .out = out };
-    *out = (ebpo_scene_least){
-        .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
-    };
+    interval_search s = { .limit = INFINITY, .out = out };
+    *out = (ebpo_scene_least){ .a = pair->a,
+                               .b = pair->b,
+                               .time = search->from,
+                               .hi = INFINITY,
+                               .clearance = pair->clearance };
     ebpo_status status =
-        ebpo_scene_evaluations_begin(&s.evaluations, how->scene, pair, how->tolerance, error);
+        ebpo_scene_evaluations_begin(&s.evaluations, search->scene, pair, search->tolerance, error);
     if (status == EBPO_OK)
-        status = begin_parts(&s, how->from, how->to, error);
+        status = begin_intervals(&s, search->from, search->to, error);
     if (status == EBPO_OK)
-        status = least_distance_narrow(&s, how, error);
+        status = least_distance_narrow(&s, search, error);
     ebpo_collider_free(s.evaluations.collider);
-    free(s.parts);
+    free(s.intervals);
     return status;
 }
 
@@ -340,14 +346,15 @@ ebpo_status ebpo_scene_least_distances(ebpo_scene *scene, double from, double to
 {
     EBPO_DEFAULT_FP;
     least_search s = { .scene = scene, .from = from, .to = to };
-    ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
+    ebpo_scene_approach_options checked = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     void *found = NULL;
     uint64_t count = 0;
-    ebpo_status status = ebpo_scene_take_approach_options(&how, options, error);
-    s.tolerance = how.tolerance;
-    s.max_evaluations = how.max_evaluations;
+    ebpo_status status = ebpo_scene_take_approach_options(&checked, options, error);
+    s.tolerance = checked.tolerance;
+    s.max_evaluations = checked.max_evaluations;
     ebpo_scene_search search = {
-        find_least, &s, sizeof(ebpo_scene_least), 1, how.threads, &how.progress, "following routes"
+        find_least,        &s, sizeof(ebpo_scene_least), 1, checked.threads, &checked.progress,
+        "following routes"
     };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, from, to, &search, &found, &count, error);

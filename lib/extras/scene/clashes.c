@@ -26,7 +26,7 @@
 
 /* A query of two instances at their poses. */
 typedef struct scene_two {
-    const ebpo_scene_clash_options *how; /* requested results */
+    const ebpo_scene_clash_options *requested;
     ebpo_collider *collider;
     const ebpo_collide_options *options; /* the poses of both instances */
     bool solid[2];                       /* true: the model is a solid, false: a surface */
@@ -171,7 +171,7 @@ static void scene_report_nearest(const scene_two *two, const ebpo_collide_distan
     clash->face_b = nearest->pair.face_b;
     for (int k = 0; k < 3; k++)
         middle[k] = nearest->point_a[k] / 2 + nearest->point_b[k] / 2;
-    if (two->how->locations)
+    if (two->requested->locations)
         set_location(clash, middle);
 }
 
@@ -230,11 +230,12 @@ static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_p
 {
     clash->face_a = first->face_a;
     clash->face_b = first->face_b;
-    if (two->how->count)
-        return two->how->locations ? count_with_location(two, first, clash, error)
-                                   : count_all(two, NULL, first, clash, error);
+    if (two->requested->count)
+        return two->requested->locations ? count_with_location(two, first, clash, error)
+                                         : count_all(two, NULL, first, clash, error);
     ebpo_status status = find_kind(two, first, clash, error);
-    return status == EBPO_OK && two->how->locations ? locate_first(two, clash, error) : status;
+    return status == EBPO_OK && two->requested->locations ? locate_first(two, clash, error)
+                                                          : status;
 }
 
 /* Returns true if a point of one model is inside the other model. If not, the depth is 0 and needs
@@ -250,10 +251,10 @@ static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *c
                                        ebpo_error *error)
 {
     static const ebpo_value_bounds none = { 0, 0, EBPO_VALUE_EXACT, 0 };
-    if (!(two->how->depth > 0))
+    if (!(two->requested->depth > 0))
         return EBPO_OK;
     if (is_any_inner(clash->relation) && (two->solid[0] || two->solid[1]))
-        return ebpo_collide_depth(two->collider, two->options, two->how->depth,
+        return ebpo_collide_depth(two->collider, two->options, two->requested->depth,
                                   two->solid[1] ? &clash->depth[0] : NULL,
                                   two->solid[0] ? &clash->depth[1] : NULL, error);
     for (int i = 0; i < 2; i++)
@@ -266,7 +267,7 @@ static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *c
 
 typedef struct clash_query {
     const ebpo_scene *scene;
-    ebpo_scene_clash_options how;
+    ebpo_scene_clash_options requested;
     double time;
 } clash_query;
 
@@ -282,10 +283,10 @@ static ebpo_clash_kind kind_of(const ebpo_scene_clash *clash)
  * Computes the distance only if it is less than the clearance. */
 static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
-    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_options limit = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result found;
-    how.at_least = clash->clearance;
-    ebpo_status status = ebpo_collide_distance(two->collider, two->options, &how, &found, error);
+    limit.at_least = clash->clearance;
+    ebpo_status status = ebpo_collide_distance(two->collider, two->options, &limit, &found, error);
     if (status != EBPO_OK || found.at_least == 1)
         return status;
     status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
@@ -316,7 +317,7 @@ static ebpo_status query_disjoint_faces(const scene_two *two, ebpo_scene_clash *
                                         ebpo_error *error)
 {
     ebpo_collide_distance_result found;
-    ebpo_status status = two->how->relate ? query_relation(two, clash, error) : EBPO_OK;
+    ebpo_status status = two->requested->relate ? query_relation(two, clash, error) : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (clash->kind == EBPO_CLASH_NONE) {
@@ -340,7 +341,7 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *clash, eb
         return query_disjoint_faces(two, clash, error);
     status = scene_report_contacts(two, &first, clash, error);
     clash->kind = kind_of(clash);
-    if (status == EBPO_OK && two->how->relate)
+    if (status == EBPO_OK && two->requested->relate)
         status = query_relation(two, clash, error);
     return status == EBPO_OK ? scene_report_depths(two, clash, error) : status;
 }
@@ -350,23 +351,26 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *clash, eb
 static ebpo_status check_omitted_faces(const clash_query *a, const ebpo_scene_pair *pair,
                                        ebpo_error *error)
 {
-    double gap = INFINITY;
-    uint64_t lacking = 0;
-    ebpo_status status = ebpo_scene_omitted(a->scene, pair, a->time, &gap, &lacking, error);
-    if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
-        status = ebpo_scene_fail_omitted(a->scene, pair, lacking, a->time, a->how.relate, error);
+    double distance = INFINITY; /* lower bound of the distance of omitted faces */
+    uint64_t omitted_in = 0;
+    ebpo_status status = ebpo_scene_omitted(a->scene, pair, a->time, &distance, &omitted_in, error);
+    if (status == EBPO_OK &&
+        (!(distance > pair->clearance) || (a->requested.relate && distance < INFINITY)))
+        status = ebpo_scene_fail_omitted(a->scene, pair, omitted_in, a->time, a->requested.relate,
+                                         error);
     return status;
 }
 
 static bool is_solid(const ebpo_scene *scene, uint64_t instance)
 {
-    return ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model))->solid;
+    return ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].description.model))
+        ->solid;
 }
 
-static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void *result,
+static ebpo_status query_pair(const void *context, const ebpo_scene_pair *pair, void *result,
                               ebpo_error *error)
 {
-    const clash_query *a = how;
+    const clash_query *a = context;
     ebpo_scene_clash *clash = result;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
@@ -378,7 +382,10 @@ static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void
     if (status == EBPO_OK)
         status = ebpo_scene_collider(a->scene, pair, 1, &collider, error);
     scene_two two = {
-        &a->how, collider, &options, { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) }
+        &a->requested,
+        collider,
+        &options,
+        { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) },
     };
     if (status == EBPO_OK && collider)
         status = query_faces(&two, clash, error);
@@ -404,19 +411,22 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                                     ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    clash_query a = { .scene = scene, .how = EBPO_SCENE_CLASH_OPTIONS_INIT, .time = time };
+    clash_query a = { .scene = scene, .requested = EBPO_SCENE_CLASH_OPTIONS_INIT, .time = time };
     void *clashes = NULL;
     uint64_t count = 0;
-    ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &a.how, options, error);
-    if (status == EBPO_OK && !(a.how.depth >= 0 && a.how.depth < INFINITY))
+    ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &a.requested, options, error);
+    if (status == EBPO_OK && !(a.requested.depth >= 0 && a.requested.depth < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "expected a tolerance of depths that is a length of 0 or more, got %g",
-                         a.how.depth);
-    a.how.relate |= a.how.depth > 0;
-    ebpo_scene_search search = {
-        query_pair,        &a, sizeof(ebpo_scene_clash), 4, a.how.threads, &a.how.progress,
-        "evaluating pairs"
-    };
+                         a.requested.depth);
+    a.requested.relate |= a.requested.depth > 0;
+    ebpo_scene_search search = { query_pair,
+                                 &a,
+                                 sizeof(ebpo_scene_clash),
+                                 4,
+                                 a.requested.threads,
+                                 &a.requested.progress,
+                                 "evaluating pairs" };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, time, time, &search, &clashes, &count, error);
     if (status == EBPO_OK)

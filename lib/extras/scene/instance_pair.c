@@ -27,7 +27,7 @@ static const double slack = 0x1p-44;
 
 static const ebpo_scene_model_entry *model_of_instance(const ebpo_scene *scene, uint64_t instance)
 {
-    return &scene->models[scene->instances[instance].as.model];
+    return &scene->models[scene->instances[instance].description.model];
 }
 
 static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
@@ -66,43 +66,43 @@ static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, pose
     }
 }
 
-ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t of, uint64_t other,
+ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t self, uint64_t other,
                                          double time, ebpo_scene_relative_box *out,
                                          ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = model_of_instance(scene, of);
-    ebpo_posing from, at;
+    const ebpo_scene_model_entry *m = model_of_instance(scene, self);
+    ebpo_posing posing, other_posing;
     posed_box b;
-    ebpo_status status = posing_of(scene, of, time, &from, error);
+    ebpo_status status = posing_of(scene, self, time, &posing, error);
     if (status == EBPO_OK)
-        status = posing_of(scene, other, time, &at, error);
+        status = posing_of(scene, other, time, &other_posing, error);
     if (status != EBPO_OK)
         return status;
-    pose_box(&at, model_of_instance(scene, other), &b);
-    double scale = from.scale, sizes = b.size, max_coordinate = 0;
+    pose_box(&other_posing, model_of_instance(scene, other), &b);
+    double scale = posing.scale, sizes = b.size, max_coordinate = 0;
     for (int i = 0; i < 3; i++) {
-        sizes += fabs(from.translation[i]);
+        sizes += fabs(posing.translation[i]);
         max_coordinate += fmax(fabs(m->min[i]), fabs(m->max[i]));
     }
-    /* The transposed matrix is used as the inverse. `off` bounds the error of this for points of
-     * the model's box, and rounding. */
-    double off =
-        (sizes + max_coordinate * scale) * slack / scale + 3 * from.error_bound * max_coordinate;
-    out->rounding = off;
+    /* The transposed matrix is used as the inverse. `error_bound` bounds the error that this and
+     * rounding cause for points of the model's box. */
+    double error_bound =
+        (sizes + max_coordinate * scale) * slack / scale + 3 * posing.error_bound * max_coordinate;
+    out->rounding = error_bound;
     for (int k = 0; k < 3; k++) {
-        double middle = 0, half = off;
+        double middle = 0, half = error_bound;
         for (int i = 0; i < 3; i++)
-            middle += from.matrix[i][k] / scale * ((b.middle[i] - from.translation[i]) / scale);
+            middle += posing.matrix[i][k] / scale * ((b.middle[i] - posing.translation[i]) / scale);
         for (int j = 0; j < 3; j++) {
             double sum = 0;
             for (int i = 0; i < 3; i++)
-                sum += from.matrix[i][k] / scale * (b.half[j][i] / scale);
+                sum += posing.matrix[i][k] / scale * (b.half[j][i] / scale);
             half += fabs(sum);
         }
         out->box.min[k] = middle - half;
         out->box.max[k] = middle + half;
     }
-    out->unit = scale * (1 - 2 * from.error_bound);
+    out->unit = scale * (1 - 2 * posing.error_bound);
     return EBPO_OK;
 }
 
@@ -119,7 +119,7 @@ double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds
 static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_bounds *out)
 {
     const ebpo_info *info =
-        ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model));
+        ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].description.model));
     bool mesh = info->parts & EBPO_PART_MESH;
     if (mesh && !info->pruned)
         return false;
@@ -131,74 +131,75 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_boun
     return true;
 }
 
-/* Returns a lower bound of the distance of `other` from the part of the box `all` that is outside
- * the box `held`. This part consists of up to six boxes on the sides of `held`. */
-static double gap_around(const ebpo_scene_bounds *all, const ebpo_scene_bounds *held,
-                         const ebpo_scene_bounds *other)
+/* Returns a lower bound of the distance of the box `other` from the points of the box `all` that
+ * are outside the box `held`. These points are in up to six boxes, one for each face of `held`. */
+static double distance_outside(const ebpo_scene_bounds *all, const ebpo_scene_bounds *held,
+                               const ebpo_scene_bounds *other)
 {
-    double gap = INFINITY;
+    double distance = INFINITY;
     for (int k = 0; k < 3; k++) {
-        ebpo_scene_bounds side = *all;
-        side.max[k] = fmin(held->min[k], all->max[k]);
+        ebpo_scene_bounds beside = *all;
+        beside.max[k] = fmin(held->min[k], all->max[k]);
         if (all->min[k] < held->min[k])
-            gap = fmin(gap, ebpo_scene_bounds_gap(&side, other));
-        side = *all;
-        side.min[k] = fmax(held->max[k], all->min[k]);
+            distance = fmin(distance, ebpo_scene_bounds_gap(&beside, other));
+        beside = *all;
+        beside.min[k] = fmax(held->max[k], all->min[k]);
         if (all->max[k] > held->max[k])
-            gap = fmin(gap, ebpo_scene_bounds_gap(&side, other));
+            distance = fmin(distance, ebpo_scene_bounds_gap(&beside, other));
     }
-    return gap;
+    return distance;
 }
 
-/* Sets *gap to a lower bound of the distance between the omitted faces of the instance `of` and the
- * instance `other`; INFINITY if no faces are omitted. */
-static ebpo_status omitted_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                              double *gap, ebpo_error *error)
+/* Sets *distance to a lower bound of the distance between the faces that the file of the instance
+ * `self` omits and the instance `other`; INFINITY if no faces are omitted. */
+static ebpo_status bound_omitted(const ebpo_scene *scene, uint64_t self, uint64_t other,
+                                 double time, double *distance, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = model_of_instance(scene, of);
+    const ebpo_scene_model_entry *m = model_of_instance(scene, self);
     ebpo_scene_bounds held, all;
-    ebpo_scene_relative_box seen;
-    *gap = INFINITY;
-    if (!held_box(scene, of, &held))
+    ebpo_scene_relative_box other_box;
+    *distance = INFINITY;
+    if (!held_box(scene, self, &held))
         return EBPO_OK;
     memcpy(all.min, m->min, sizeof all.min);
     memcpy(all.max, m->max, sizeof all.max);
-    ebpo_status status = ebpo_scene_make_relative_box(scene, of, other, time, &seen, error);
+    ebpo_status status = ebpo_scene_make_relative_box(scene, self, other, time, &other_box, error);
     if (status == EBPO_OK)
-        *gap = gap_around(&all, &held, &seen.box) * seen.unit;
+        *distance = distance_outside(&all, &held, &other_box.box) * other_box.unit;
     return status;
 }
 
 ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
-                               double *gap, uint64_t *lacking, ebpo_error *error)
+                               double *distance, uint64_t *omitted_in, ebpo_error *error)
 {
-    double of_a, of_b;
-    ebpo_status status = omitted_of(scene, pair->a, pair->b, time, &of_a, error);
+    double from_a, from_b; /* distance of the faces omitted from the file of a, and of b */
+    ebpo_status status = bound_omitted(scene, pair->a, pair->b, time, &from_a, error);
     if (status == EBPO_OK)
-        status = omitted_of(scene, pair->b, pair->a, time, &of_b, error);
+        status = bound_omitted(scene, pair->b, pair->a, time, &from_b, error);
     if (status != EBPO_OK)
         return status;
-    *gap = fmin(of_a, of_b);
-    *lacking = of_a <= of_b ? pair->a : pair->b;
+    *distance = fmin(from_a, from_b);
+    *omitted_in = from_a <= from_b ? pair->a : pair->b;
     return EBPO_OK;
 }
 
 ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
-                                    uint64_t lacking, double time, bool solids, ebpo_error *error)
+                                    uint64_t omitted_in, double time, bool solids,
+                                    ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = model_of_instance(scene, lacking);
+    const ebpo_scene_model_entry *m = model_of_instance(scene, omitted_in);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
         "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a subset or "
         "has no mesh, and the omitted part may change the result; query a scene with more of the "
         "model%s",
-        scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
-        solids ? ", such as a scene from ebpo scene pack --solids" : "");
+        scene->instances[pair->a].description.name, scene->instances[pair->b].description.name,
+        time, m->name, solids ? ", such as a scene from ebpo scene pack --solids" : "");
 }
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
 {
-    uint64_t route = scene->instances[instance].as.route;
+    uint64_t route = scene->instances[instance].description.route;
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
@@ -292,7 +293,8 @@ ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pai
     ebpo_model *model;
     for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++) {
         uint64_t instance = i % 2 ? pairs[i / 2].b : pairs[i / 2].a;
-        status = ebpo_scene_model(scene, scene->instances[instance].as.model, &model, error);
+        status =
+            ebpo_scene_model(scene, scene->instances[instance].description.model, &model, error);
     }
     return status;
 }
@@ -336,7 +338,7 @@ static ebpo_status find_in_range(void *context, uint64_t begin, uint64_t end, un
     ebpo_status status = EBPO_OK;
     (void)worker;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = s->find(s->how, &f->pairs[i], f->results + i * s->result_size, error);
+        status = s->find(s->context, &f->pairs[i], f->results + i * s->result_size, error);
     return status;
 }
 
@@ -361,25 +363,25 @@ ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
 
 static ebpo_model *opened_model(const ebpo_scene *scene, uint64_t instance)
 {
-    return scene->files[scene->models[scene->instances[instance].as.model].file].model;
+    return scene->files[scene->models[scene->instances[instance].description.model].file].model;
 }
 
 static bool has_mesh(const ebpo_scene *scene, uint64_t instance)
 {
-    uint64_t model = scene->instances[instance].as.model;
+    uint64_t model = scene->instances[instance].description.model;
     return ebpo_file_info(ebpo_scene_file(scene, model))->parts & EBPO_PART_MESH;
 }
 
 ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                 unsigned threads, ebpo_collider **out, ebpo_error *error)
 {
-    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
-    how.threads = threads;
+    ebpo_collider_options options = EBPO_COLLIDER_OPTIONS_INIT;
+    options.threads = threads;
     *out = NULL;
     if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
         return EBPO_OK;
-    return ebpo_collider_of_parts(opened_model(scene, pair->a), opened_model(scene, pair->b), &how,
-                                  out, error);
+    return ebpo_collider_of_parts(opened_model(scene, pair->a), opened_model(scene, pair->b),
+                                  &options, out, error);
 }
 
 ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
@@ -395,14 +397,14 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
                                   ebpo_error *error)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_options query = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
-    how.tolerance = l->tolerance;
+    query.tolerance = l->tolerance;
     /* lo and hi may depend on the last query, so each pair of instances has a separate collider */
-    how.warm = true;
+    query.warm = true;
     ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)
-        status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
+        status = ebpo_collide_distance(l->collider, &options, &query, &found, error);
     *lo = found.distance.lo;
     *hi = found.distance.hi;
     return status;
@@ -411,11 +413,12 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
 ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                 ebpo_error *error)
 {
-    l->gap = INFINITY;
+    l->omitted_distance = INFINITY;
     ebpo_status status = query_distance(l, time, lo, hi, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_omitted(l->scene, l->pair, time, &l->gap, &l->lacking, error);
-    *lo = fmin(*lo, l->gap);
+        status = ebpo_scene_omitted(l->scene, l->pair, time, &l->omitted_distance, &l->omitted_in,
+                                    error);
+    *lo = fmin(*lo, l->omitted_distance);
     return status;
 }
 

@@ -19,9 +19,9 @@ typedef struct ebpo_scene_relative_box {
     double unit;     /* least length in the world of a length of 1 in these coordinates */
 } ebpo_scene_relative_box;
 
-/* Computes a box in the coordinates of the instance `of` that contains the box of `other` at a
- * time. Fails with EBPO_E_ARGUMENT if a pose is out of range. */
-EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t of,
+/* Computes a box in the coordinates of the model of the instance `self`. The box contains the box
+ * of the instance `other` at a time. Fails with EBPO_E_ARGUMENT if a pose is out of range. */
+EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t self,
                                                        uint64_t other, double time,
                                                        ebpo_scene_relative_box *out,
                                                        ebpo_error *error);
@@ -29,18 +29,19 @@ EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, 
 /* Returns the distance of two boxes, rounded down. */
 double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds *b);
 
-/* Sets *gap to a lower bound of the distance, at a time, of all pairs of a face of pair->a and a
- * face of pair->b in which at least one face is omitted from its file; INFINITY if no face is
- * omitted. Sets *lacking to an instance whose file omits faces. */
+/* Sets *distance to a lower bound of the distance, at a time, of all pairs of a face of pair->a and
+ * a face of pair->b in which at least one face is omitted from its file; INFINITY if no face is
+ * omitted. Sets *omitted_in to an instance whose file omits faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
-                                             double time, double *gap, uint64_t *lacking,
+                                             double time, double *distance, uint64_t *omitted_in,
                                              ebpo_error *error);
 
-/* Reports that faces which the file of the instance `lacking` omits may change the result. Always
- * returns EBPO_E_ABSENT. solids: the reason is that the omitted faces may enclose the other
+/* Reports that faces which the file of the instance `omitted_in` omits may change the result.
+ * Always returns EBPO_E_ABSENT. solids: the reason is that the omitted faces may enclose the other
  * instance. */
 ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
-                                    uint64_t lacking, double time, bool solids, ebpo_error *error);
+                                    uint64_t omitted_in, double time, bool solids,
+                                    ebpo_error *error);
 
 /* Returns the next time after `from` at which a route of the pair has a key (a time at which a
  * route gives a pose), or `to` if that is earlier. */
@@ -57,14 +58,14 @@ typedef struct ebpo_scene_pairs_list {
 /* Lists the pairs of ebpo_scene_pairs. On failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
                                                 ebpo_scene_pairs_list *out, ebpo_error *error);
-/* Computes the result of one pair. how: the data of ebpo_scene_search. */
-typedef ebpo_status (*ebpo_scene_find_fn)(const void *how, const ebpo_scene_pair *pair,
+/* Computes the result of one pair. context: that of ebpo_scene_search. */
+typedef ebpo_status (*ebpo_scene_find_fn)(const void *context, const ebpo_scene_pair *pair,
                                           void *result, ebpo_error *error);
 
-/* How to compute the results of many pairs. */
+/* Describes the computation of the results of many pairs. */
 typedef struct ebpo_scene_search {
     ebpo_scene_find_fn find;
-    const void *how;
+    const void *context; /* passed to `find` */
     size_t result_size;
     uint64_t grain;   /* number of consecutive pairs that a thread takes */
     unsigned threads; /* 0: one for each core */
@@ -100,8 +101,8 @@ typedef struct ebpo_scene_evaluations {
     ebpo_collider *collider; /* from ebpo_scene_collider; must be freed */
     double tolerance;        /* tolerance of one evaluation */
     bool shares_route;       /* both instances follow one route */
-    double gap;              /* result of ebpo_scene_omitted at the last evaluation */
-    uint64_t lacking;        /* instance whose file omits faces, from the same call */
+    double omitted_distance; /* result of ebpo_scene_omitted at the last evaluation */
+    uint64_t omitted_in;     /* instance whose file omits faces, from the same call */
 } ebpo_scene_evaluations;
 
 /* Begins evaluations. tolerance: tolerance of the caller's result; each evaluation uses a quarter

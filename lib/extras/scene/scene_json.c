@@ -483,7 +483,7 @@ static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t
     uint64_t set = ebpo_scene_find_name(r->scene, "group:", name);
     return set == EBPO_SCENE_NONE
                ? ebpo_json_bad(r, "is not a group of this scene")
-               : ebpo_json_locate_error(r, ebpo_scene_join_set(r->scene, set, &why), &why);
+               : ebpo_json_locate_error(r, ebpo_scene_put_newest_into(r->scene, set, &why), &why);
 }
 
 static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const json_t *value)

@@ -1,9 +1,10 @@
 /* Makes a scene: adds and returns its members, and checks names and the paths of files.
  *
- * Models, routes and cameras each have a separate name space. In rules, a selector stands for a set
- * of instances: "*", the name of an instance, or the name of a layer or a group with the prefix
- * "layer:" or "group:". Every instance belongs to the set of all instances, to a set that has only
- * this instance, to the set of its layer and to the sets of its groups.
+ * Models, routes and cameras each have a separate name space. A rule gives the clearance of pairs
+ * of instances, or ignores them. It names both sets of instances by selectors: "*", the name of an
+ * instance, or the name of a layer or a group with the prefix "layer:" or "group:". Every instance
+ * belongs to the set of all instances, to a set that has only this instance, to the set of its
+ * layer and to the sets of its groups.
  *
  * A scene file is untrusted input. It may name only files in its folder or below that, unless the
  * options allow other files. Symbolic links that lead out of the folder are rejected. */
@@ -106,12 +107,12 @@ static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name
 
 /* --- files that a scene names --- */
 
-/* Returns true if a part of the path is "..". */
+/* Returns true if one of the names in the path is "..". */
 static bool goes_up(const char *path)
 {
-    for (const char *part = path; part; part = strchr(part, '/')) {
-        part += *part == '/';
-        if (strncmp(part, "..", 2) == 0 && (part[2] == '/' || part[2] == 0))
+    for (const char *name = path; name; name = strchr(name, '/')) {
+        name += *name == '/';
+        if (strncmp(name, "..", 2) == 0 && (name[2] == '/' || name[2] == 0))
             return true;
     }
     return false;
@@ -123,19 +124,18 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
     if (!*path)
         return "is not a path";
     if (ebpo_is_url(path) && !options->remote)
-        return "is on a server, which must be allowed (ebpo scene --remote)";
+        return "is on a server; to allow files on servers, use ebpo scene --remote";
     if (ebpo_is_url(path) && !has_digest)
-        return "is on a server; the scene must have its content_sha256 beside the path";
+        return "is on a server; add its content_sha256 to the model in the scene";
     if (!ebpo_is_url(path) && !options->outside && (ebpo_path_is_absolute(path) || goes_up(path)))
-        return "is outside the scene's folder, which must be allowed (ebpo scene "
-               "--allow-outside)";
+        return "is outside the scene's folder; to allow this, use ebpo scene --allow-outside";
     return NULL;
 }
 
 char *ebpo_scene_join_path(const char *folder, const char *path)
 {
-    bool alone = ebpo_path_is_absolute(path) || ebpo_is_url(path);
-    size_t begin = alone ? 0 : strlen(folder), size = strlen(path);
+    bool is_absolute = ebpo_path_is_absolute(path) || ebpo_is_url(path);
+    size_t begin = is_absolute ? 0 : strlen(folder), size = strlen(path);
     char *joined = malloc(begin + size + 1);
     if (joined) {
         memcpy(joined, folder, begin);
@@ -151,15 +151,16 @@ static bool is_below(const char *folder, const char *path)
     return strncmp(folder, path, size) == 0 && path[size] == '/';
 }
 
-/* Checks that the real path of a file, which has no links, is in the folder. */
+/* Checks that a file is in the folder. real: the file's path without symbolic links. path: the path
+ * that the scene names, for the message. */
 static ebpo_status check_real(const char *folder, const char *real, const char *path,
                               ebpo_error *error)
 {
     if (is_below(folder, real))
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, path,
-                          "leads by a link to the file %.160s, outside the scene's folder %.160s, "
-                          "which must be allowed (ebpo scene --allow-outside)",
+                          "leads by a link to the file %.160s, outside the scene's folder %.160s; "
+                          "to allow this, use ebpo scene --allow-outside",
                           real, folder);
 }
 
@@ -194,7 +195,7 @@ ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
     ebpo_scene *scene = ebpo_alloc_zero(1, sizeof *scene);
     if (!scene)
         return ebpo_fail_memory(error, sizeof *scene);
-    scene->how = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
+    scene->model_options = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
     scene->names = json_object();
     scene->folder = strdup("");
     ebpo_status status = EBPO_OK;
@@ -209,14 +210,14 @@ ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
     return status;
 }
 
-static void free_parts(ebpo_scene *scene)
+static void free_members(ebpo_scene *scene)
 {
     for (uint64_t i = 0; i < scene->models_count; i++) {
         free(scene->models[i].name);
         free(scene->models[i].path);
     }
     for (uint64_t i = 0; i < scene->instances_count; i++) {
-        free((char *)scene->instances[i].as.name);
+        free((char *)scene->instances[i].description.name);
         free(scene->instances[i].sets);
     }
     for (uint64_t i = 0; i < scene->routes_count; i++) {
@@ -236,7 +237,7 @@ static void close_files(ebpo_scene *scene)
         ebpo_close(scene->files[i].file);
         free(scene->files[i].path);
     }
-    ebpo_budget_free(scene->how.budget);
+    ebpo_budget_free(scene->model_options.budget);
 }
 
 void ebpo_scene_free(ebpo_scene *scene)
@@ -244,7 +245,7 @@ void ebpo_scene_free(ebpo_scene *scene)
     if (!scene)
         return;
     close_files(scene);
-    free_parts(scene);
+    free_members(scene);
     free(scene->models);
     free(scene->instances);
     free(scene->routes);
@@ -311,48 +312,50 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no layer %llu",
                          (unsigned long long)i->layer);
     if (i->fixed && i->route != EBPO_SCENE_NONE)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a fixed instance has no route");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "a fixed instance must not have a route; set fixed to false or remove the route");
     return ebpo_posing_make(&posing, &i->pose, origin, error); /* only checks the pose */
 }
 
-/* Adds the instance that was added last to the set of all instances, to the set of its layer, and
- * to `set`, which has only this instance. */
-static ebpo_status join_own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
+/* Puts the newest instance into three sets: the set of all instances, the set of its layer, and
+ * `set`, which has only this instance. */
+static ebpo_status put_newest_into_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
     const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
-    ebpo_status status = ebpo_scene_join_set(scene, EBPO_SCENE_ALL_SET, error);
-    if (status == EBPO_OK && i->as.layer != EBPO_SCENE_NONE)
-        status = ebpo_scene_join_set(scene, scene->layers[i->as.layer], error);
-    return status == EBPO_OK ? ebpo_scene_join_set(scene, set, error) : status;
+    ebpo_status status = ebpo_scene_put_newest_into(scene, EBPO_SCENE_ALL_SET, error);
+    if (status == EBPO_OK && i->description.layer != EBPO_SCENE_NONE)
+        status = ebpo_scene_put_newest_into(scene, scene->layers[i->description.layer], error);
+    return status == EBPO_OK ? ebpo_scene_put_newest_into(scene, set, error) : status;
 }
 
 ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance *instance,
                                     uint64_t *number, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_scene_instance as = EBPO_SCENE_INSTANCE_INIT;
+    ebpo_scene_instance description = EBPO_SCENE_INSTANCE_INIT;
     uint64_t n, set;
-    ebpo_status status = EBPO_TAKE(ebpo_scene_instance, &as, instance, error);
+    ebpo_status status = EBPO_TAKE(ebpo_scene_instance, &description, instance, error);
     if (status == EBPO_OK)
-        status = check_instance(scene, &as, error);
+        status = check_instance(scene, &description, error);
     if (status == EBPO_OK)
         status = SPACE(scene, instances, &n, error);
     if (status == EBPO_OK)
-        status = add_set(scene, "", as.name, &set, error);
+        status = add_set(scene, "", description.name, &set, error);
     if (status != EBPO_OK)
         return status;
-    as.name = strdup(as.name);
-    scene->instances[n] = (ebpo_scene_instance_entry){ .as = as };
+    description.name = strdup(description.name);
+    scene->instances[n] = (ebpo_scene_instance_entry){ .description = description };
     scene->instances_count++;
-    if (!as.name)
+    if (!description.name)
         return ebpo_fail_memory(error, 1);
-    scene->models[as.model].instances++;
+    scene->models[description.model].instances++;
     if (number)
         *number = n;
-    return join_own_sets(scene, set, error);
+    return put_newest_into_sets(scene, set, error);
 }
 
-ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
+ebpo_status ebpo_scene_put_newest_into(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
     ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
     uint64_t *sets = ebpo_realloc(i->sets, i->set_count + 1, sizeof *sets);
@@ -434,7 +437,7 @@ ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, doubl
         return status;
     scene->rules[scene->rules_count++] =
         (ebpo_scene_rule_entry){ a < b ? a : b, a < b ? b : a, clearance };
-    scene->ignored_count += clearance < 0;
+    scene->ignored_count += clearance < 0; /* below 0: the pairs are ignored */
     scene->clearance_count += clearance >= 0;
     return EBPO_OK;
 }
@@ -470,7 +473,7 @@ ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *ou
     c.ignored = scene->ignored_count;
     c.clearances = scene->clearance_count;
     for (uint64_t i = 0; i < scene->instances_count; i++)
-        c.fixed += scene->instances[i].as.fixed;
+        c.fixed += scene->instances[i].description.fixed;
     add_times(scene, &c);
     return EBPO_GIVE(ebpo_scene_counts, out, &c);
 }
@@ -497,7 +500,7 @@ ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t instance,
 {
     if (instance >= scene->instances_count)
         return EBPO_E_ARGUMENT;
-    return EBPO_GIVE(ebpo_scene_instance, out, &scene->instances[instance].as);
+    return EBPO_GIVE(ebpo_scene_instance, out, &scene->instances[instance].description);
 }
 
 const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer)

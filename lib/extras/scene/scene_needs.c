@@ -1,9 +1,10 @@
-/* Finds the part of each model's file that a scene needs in an interval of time: a box for
- * collisions and for inside tests, and the last level for views.
+/* Finds what a scene needs of each model's file in an interval of time: a box for collisions and
+ * for inside tests, and the last level for views.
  *
- * Boxes are in the coordinates of the model, and contain all parts that come near another instance.
- * They are computed over steps of time so short that no instance moves far. They are rounded
- * outwards, so that the subset of a file with this box returns the same results as the whole file.
+ * Boxes are in the coordinates of the model, and contain all points that come near another
+ * instance. They are computed over steps of time so short that no instance moves far. They are
+ * rounded outwards, so that the subset of a file with this box returns the same results as the
+ * whole file.
  *
  * A view needs the levels up to the first one whose cells have a diagonal of at most one pixel. A
  * node's envelope and its content are both in its cell, so finer levels make no visible difference.
@@ -25,30 +26,30 @@
  * is halved. */
 enum { HALVINGS = 12 };
 
-/* The search for the parts of the instance `of` that come near the instance `other`. */
+/* The search for the points of the instance `self` that come near the instance `other`. */
 typedef struct near_search {
     ebpo_scene_needs *needs;
     const ebpo_scene *scene;
-    uint64_t of, other;
-    double clearance; /* parts within this distance are near; a length in the world */
+    uint64_t self, other;
+    double clearance; /* points within this distance are near; a length in the world */
     double margin;    /* greatest motion in one step, by which boxes are widened; a length in the
                        * world */
-    ebpo_scene_file_need *need; /* need of the file of `of` */
+    ebpo_scene_file_need *need; /* need of the file of the instance `self` */
 } near_search;
 
 static ebpo_scene_file_need *need_of(const ebpo_scene_needs *n, uint64_t instance)
 {
-    return &n->files[n->scene->models[n->scene->instances[instance].as.model].file];
+    return &n->files[n->scene->models[n->scene->instances[instance].description.model].file];
 }
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
 {
-    uint64_t route = scene->instances[instance].as.route;
+    uint64_t route = scene->instances[instance].description.route;
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Computes an upper bound of the distance of the other instance from the origin of this instance's
- * route, in the coordinates before the route's scale. */
+/* Computes an upper bound of the distance of the other instance from the point about which the
+ * route of this instance rotates, divided by the route's scale. */
 static ebpo_status bound_distance(const near_search *n, const ebpo_scene_route *route, double from,
                                   double to, double *distance)
 {
@@ -71,7 +72,7 @@ static ebpo_status bound_distance(const near_search *n, const ebpo_scene_route *
  * may be between the two times. */
 static ebpo_status relative_motion(const near_search *n, double from, double to, double *out)
 {
-    const ebpo_scene_route *route = route_of(n->scene, n->of);
+    const ebpo_scene_route *route = route_of(n->scene, n->self);
     double distance = 0, own_motion = 0;
     ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
     if (status == EBPO_OK && route && from < to) {
@@ -83,25 +84,26 @@ static ebpo_status relative_motion(const near_search *n, double from, double to,
     return status;
 }
 
-/* Computes the part of the model's box that may come near the other instance between two times.
- * *any is false if there is no such part. */
+/* Computes the smaller box of those points of the model's box that may come near the other instance
+ * between two times. *any is false if there are no such points. */
 static ebpo_status near_box(const near_search *n, double from, double to, double motion,
                             ebpo_scene_bounds *out, bool *any)
 {
-    ebpo_scene_relative_box at, later;
+    ebpo_scene_relative_box first, last;
     ebpo_status status =
-        ebpo_scene_make_relative_box(n->scene, n->of, n->other, from, &at, n->needs->error);
+        ebpo_scene_make_relative_box(n->scene, n->self, n->other, from, &first, n->needs->error);
     if (status == EBPO_OK)
         status =
-            ebpo_scene_make_relative_box(n->scene, n->of, n->other, to, &later, n->needs->error);
+            ebpo_scene_make_relative_box(n->scene, n->self, n->other, to, &last, n->needs->error);
     if (status != EBPO_OK)
         return status;
     /* The last term bounds the rounding errors of the boxes at all times between these two. */
-    double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
-                  2 * fmax(at.rounding, later.rounding);
+    double grow =
+        (n->clearance + n->margin + motion) / fmin(first.unit, last.unit) * (1 + 0x1p-40) +
+        2 * fmax(first.rounding, last.rounding);
     *any = true;
     for (int k = 0; k < 3; k++) {
-        double low = at.box.min[k] - grow, high = at.box.max[k] + grow;
+        double low = first.box.min[k] - grow, high = first.box.max[k] + grow;
         /* NaN after an overflow: the comparison is false, and the whole box is used */
         out->min[k] = low > n->need->whole.min[k] ? low : n->need->whole.min[k];
         out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
@@ -130,7 +132,7 @@ static void join_need_box(ebpo_scene_file_need *need, const ebpo_scene_bounds *b
     }
 }
 
-/* Adds the part of the model that comes near the other instance between two times. Halves the
+/* Adds the points of the model that come near the other instance between two times. Halves the
  * interval while the instances move by more than the margin, but at most `halvings` times. */
 static ebpo_status add_near_between(const near_search *n, double from, double to, int halvings)
 {
@@ -150,11 +152,11 @@ static ebpo_status add_near_between(const near_search *n, double from, double to
     return status == EBPO_OK ? add_near_between(n, middle, to, halvings - 1) : status;
 }
 
-/* Adds the near parts over the whole interval, from key to key of both routes. Each key begins a
- * new part of the interval, because routes may jump at keys. */
-static ebpo_status add_near_parts(const near_search *n)
+/* Adds the near points over the whole interval of time, from key to key of both routes. Each key
+ * begins a new step, because routes may jump at keys. */
+static ebpo_status add_near_steps(const near_search *n)
 {
-    const ebpo_scene_pair pair = { n->of, n->other, 0 };
+    const ebpo_scene_pair pair = { n->self, n->other, 0 };
     double to = n->needs->to;
     ebpo_status status = EBPO_OK;
     for (double at = n->needs->from; at < to && status == EBPO_OK;) {
@@ -168,7 +170,7 @@ static ebpo_status add_near_parts(const near_search *n)
 /* Returns the longest side of an instance's box in the world. */
 static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
 {
-    const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].as.model];
+    const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].description.model];
     ebpo_pose pose = EBPO_POSE_INIT;
     double size = 0;
     if (ebpo_scene_pose(scene, instance, time, &pose, NULL) != EBPO_OK)
@@ -200,23 +202,24 @@ static void add_complete_models(ebpo_scene_needs *needs, const ebpo_scene_pair *
 
 static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
-    if (needs->how.purpose == EBPO_SCENE_FOR_SOLIDS) {
+    if (needs->options.purpose == EBPO_SCENE_FOR_SOLIDS) {
         add_complete_models(needs, pair);
         return EBPO_OK;
     }
-    bool inside = needs->how.purpose == EBPO_SCENE_FOR_INSIDE;
-    double margin = needs->how.margin > 0 ? needs->how.margin : default_margin(needs, pair);
+    /* inside tests of points need only the box in which the instances overlap */
+    bool inside = needs->options.purpose == EBPO_SCENE_FOR_INSIDE;
+    double margin = needs->options.margin > 0 ? needs->options.margin : default_margin(needs, pair);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         near_search n = { .needs = needs,
                           .scene = needs->scene,
-                          .of = i ? pair->b : pair->a,
+                          .self = i ? pair->b : pair->a,
                           .other = i ? pair->a : pair->b,
                           .clearance = inside ? 0 : pair->clearance,
                           .margin = margin };
-        n.need = need_of(needs, n.of);
+        n.need = need_of(needs, n.self);
         n.need->users++;
-        status = add_near_parts(&n);
+        status = add_near_steps(&n);
     }
     return status;
 }
@@ -229,8 +232,8 @@ ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs)
     for (uint64_t i = 0; i < list.count && status == EBPO_OK; i++) {
         status = add_pair(needs, &list.pairs[i]);
         if (status == EBPO_OK &&
-            !ebpo_progress_step(&needs->how.progress, "finding the needed parts", i + 1, list.count,
-                                needs->error))
+            !ebpo_progress_step(&needs->options.progress, "finding the needed parts", i + 1,
+                                list.count, needs->error))
             status = EBPO_E_CANCELLED;
     }
     free(list.pairs);
@@ -248,10 +251,10 @@ static void begin_files(ebpo_scene_needs *needs)
         need->box = need->whole;
         need->last_level = -1;
         need->parts = EBPO_PART_PLANES | EBPO_PART_MESH;
-        if (needs->how.purpose == EBPO_SCENE_FOR_COLLIDE ||
-            needs->how.purpose == EBPO_SCENE_FOR_SOLIDS)
+        if (needs->options.purpose == EBPO_SCENE_FOR_COLLIDE ||
+            needs->options.purpose == EBPO_SCENE_FOR_SOLIDS)
             need->parts |= EBPO_PART_MAPS;
-        if (needs->how.purpose == EBPO_SCENE_FOR_VIEW)
+        if (needs->options.purpose == EBPO_SCENE_FOR_VIEW)
             need->parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
     }
 }
@@ -318,7 +321,7 @@ ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model
 
 /* --- views --- */
 
-/* Number of parts into which a camera's path between two keys is divided. */
+/* Number of steps into which a camera's path between two keys is divided. */
 enum { VIEW_STEPS = 16 };
 
 /* The search for the levels that a camera can resolve. */
@@ -388,8 +391,8 @@ static bool is_behind(const view_search *s, const ebpo_scene_bounds *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
-/* Returns the first level whose cells have a diagonal of at most `size`; -1: at most the
- * last level has such cells, so all levels are needed. */
+/* Returns the first level whose cells have a diagonal of at most `size`; -1: no level
+ * before the last one has cells so small, so all levels are needed. */
 static int level_for(const ebpo_info *info, double size)
 {
     double cell = ebpo_scene_length_above(info->box_size);
@@ -404,7 +407,7 @@ static ebpo_status add_instance_view(const view_search *s, uint64_t instance, do
                                      double to)
 {
     const ebpo_scene *scene = s->needs->scene;
-    uint64_t file = scene->models[scene->instances[instance].as.model].file;
+    uint64_t file = scene->models[scene->instances[instance].description.model].file;
     ebpo_scene_file_need *need = &s->needs->files[file];
     ebpo_scene_bounds box;
     double distance, scale;

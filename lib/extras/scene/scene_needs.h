@@ -1,23 +1,23 @@
-/* Finds the part of each model's file that the queries of a scene need. */
+/* Finds what the queries of a scene need of each model's file. */
 #ifndef EBPO_SCENE_SCENE_NEEDS_H
 #define EBPO_SCENE_SCENE_NEEDS_H
 
 #include "extras/scene/instance_pair.h"
 
-/* The needed part of a file. */
+/* The needed content of a file. */
 typedef struct ebpo_scene_file_need {
     uint64_t users;          /* number of pairs of instances, or of cameras, that need the file */
     bool any;                /* false: only the root node is needed */
-    ebpo_scene_bounds box;   /* part that collisions and inside tests need */
+    ebpo_scene_bounds box;   /* contains the faces that collisions and inside tests need */
     ebpo_scene_bounds whole; /* box of all faces */
     int last_level;          /* last level that views need; -1: all levels */
-    uint32_t parts;          /* EBPO_PART_... */
+    uint32_t parts;          /* needed kinds of content, EBPO_PART_... */
 } ebpo_scene_file_need;
 
 /* The needs of all files in the interval of time from .. to. */
 typedef struct ebpo_scene_needs {
     ebpo_scene *scene;
-    ebpo_plan_options how;
+    ebpo_plan_options options;
     double from, to;
     ebpo_scene_file_need *files; /* [scene->files_count], from malloc */
     ebpo_error *error;
@@ -27,7 +27,7 @@ typedef struct ebpo_scene_needs {
  * caller frees `files`, even on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_begin_needs(ebpo_scene_needs *needs);
 
-/* Adds the parts of models that come near the other instance of a pair. */
+/* Adds the points of models that come near the other instance of a pair. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs);
 
 /* Completes the needs. If no need was added for a file, only its root is needed. */

@@ -210,16 +210,16 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
 static ebpo_status check_range(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                                ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = &scene->models[i->as.model];
+    const ebpo_scene_model_entry *m = &scene->models[i->description.model];
     double greatest[3]; /* greatest absolute coordinates */
     ebpo_posing posing;
     ebpo_error why = EBPO_ERROR_INIT;
     for (int k = 0; k < 3; k++)
         greatest[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
-    ebpo_status status = ebpo_posing_make(&posing, &i->as.pose, greatest, &why);
-    return status == EBPO_OK
-               ? EBPO_OK
-               : ebpo_fail(error, status, "instance '%.80s': %.300s", i->as.name, why.message);
+    ebpo_status status = ebpo_posing_make(&posing, &i->description.pose, greatest, &why);
+    return status == EBPO_OK ? EBPO_OK
+                             : ebpo_fail(error, status, "instance '%.80s': %.300s",
+                                         i->description.name, why.message);
 }
 
 ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options, ebpo_error *error)
@@ -227,8 +227,8 @@ ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options,
     EBPO_DEFAULT_FP;
     ebpo_load_options checked = EBPO_LOAD_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_load_options, &checked, options, error);
-    if (status == EBPO_OK && checked.memory && !scene->how.budget)
-        status = ebpo_budget_new(checked.memory, &scene->how.budget, error);
+    if (status == EBPO_OK && checked.memory && !scene->model_options.budget)
+        status = ebpo_budget_new(checked.memory, &scene->model_options.budget, error);
     if (status == EBPO_OK && !ebpo_progress_stage(&checked.progress, "opening models", error))
         status = EBPO_E_CANCELLED;
     for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {
@@ -259,7 +259,7 @@ ebpo_status ebpo_scene_model(ebpo_scene *scene, uint64_t model, ebpo_model **out
     ebpo_scene_file_entry *f = &scene->files[scene->models[model].file];
     ebpo_status status = EBPO_OK;
     if (!f->model)
-        status = ebpo_model_new(f->file, &scene->how, &f->model, error);
+        status = ebpo_model_new(f->file, &scene->model_options, &f->model, error);
     if (status == EBPO_OK)
         *out = f->model;
     return status;

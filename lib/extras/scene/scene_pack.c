@@ -1,5 +1,5 @@
-/* Plans and packs a scene: finds the parts of its models' files that are needed, and writes a
- * folder that has only these parts.
+/* Plans and packs a scene: finds the content of its models' files that is needed, and writes a
+ * folder that has only this content.
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
  * scene file that differs from the original in its paths and digests. The folder is written under a
@@ -30,21 +30,22 @@
 /* Name of the scene file in the folder. */
 #define SCENE_PACKED "packed.scene.json"
 
-/* Sets needs->how from the options, and checks the options, the times and the scene. */
+/* Sets needs->options from the options, and checks the options, the times and the scene. */
 static ebpo_status check_plan_options(ebpo_scene_needs *needs, const ebpo_plan_options *options)
 {
     const ebpo_scene *scene = needs->scene;
     ebpo_error *error = needs->error;
-    needs->how = (ebpo_plan_options)EBPO_PLAN_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_plan_options, &needs->how, options, error);
+    needs->options = (ebpo_plan_options)EBPO_PLAN_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_plan_options, &needs->options, options, error);
     if (status != EBPO_OK)
         return status;
-    if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_SOLIDS)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown purpose %d", (int)needs->how.purpose);
-    if (!(needs->how.margin >= 0 && needs->how.margin < INFINITY))
+    if (needs->options.purpose < EBPO_SCENE_FOR_COLLIDE ||
+        needs->options.purpose > EBPO_SCENE_FOR_SOLIDS)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown purpose %d", (int)needs->options.purpose);
+    if (!(needs->options.margin >= 0 && needs->options.margin < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "expected a margin that is a length of 0 or more, got %g",
-                         needs->how.margin);
+                         needs->options.margin);
     if (!(isfinite(needs->from) && isfinite(needs->to) && needs->from <= needs->to))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%g to %g is not an interval of time", needs->from,
                          needs->to);
@@ -55,13 +56,13 @@ static ebpo_status check_plan_options(ebpo_scene_needs *needs, const ebpo_plan_o
     return EBPO_OK;
 }
 
-/* Finds the needed part of each file. Free needs->files, also on failure. */
+/* Finds the needed content of each file. Free needs->files, also on failure. */
 static ebpo_status find_needs(ebpo_scene_needs *needs)
 {
     ebpo_status status = ebpo_scene_begin_needs(needs);
     if (status == EBPO_OK)
-        status = needs->how.purpose == EBPO_SCENE_FOR_VIEW ? ebpo_scene_add_views(needs)
-                                                           : ebpo_scene_add_near(needs);
+        status = needs->options.purpose == EBPO_SCENE_FOR_VIEW ? ebpo_scene_add_views(needs)
+                                                               : ebpo_scene_add_near(needs);
     if (status == EBPO_OK)
         ebpo_scene_end_needs(needs);
     return status;
@@ -210,7 +211,7 @@ static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_
 
 typedef struct packing {
     ebpo_scene_needs needs;
-    ebpo_pack_options how;
+    ebpo_pack_options options;
     const char *folder;
     char *partial_folder; /* name of the folder until it is complete */
     ebpo_scene_packed *files;
@@ -286,7 +287,7 @@ static uint64_t bytes_read(const ebpo_file *file)
     return s.bytes_read;
 }
 
-/* Writes the needed part of a model's file. target: greatest size in bytes; 0: no limit. */
+/* Writes the needed content of a model's file. target: greatest size in bytes; 0: no limit. */
 static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
@@ -299,8 +300,8 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
         return ebpo_fail_memory(p->error, strlen(p->partial_folder));
     uint64_t before = bytes_read(file);
     o.target_bytes = target;
-    o.threads = p->how.threads;
-    o.progress = p->how.progress;
+    o.threads = p->options.threads;
+    o.progress = p->options.progress;
     ebpo_status status = ebpo_subset(file, path, &o, p->error);
     out->bytes_read = bytes_read(file) - before;
     out->source_bytes = ebpo_file_info(file)->file_bytes;
@@ -323,7 +324,7 @@ static uint64_t sum_of_files(const packing *p)
  * same factor. Files of which only the root is needed are not reduced. */
 static ebpo_status shrink_to_target(packing *p)
 {
-    uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;
+    uint64_t fixed = 0, sum = sum_of_files(p), target = p->options.target_bytes;
     ebpo_status status = EBPO_OK;
     if (!target || sum <= target)
         return EBPO_OK;
@@ -350,18 +351,18 @@ static ebpo_status write_files(packing *p)
 
 /* --- packing --- */
 
-/* Sets p->how from the options, and checks the options and the scene. */
+/* Sets p->options from the options, and checks the options and the scene. */
 static ebpo_status check_pack_options(packing *p, const ebpo_pack_options *options)
 {
     const ebpo_scene *scene = p->needs.scene;
     ebpo_plan_options plan = EBPO_PLAN_OPTIONS_INIT;
-    p->how = (ebpo_pack_options)EBPO_PACK_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_pack_options, &p->how, options, p->error);
+    p->options = (ebpo_pack_options)EBPO_PACK_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_pack_options, &p->options, options, p->error);
     if (status != EBPO_OK)
         return status;
-    plan.progress = p->how.progress;
-    plan.margin = p->how.margin;
-    plan.purpose = p->how.purpose;
+    plan.progress = p->options.progress;
+    plan.margin = p->options.margin;
+    plan.purpose = p->options.purpose;
     if (!scene->text || scene->text_models != scene->models_count ||
         scene->text_instances != scene->instances_count)
         return ebpo_fail(p->error, EBPO_E_ARGUMENT,
@@ -383,7 +384,7 @@ static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
         list[i] = p->files[scene->models[i].file];
         list[i].struct_size = sizeof *list;
         list[i].model = i;
-        list[i].complete = !(list[i].max_error > 0) || p->how.purpose == EBPO_SCENE_FOR_VIEW;
+        list[i].complete = !(list[i].max_error > 0) || p->options.purpose == EBPO_SCENE_FOR_VIEW;
     }
     return EBPO_OK;
 }

@@ -123,7 +123,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     if (a == b || a >= scene->instances_count || b >= scene->instances_count)
         return false;
     const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
-    if (x->as.fixed && y->as.fixed)
+    if (x->description.fixed && y->description.fixed)
         return false;
     /* If there are fewer rules than pairs of sets, test every rule: if both instances have 100,000
      * groups, looking up the rules of all pairs of groups takes hours. */
@@ -140,7 +140,7 @@ static const double step_angle = 0.125;
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
 {
-    return i->as.route == EBPO_SCENE_NONE ? NULL : &scene->routes[i->as.route];
+    return i->description.route == EBPO_SCENE_NONE ? NULL : &scene->routes[i->description.route];
 }
 
 static void pose_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
@@ -148,11 +148,11 @@ static void pose_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
 {
     const ebpo_scene_route *route = route_of(scene, i);
     ebpo_pose moved;
-    *out = i->as.pose;
+    *out = i->description.pose;
     if (!route)
         return;
     ebpo_scene_route_at(route, time, &moved);
-    ebpo_scene_compose(&moved, &i->as.pose, out);
+    ebpo_scene_compose(&moved, &i->description.pose, out);
 }
 
 static ebpo_status check_time(const ebpo_scene *scene, uint64_t instance, double from, double to,
@@ -172,7 +172,7 @@ static ebpo_status check_loaded(const ebpo_scene *scene, uint64_t instance, doub
     ebpo_status status = check_time(scene, instance, from, to, error);
     if (status != EBPO_OK)
         return status;
-    const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].as.model];
+    const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].description.model];
     return m->file != EBPO_SCENE_NONE
                ? EBPO_OK
                : ebpo_fail(error, EBPO_E_ARGUMENT, "model '%.80s' has not been loaded", m->name);
@@ -229,14 +229,14 @@ static void empty_box(double min[3], double max[3])
 
 ebpo_scene_extent ebpo_scene_extent_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
 {
-    const ebpo_scene_model_entry *m = &scene->models[i->as.model];
+    const ebpo_scene_model_entry *m = &scene->models[i->description.model];
     double min[3], max[3], far[3];
     ebpo_scene_extent extent = { 0, 0 };
-    posed_box(&i->as.pose, m, min, max);
+    posed_box(&i->description.pose, m, min, max);
     for (int k = 0; k < 3; k++) {
         far[k] = fmax(fabs(min[k]), fabs(max[k]));
-        extent.size += fabs(i->as.pose.translation[k]) +
-                       i->as.pose.scale * fmax(fabs(m->min[k]), fabs(m->max[k]));
+        extent.size += fabs(i->description.pose.translation[k]) +
+                       i->description.pose.scale * fmax(fabs(m->min[k]), fabs(m->max[k]));
     }
     extent.max_distance = ebpo_scene_length_above(far);
     return extent;
@@ -250,7 +250,7 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
     double low[3], high[3];
     ebpo_pose pose;
     pose_at(scene, i, time, &pose);
-    posed_box(&pose, &scene->models[i->as.model], low, high);
+    posed_box(&pose, &scene->models[i->description.model], low, high);
     join_box(min, max, low, high, by);
 }
 

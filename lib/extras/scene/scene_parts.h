@@ -38,8 +38,8 @@ typedef struct ebpo_scene_route {
  * or of a group, one instance, or all instances. So an instance is in the set of all instances, in
  * a set that has only this instance, and in the sets of its layer and its groups. */
 typedef struct ebpo_scene_instance_entry {
-    ebpo_scene_instance as; /* the entry owns the name in this struct */
-    uint64_t *sets;         /* in ascending order, once the rules are sorted */
+    ebpo_scene_instance description; /* as added by the caller; the entry owns its name */
+    uint64_t *sets;                  /* in ascending order, once the rules are sorted */
     uint32_t set_count;
 } ebpo_scene_instance_entry;
 
@@ -73,7 +73,7 @@ struct ebpo_scene {
     size_t text_size;
     uint64_t text_models, text_instances; /* numbers of models and instances in that text */
     bool allow_outside;                   /* files that the scene names may be outside the folder */
-    ebpo_model_options how;               /* options of ebpo_scene_model */
+    ebpo_model_options model_options;     /* options of ebpo_scene_model */
 };
 
 #define EBPO_SCENE_ALL_SET 0
@@ -102,8 +102,9 @@ EBPO_MUST_USE ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *na
                                                uint64_t *number, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
                                                 ebpo_error *error);
-/* Adds the instance that was added last to a set. */
-EBPO_MUST_USE ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error);
+/* Puts the newest instance into a set. */
+EBPO_MUST_USE ebpo_status ebpo_scene_put_newest_into(ebpo_scene *scene, uint64_t set,
+                                                     ebpo_error *error);
 /* Adds a rule for pairs of an instance of set a and an instance of set b. A clearance below 0 means
  * that the pairs are ignored. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b,
@@ -189,7 +190,7 @@ char *ebpo_scene_join_path(const char *folder, const char *path);
  * Fails with EBPO_E_FORMAT if it does, and with EBPO_E_IO, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_scene_stays_within(const char *folder, const char *path,
                                                   ebpo_error *error);
-/* Returns the part of a path up to its last "/", or "", from malloc. */
+/* Returns the beginning of a path up to its last "/", or "", from malloc. */
 char *ebpo_scene_folder_of(const char *path);
 
 /* --- the text of a scene file --- */

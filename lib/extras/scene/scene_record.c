@@ -95,7 +95,7 @@ static ebpo_status put_meaning(ebpo_scene_report *r, ebpo_h5_id id, const char *
 
 static const char *instance_name(const ebpo_scene *scene, uint64_t i)
 {
-    return scene->instances[i].as.name;
+    return scene->instances[i].description.name;
 }
 
 static const char *model_name(const ebpo_scene *scene, uint64_t i) { return scene->models[i].name; }
@@ -123,7 +123,7 @@ static ebpo_status put_models(ebpo_scene_report *r, ebpo_error *error)
     if (!model)
         return ebpo_fail_memory(error, count * sizeof *model);
     for (uint64_t i = 0; i < count; i++)
-        model[i] = (int64_t)r->scene->instances[i].as.model;
+        model[i] = (int64_t)r->scene->instances[i].description.model;
     ebpo_h5_table table;
     ebpo_status status =
         ebpo_h5_make_table(&r->out, "/instances/model", EBPO_H5_I64, 0, &table, error);
