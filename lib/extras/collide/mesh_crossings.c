@@ -41,13 +41,13 @@ typedef struct crossings {
 static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                ebpo_error *error)
 {
-    ebpo_build_options how = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     ebpo_mesh_report surface = *report;
     surface.balanced = surface.manifold = false;
-    how.parts = EBPO_PART_MESH | EBPO_PART_MAPS;
-    how.threads = c->options.threads;
-    how.progress = c->options.progress;
-    return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
+    options.parts = EBPO_PART_MESH | EBPO_PART_MAPS;
+    options.threads = c->options.threads;
+    options.progress = c->options.progress;
+    return ebpo_build(mesh, &surface, NULL, &options, &c->tree, error);
 }
 
 /* Frees the levels. After the file is written, the search needs only the file, and the mesh for the
@@ -157,12 +157,12 @@ static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t coun
 /* Writes the PLY file. */
 static ebpo_status write_red_mesh(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
 {
-    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh;
     bool source_order;
-    how.threads = c->options.threads;
-    how.workspace = workspace;
-    ebpo_status status = ebpo_file_read_source_mesh(c->file, &how, &mesh, &source_order, error);
+    options.threads = c->options.threads;
+    options.workspace = workspace;
+    ebpo_status status = ebpo_file_read_source_mesh(c->file, &options, &mesh, &source_order, error);
     if (status != EBPO_OK)
         return status;
     const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->intersecting, "200 200 200" };
@@ -174,8 +174,8 @@ static ebpo_status write_red_mesh(crossings *c, ebpo_workspace *workspace, ebpo_
 static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                     ebpo_workspace *workspace, ebpo_error *error)
 {
-    ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
-    how.progress = c->options.progress;
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    options.progress = c->options.progress;
     ebpo_status status = build_model(c, mesh, report, error);
     if (status != EBPO_OK)
         return status;
@@ -187,7 +187,7 @@ static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_me
     if (status == EBPO_OK)
         status = make_collider(c, ebpo_workspace_memory(workspace), error);
     if (status == EBPO_OK)
-        status = ebpo_collide_self(c->collider, &how, receive_pairs, c, error);
+        status = ebpo_collide_self(c->collider, &options, receive_pairs, c, error);
     return status == EBPO_OK && c->options.ply ? write_red_mesh(c, workspace, error) : status;
 }
 

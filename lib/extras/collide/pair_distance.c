@@ -94,12 +94,12 @@ static void offer_edges(search *s, int i, int j)
 
 /* --- corners with planes --- */
 
-/* Offers corner i of face `of` and its nearest point on the other face, if that point is in the
+/* Offers corner i of face `which` and its nearest point on the other face, if that point is in the
  * other face's interior. If it is on an edge, the pairs of edges include this pair of points. */
-static void offer_corner(search *s, int of, int i)
+static void offer_corner(search *s, int which, int i)
 {
-    double(*plane)[3] = s->face[!of];
-    const double *corner = s->face[of][i];
+    double(*plane)[3] = s->face[!which];
+    const double *corner = s->face[which][i];
     double e[3], f[3], n[3], d[3], c[3], foot[3];
     ebpo_vec3_subtract(plane[1], plane[0], e);
     ebpo_vec3_subtract(plane[2], plane[0], f);
@@ -116,7 +116,7 @@ static void offer_corner(search *s, int of, int i)
         foot[k] = plane[0][k] + (on_e * e[k] + on_f * f[k]);
     double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = ebpo_vec3_dot(e, e),
            ff = ebpo_vec3_dot(f, f);
-    offer_points(s, of, corner, foot, i, 6,
+    offer_points(s, which, corner, foot, i, 6,
                  nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
 }
 
@@ -134,8 +134,8 @@ static bool make_relative(const double a[3][3], const double b[3][3], search *s)
     for (int i = 0; i < 3; i++) {
         ebpo_vec3_subtract(a[i], a[0], s->face[0][i]);
         ebpo_vec3_subtract(b[i], a[0], s->face[1][i]);
-        for (int of = 0; of < 2; of++) {
-            const double *x = s->face[of][i];
+        for (int which = 0; which < 2; which++) {
+            const double *x = s->face[which][i];
             s->norm = fmax(s->norm, fabs(x[0]) + fabs(x[1]) + fabs(x[2]));
         }
     }
@@ -174,12 +174,12 @@ static bool features_certain(const search *s, const double n[3])
     const double enough = 0x1p-24;
     if (!(s->space > enough * s->norm))
         return false;
-    for (int of = 0; of < 2; of++)
+    for (int which = 0; which < 2; which++)
         for (int i = 0; i < 3; i++) {
             double d[3];
-            ebpo_vec3_subtract(s->face[of][i], s->point[of], d);
-            double ahead = of ? ebpo_vec3_dot(n, d) : -ebpo_vec3_dot(n, d);
-            if (!is_on(i, s->feature[of]) && !(ahead > enough * s->norm * s->norm))
+            ebpo_vec3_subtract(s->face[which][i], s->point[which], d);
+            double ahead = which ? ebpo_vec3_dot(n, d) : -ebpo_vec3_dot(n, d);
+            if (!is_on(i, s->feature[which]) && !(ahead > enough * s->norm * s->norm))
                 return false;
         }
     return true;
@@ -263,9 +263,9 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
         out->certain = out->lo > 0 && features_certain(&s, n);
     }
     memcpy(out->feature, s.feature, sizeof out->feature);
-    for (int of = 0; of < 2; of++)
+    for (int which = 0; which < 2; which++)
         for (int k = 0; k < 3; k++)
-            out->point[of][k] = a[0][k] + s.point[of][k];
+            out->point[which][k] = a[0][k] + s.point[which][k];
 }
 
 /* --- exact distances: fractions of integers --- */
@@ -326,19 +326,19 @@ static void edges_clear(edges *e)
     mpz_clears(e->length2, e->share, NULL);
 }
 
-static void set_edge(edges *e, int of, const double from[3], const double to[3], int unit)
+static void set_edge(edges *e, int which, const double from[3], const double to[3], int unit)
 {
     for (int k = 0; k < 3; k++) {
-        ebpo_set_integer(e->from[of].x[k], from[k], unit);
-        ebpo_set_integer(e->along[of].x[k], to[k], unit);
+        ebpo_set_integer(e->from[which].x[k], from[k], unit);
+        ebpo_set_integer(e->along[which].x[k], to[k], unit);
     }
-    ebpo_vectorz_subtract(&e->along[of], &e->along[of], &e->from[of]);
+    ebpo_vectorz_subtract(&e->along[which], &e->along[which], &e->from[which]);
 }
 
-/* Returns true if the nearest points of the lines are between the ends of edge `of`. */
-static bool within_edge(edges *e, int of)
+/* Returns true if the nearest points of the lines are between the ends of edge `which`. */
+static bool within_edge(edges *e, int which)
 {
-    ebpo_vectorz_cross(&e->part, &e->between, &e->along[!of]);
+    ebpo_vectorz_cross(&e->part, &e->between, &e->along[!which]);
     ebpo_vectorz_dot(e->share, &e->part, &e->normal);
     return mpz_sgn(e->share) >= 0 && mpz_cmp(e->share, e->length2) <= 0;
 }

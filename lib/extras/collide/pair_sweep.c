@@ -123,47 +123,47 @@ static bool is_share(const sweep *s)
     return mpz_sgn(s->share) * sign >= 0 && mpz_cmp(s->share, s->bottom) * sign <= 0;
 }
 
-static const ebpo_vectorz *next_corner(const sweep *s, int of, int i)
+static const ebpo_vectorz *next_corner(const sweep *s, int which, int i)
 {
-    return &s->corner[of][i == 2 ? 0 : i + 1];
+    return &s->corner[which][i == 2 ? 0 : i + 1];
 }
 
-/* Sets n to the normal of face `of`. Returns false if the face is parallel to the direction or has
- * no area. */
-static bool find_normal(sweep *s, int of)
+/* Sets n to the normal of face `which`. Returns false if the face is parallel to the direction or
+ * has no area. */
+static bool find_normal(sweep *s, int which)
 {
-    ebpo_vectorz_subtract(&s->u, &s->corner[of][1], &s->corner[of][0]);
-    ebpo_vectorz_subtract(&s->v, &s->corner[of][2], &s->corner[of][0]);
+    ebpo_vectorz_subtract(&s->u, &s->corner[which][1], &s->corner[which][0]);
+    ebpo_vectorz_subtract(&s->v, &s->corner[which][2], &s->corner[which][0]);
     ebpo_vectorz_cross(&s->n, &s->u, &s->v);
     ebpo_vectorz_dot(s->share, &s->n, &s->d);
     return mpz_sgn(s->share) != 0;
 }
 
-/* Returns true if the projection of face `of` contains the projection of the corner. */
-static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
+/* Returns true if the projection of face `which` contains the projection of the corner. */
+static bool is_over(sweep *s, const ebpo_vectorz *corner, int which)
 {
     int signs[3] = { 0, 0, 0 };
     for (int k = 0; k < 3; k++) {
-        ebpo_vectorz_subtract(&s->u, next_corner(s, of, k), &s->corner[of][k]);
-        ebpo_vectorz_subtract(&s->v, corner, &s->corner[of][k]);
+        ebpo_vectorz_subtract(&s->u, next_corner(s, which, k), &s->corner[which][k]);
+        ebpo_vectorz_subtract(&s->v, corner, &s->corner[which][k]);
         triple_product(s, s->share, &s->d, &s->u, &s->v);
         signs[mpz_sgn(s->share) + 1]++;
     }
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Considers the times at which the other face contains a corner of face `of`. The other face must
- * not be parallel to the direction. */
-static void corners_and_face(sweep *s, int of)
+/* Considers the times at which the other face contains a corner of face `which`. The other face
+ * must not be parallel to the direction. */
+static void corners_and_face(sweep *s, int which)
 {
-    (void)find_normal(s, !of);
+    (void)find_normal(s, !which);
     for (int i = 0; i < 3; i++) {
-        if (!is_over(s, &s->corner[of][i], !of))
+        if (!is_over(s, &s->corner[which][i], !which))
             continue;
-        ebpo_vectorz_subtract(&s->w, &s->corner[!of][0], &s->corner[of][i]);
+        ebpo_vectorz_subtract(&s->w, &s->corner[!which][0], &s->corner[which][i]);
         ebpo_vectorz_dot(s->top, &s->n, &s->w);
         ebpo_vectorz_dot(s->bottom, &s->n, &s->d);
-        keep_later_time(s, of == 1);
+        keep_later_time(s, which == 1);
     }
 }
 
@@ -188,12 +188,13 @@ static void two_edges(sweep *s, int i, int j)
     keep_later_time(s, false);
 }
 
-/* Considers the time at which corner i of face `of` is on edge j of the other face: w = t d - x v.
+/* Considers the time at which corner i of face `which` is on edge j of the other face:
+ * w = t d - x v.
  */
-static void corner_and_edge(sweep *s, int of, int i, int j)
+static void corner_and_edge(sweep *s, int which, int i, int j)
 {
-    const ebpo_vectorz *p = &s->corner[of][i], *q = &s->corner[!of][j];
-    ebpo_vectorz_subtract(&s->v, next_corner(s, !of, j), q);
+    const ebpo_vectorz *p = &s->corner[which][i], *q = &s->corner[!which][j];
+    ebpo_vectorz_subtract(&s->v, next_corner(s, !which, j), q);
     ebpo_vectorz_subtract(&s->w, q, p);
     ebpo_vectorz_cross(&s->n, &s->d, &s->v);
     ebpo_vectorz_dot(s->bottom, &s->n, &s->n);
@@ -204,7 +205,7 @@ static void corner_and_edge(sweep *s, int of, int i, int j)
     if (!is_share(s))
         return;
     triple_product(s, s->top, &s->n, &s->w, &s->v);
-    keep_later_time(s, of == 1);
+    keep_later_time(s, which == 1);
 }
 
 /* Considers the time at which two corners with the same projection are equal: w = t d. */
@@ -223,9 +224,9 @@ static void two_corners(sweep *s, int i, int j)
 static void inspect_faces(sweep *s)
 {
     bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) };
-    for (int of = 0; of < 2; of++)
-        if (!upright[!of])
-            corners_and_face(s, of);
+    for (int which = 0; which < 2; which++)
+        if (!upright[!which])
+            corners_and_face(s, which);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             two_edges(s, i, j);

@@ -226,9 +226,9 @@ static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
                      ebpo_polytope *envelope)
 {
     uint32_t count = 0;
-    ebpo_node as = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
-    as.subtree = s->model->whole;
-    const uint32_t *codes = ebpo_model_planes(s->model, &as, &count);
+    ebpo_node stored = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
+    stored.subtree = s->model->whole;
+    const uint32_t *codes = ebpo_model_planes(s->model, &stored, &count);
     ebpo_planes_cut(envelope, codes, count);
 }
 

@@ -127,15 +127,15 @@ static ebpo_status separate_patches_side(const separate_patches *u, uint64_t num
                                          ebpo_error *error)
 {
     const ebpo_model *model = u->collision->model[u->m];
-    ebpo_posed_subtrees as = { .model = model, .posing = u->collision->posing[u->m].posing };
+    ebpo_posed_subtrees posed = { .model = model, .posing = u->collision->posing[u->m].posing };
     double corner[8][3], middle[3];
     *in = -1;
     if (model->whole)
         return EBPO_OK;
     ebpo_cell cell = model->top->below[number].cell;
-    double radius = ebpo_posed_diagonal(&as, cell) / 2 +
-                    ebpo_posed_slack(&as, cell, u->collision->max_coordinate);
-    ebpo_posed_cell(&as, cell, corner);
+    double radius = ebpo_posed_diagonal(&posed, cell) / 2 +
+                    ebpo_posed_slack(&posed, cell, u->collision->max_coordinate);
+    ebpo_posed_cell(&posed, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
     if (ebpo_posed_solid_near(&u->two->model[!u->m], middle, radius))

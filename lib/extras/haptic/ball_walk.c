@@ -11,9 +11,9 @@
  * may be in contact; or, if that is near the beginning, the next haptic step continues the search.
  * The search also ends if the contacts found so far hold the ball in its position.
  *
- * The planes of the contacts bound a cone of allowed motions. The motion in the cone that is
- * nearest to the wanted motion is the wanted motion itself, or on a plane, or on the line of two
- * planes, or 0. All these motions are tried, because there are few planes. */
+ * The planes of the contacts bound a cone of allowed motions. One motion of the cone is nearest to
+ * the wanted motion: the wanted motion itself, its projection onto a plane or onto the line of two
+ * planes, or 0. All these are tried, because there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -115,7 +115,7 @@ enum {
 };
 
 /* Least fraction of a piece at which the piece may end before its contact is known. */
-static const double least_part = 1.0 / 32;
+static const double least_fraction = 1.0 / 32;
 
 /* Returns the capacity of the queue. The subtrees of waiting nodes are disjoint, so their number is
  * at most the number of leaves. */
@@ -142,8 +142,8 @@ void ebpo_ball_walk_free(ebpo_ball_walk *w)
     w->queue.item = NULL;
 }
 
-/* Returns true if the ball comes nearer to no point of `e`, except by rounding, which is less than
- * the slacks of ebpo_ball_motion. */
+/* Returns true if the ball comes nearer to no point of `e`. Rounding is ignored, because it is less
+ * than the slacks of ebpo_ball_motion. */
 static bool moves_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;
@@ -223,7 +223,7 @@ static bool end_before_waiting(ebpo_ball_walk *w)
 {
     if (w->fraction <= 0)
         return true;
-    if (!(w->queue.item[0].key >= least_part))
+    if (!(w->queue.item[0].key >= least_fraction))
         return false;
     w->fraction = w->queue.item[0].key;
     w->contacts.count = 0;

@@ -2,9 +2,9 @@
  * ball that stays outside of the model. Its path consists of straight pieces: a piece ends where
  * the ball comes into contact, and the next piece follows the contacts.
  *
- * Each piece is decided in two passes: distances find where the ball stops, and exact arithmetic
- * checks that the centre has crossed no face. If very many faces are around the ball, a piece is
- * completed in later haptic steps.
+ * Each piece is computed in two passes. The first pass finds by distances where the ball stops. The
+ * second pass checks by exact arithmetic that the centre has crossed no face. If very many faces
+ * are around the ball, a piece is completed in later haptic steps.
  *
  * This file also takes over the boxes (sets of loaded faces, face_box.h) of the loading thread,
  * finds the nearest face, and computes the smooth normal, which changes continuously with the
@@ -219,7 +219,7 @@ static void shorten_motion(double motion[3], double fraction)
 
 /* Returns the fraction, 0 to 1, of the path from p that is in `e`; p must be in `e`. The fraction
  * is rounded down, so that the computed end is in `e`, too. */
-static double part_inside(const double p[3], const double motion[3], const ebpo_extent *e)
+static double fraction_inside(const double p[3], const double motion[3], const ebpo_extent *e)
 {
     double fraction = 1;
     for (int i = 0; i < 3; i++) {
@@ -239,12 +239,12 @@ double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], dou
     box_of_path(t->proxy, motion, distance, &all);
     if (are_apart(&all, &t->root))
         return 1;
-    return ebpo_extent_holds(allowed, t->proxy) ? part_inside(t->proxy, motion, allowed) : 0;
+    return ebpo_extent_holds(allowed, t->proxy) ? fraction_inside(t->proxy, motion, allowed) : 0;
 }
 
-/* Shortens the piece to the part around which all faces are loaded. Returns false if no box
- * contains the proxy. */
-static bool cut_to_loaded_part(path_step *s)
+/* Shortens the piece so that all faces around it are loaded. Returns false if no box contains the
+ * proxy. */
+static bool shorten_to_loaded(path_step *s)
 {
     ebpo_haptic *t = s->t;
     double fraction = ebpo_haptic_loaded_part(t, s->motion, t->contact_distance + t->band);
@@ -282,7 +282,7 @@ static bool begin_piece(path_step *s)
     if (full_length <= 0x1p-12 * t->options.skin)
         return false;
     t->end_flags = 0;
-    if (!cut_to_loaded_part(s))
+    if (!shorten_to_loaded(s))
         return false;
     /* s->slack and s->least_slack belong to the whole path to the device; scale them to this piece
      */
@@ -290,7 +290,7 @@ static bool begin_piece(path_step *s)
     const ebpo_face_box *box = &t->box[t->current_box];
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
-    /* NULL: the whole piece is away from all faces (cut_to_loaded_part) */
+    /* NULL: the whole piece is away from all faces (shorten_to_loaded) */
     w->box = ebpo_extent_holds(&box->allowed, t->proxy) ? box : NULL;
     w->contact_distance = t->contact_distance;
     w->band = t->band;

@@ -1,8 +1,8 @@
-/* Computes a haptic step of a tool, a rigid set of points. The motion follows Gauss' principle for
- * a body without mass: of all motions that its contacts allow, the tool makes the motion nearest to
- * the motion of the device (Ortega, Redon, Coquillart 2007).
+/* Computes a haptic step of a tool (a rigid set of points). The motion follows Gauss' principle for
+ * a body without mass: the tool makes the motion that is nearest to the motion of the device among
+ * all motions that the contacts allow (Ortega, Redon, Coquillart 2007).
  *
- * The path of a step consists of pieces. A piece is decided in two passes. The first pass follows
+ * The path of a step consists of pieces. A piece is computed in two passes. The first pass follows
  * each point that may hit a face, and ends the piece where the first point comes too close to a
  * face. The second pass examines these points at their new positions: exact arithmetic checks that
  * no point has crossed a face, and distances check that no point is too close. After that, the tool
@@ -42,10 +42,10 @@ static tool_piece make_piece(ebpo_haptic *t, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
     const ebpo_face_box *box = &t->box[t->current_box];
-    bool known = ebpo_extent_holds(&box->allowed, tool->proxy.place);
+    bool is_in_box = ebpo_extent_holds(&box->allowed, tool->proxy.place);
     return (tool_piece){ t,
                          tool,
-                         known ? box : NULL,
+                         is_in_box ? box : NULL,
                          t->options.skin,
                          sqrt(ebpo_vec3_dot(tool->motion + 3, tool->motion + 3)) / tool->arm,
                          work };
@@ -109,11 +109,11 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
     if (!all)
         return false;
-    const ebpo_ball_motion w = { from, motion, stop_distance * p->skin, p->t->band, 0, 0 };
+    const ebpo_ball_motion ball = { from, motion, stop_distance * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
         double fraction = ebpo_ball_first_contact(
-            &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
+            &ball, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
         tool->fraction = fmin(tool->fraction, fraction);
     }
     tool->close_points[tool->close_count++] =
@@ -128,8 +128,8 @@ static bool inspect_points(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
-    double need = search_distance * p->skin;
-    double all = INFINITY;
+    double margin = search_distance * p->skin;
+    double least = INFINITY;
     c->safe_until = 0; /* not known, until all points have been examined */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
         double motion = max_point_motion(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
@@ -138,13 +138,13 @@ static bool inspect_points(const tool_piece *p, uint32_t number)
             ebpo_extent e;
             ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
             box_of_segment(at, at, 0, &e);
-            tool->safe_until[i] = c->travelled + free_distance(p, &e, POINT_VISITS) - need;
+            tool->safe_until[i] = c->travelled + free_distance(p, &e, POINT_VISITS) - margin;
         }
         if (tool->safe_until[i] - c->travelled - motion <= 0 && !add_close_point(p, i))
             return false;
-        all = fmin(all, tool->safe_until[i]);
+        least = fmin(least, tool->safe_until[i]);
     }
-    c->safe_until = all;
+    c->safe_until = least;
     return true;
 }
 
@@ -157,14 +157,14 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
     ++*p->work;
     if (!p->box || c->safe_until - c->travelled - motion > 0)
         return true;
-    double at[3], from_all;
+    double at[3], distance;
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
     box_of_segment(at, at, c->radius, &e);
-    from_all = free_distance(p, &e, CLUSTER_VISITS) - search_distance * p->skin;
-    if (from_all - motion <= 0)
+    distance = free_distance(p, &e, CLUSTER_VISITS) - search_distance * p->skin;
+    if (distance - motion <= 0)
         return inspect_points(p, number);
-    c->safe_until = c->travelled + from_all;
+    c->safe_until = c->travelled + distance;
     for (uint32_t i = c->first; i < c->first + c->count; i++)
         tool->safe_until[i] = fmax(tool->safe_until[i], c->safe_until);
     return true;
@@ -301,8 +301,8 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     return true;
 }
 
-/* Abandons the piece, because too many faces are close or its end is not allowed. Makes the next
- * piece shorter. */
+/* Abandons the piece: too many faces are close, or the tool may not be at the end of the piece.
+ * Makes the next piece shorter. */
 static uint32_t give_up_piece(tool_piece *p)
 {
     p->t->max_piece = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
@@ -343,8 +343,9 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
 
 static double contact_tolerance(const ebpo_haptic *t) { return 0x1p-6 * t->options.skin; }
 
-/* Applies Coulomb friction: shortens `motion`, the part of `want` that the contacts allow, by the
- * coefficient of friction times the length of the part that they prevent. */
+/* Applies Coulomb friction. The contacts allow `motion` and prevent the rest of `want`, its
+ * difference from `motion`. Shortens `motion` by the coefficient of friction times the length of
+ * this rest. */
 static void apply_friction(const ebpo_haptic *t, const double want[EBPO_SCREW],
                            double motion[EBPO_SCREW])
 {
@@ -400,8 +401,8 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
     return flags | EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
-/* Computes the vector from device to proxy, or only the part of this vector that contacts cause.
- * Returns the number of contacts that hold the tool. */
+/* Computes the vector from device to proxy, or only the component of this vector that contacts
+ * cause. Returns the number of contacts that hold the tool. */
 static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t flags,
                       double out[EBPO_SCREW])
 {
@@ -409,8 +410,9 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
     double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
     int holding = ebpo_tool_hold(&tool->contacts, want, contact_tolerance(t), false, motion);
-    /* Friction holds a tool that has completed its path in all directions, so the whole vector
-     * counts. In other cases motions that the contacts allow do not count. */
+    /* With friction, a tool that has completed its path is held in all directions, so the whole
+     * vector counts. Without friction, or on an incomplete path, motions that the contacts allow
+     * do not count. */
     bool held_only =
         flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)

@@ -171,10 +171,11 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
 }
 
 /* Checks all texts, then copies them. known: the present date, which is not checked, so that a date
- * that another program wrote can be kept. of: the object for messages, such as "a layer". */
+ * that another program wrote can be kept. owner: what has these texts, for
+ * messages, such as "a layer". */
 static ebpo_status check_texts(const char *const from[EBPO_PAINT_TEXTS],
-                               const ebpo_paint_text_kind *kinds, const char *of, const char *known,
-                               char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
+                               const ebpo_paint_text_kind *kinds, const char *owner,
+                               const char *known, char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
 {
     const char *date = from[EBPO_PAINT_DATE];
     size_t bytes = 0;
@@ -182,19 +183,19 @@ static ebpo_status check_texts(const char *const from[EBPO_PAINT_TEXTS],
         size_t length = from[i] ? strlen(from[i]) : 0;
         bytes += length + 1;
         if (length > kinds[i].max_bytes)
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: the %s is longer than %zu bytes", of,
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: the %s is longer than %zu bytes", owner,
                              kinds[i].name, kinds[i].max_bytes);
         if (from[i] && !ebpo_text_ok(from[i]))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "%s: the %s is not UTF-8 without control characters; lines are "
                              "separated by U+2028",
-                             of, kinds[i].name);
+                             owner, kinds[i].name);
     }
     if (date && *date && strcmp(date, known) != 0 && !ebpo_is_date(date))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: the date is not a valid ISO 8601 date, such as 2026-11-26 or "
                          "2026-11-26T21:43:05Z",
-                         of);
+                         owner);
     return copy_texts(from, to) ? EBPO_OK : ebpo_fail_memory(error, bytes);
 }
 

@@ -52,8 +52,8 @@ typedef struct ebpo_stroke_data {
     uint8_t rgba[4];
 } ebpo_stroke_data;
 
-/* The file to which a paint belongs, with the version of the file that was read or last saved.
- * Saving changes this struct, but not the paint. */
+/* The file of the annotations, with its version when it was read or last saved. Saving changes this
+ * struct, but not the annotations (ebpo_paint). */
 typedef struct ebpo_paint_file {
     pthread_mutex_t mutex; /* protects the other members during saving */
     char *path;            /* absolute path; NULL: no file yet */

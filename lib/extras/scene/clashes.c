@@ -127,13 +127,13 @@ static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *clash, e
 
 /* --- locations --- */
 
-/* Computes a common point of two faces: if they cross, an end of their common segment, otherwise a
- * nearest point. */
-static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair, double out[3],
+/* Computes a common point of two faces that cross or touch: an end of their common segment if they
+ * cross, a nearest point if they touch. models: gives the corners of both faces. */
+static ebpo_status common_point(ebpo_pair_faces *models, const ebpo_face_pair *pair, double out[3],
                                 ebpo_error *error)
 {
     ebpo_posed_pair faces;
-    ebpo_status status = ebpo_pose_pair(of, pair, &faces, error);
+    ebpo_status status = ebpo_pose_pair(models, pair, &faces, error);
     if (status != EBPO_OK)
         return status;
     const double(*a)[3] = (const double(*)[3])faces.corner[0];

@@ -144,10 +144,10 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     if (!ebpo_grow(&scene->files, &scene->files_capacity, n + 1, sizeof *scene->files))
         return ebpo_fail_memory(error, (n + 1) * sizeof *scene->files);
     ebpo_scene_file_entry f = { .path = strdup(path) };
-    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
-    how.max_expansion = max_expansion;
+    ebpo_open_options options = EBPO_OPEN_OPTIONS_INIT;
+    options.max_expansion = max_expansion;
     ebpo_status status =
-        f.path ? ebpo_open_with(path, &how, &f.file, error) : ebpo_fail_memory(error, 1);
+        f.path ? ebpo_open_with(path, &options, &f.file, error) : ebpo_fail_memory(error, 1);
     if (status != EBPO_OK) {
         free(f.path);
         return status;

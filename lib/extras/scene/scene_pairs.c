@@ -48,8 +48,8 @@ static void sort_sets(ebpo_scene_instance_entry *i)
     i->set_count = kept;
 }
 
-/* Merges the rules for each pair of sets into one rule. This rule ignores pairs if one of the rules
- * does; otherwise it has the greatest clearance. */
+/* Merges the rules for each pair of sets into one rule. The merged rule has their greatest
+ * clearance, or ignores pairs if one of the merged rules does. */
 void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
     uint64_t kept = 0;
@@ -80,17 +80,18 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
     return rule ? rule->clearance : 0;
 }
 
-/* Applies the clearance `rule` of a rule to a pair; returns false if the rule ignores the pair. */
-static bool apply_rule(double rule, double *clearance)
+/* Applies the clearance of one rule to the clearance of a pair: the pair gets the greater one.
+ * Returns false if the rule ignores the pair. */
+static bool apply_rule(double rule_clearance, double *pair_clearance)
 {
-    *clearance = fmax(*clearance, rule);
-    return rule >= 0;
+    *pair_clearance = fmax(*pair_clearance, rule_clearance);
+    return rule_clearance >= 0;
 }
 
 /* Applies all rules for a set of x and a set of y, by looking up the rule of each pair of sets.
  * Returns false if a rule ignores the pair. */
-static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
-                    const ebpo_scene_instance_entry *y, double *clearance)
+static bool apply_rules_by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
+                                const ebpo_scene_instance_entry *y, double *clearance)
 {
     for (uint32_t i = 0; i < x->set_count; i++)
         for (uint32_t k = 0; k < y->set_count; k++)
@@ -104,9 +105,9 @@ static bool is_in(const ebpo_scene_instance_entry *i, uint64_t set)
     return bsearch(&set, i->sets, i->set_count, sizeof set, compare_sets) != NULL;
 }
 
-/* Does the same as by_sets, by testing each rule of the scene. */
-static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
-                     const ebpo_scene_instance_entry *y, double *clearance)
+/* Does the same as apply_rules_by_sets, by testing each rule of the scene. */
+static bool test_all_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
+                           const ebpo_scene_instance_entry *y, double *clearance)
 {
     for (uint64_t i = 0; i < scene->rules_count; i++) {
         const ebpo_scene_rule_entry *r = &scene->rules[i];
@@ -125,10 +126,10 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->description.fixed && y->description.fixed)
         return false;
-    /* If there are fewer rules than pairs of sets, test every rule: if both instances have 100,000
-     * groups, looking up the rules of all pairs of groups takes hours. */
-    bool by_rule = scene->rules_count < (uint64_t)x->set_count * y->set_count;
-    return (by_rule ? by_rules : by_sets)(scene, x, y, clearance);
+    /* Use the faster way. Instances with 100,000 groups each have so many pairs of groups that
+     * looking up their rules would take hours. */
+    bool fewer_rules = scene->rules_count < (uint64_t)x->set_count * y->set_count;
+    return (fewer_rules ? test_all_rules : apply_rules_by_sets)(scene, x, y, clearance);
 }
 
 /* --- poses, boxes and motion --- */
@@ -200,22 +201,24 @@ static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, do
             high += fmax(a, b);
             size += fmax(fabs(a), fabs(b));
         }
-        double off = size * 0x1p-48 + 0x1p-1000;
-        min[i] = low + pose->translation[i] - off;
-        max[i] = high + pose->translation[i] + off;
+        double rounding = size * 0x1p-48 + 0x1p-1000;
+        min[i] = low + pose->translation[i] - rounding;
+        max[i] = high + pose->translation[i] + rounding;
     }
 }
 
-/* Returns x, or `all` if x is NaN, because after an overflow the bound is unknown. */
-static double or_else(double x, double all) { return isnan(x) ? all : x; }
+/* Returns x. If x is NaN, which follows from an overflow, returns `infinite` instead, so that the
+ * box is unbounded on this side. */
+static double or_infinite(double x, double infinite) { return isnan(x) ? infinite : x; }
 
-/* Extends a box so that it contains the box low .. high, enlarged by `by` on each side. */
+/* Extends a box so that it contains the box low .. high, enlarged by `distance` on each
+ * side. */
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
-                     double by)
+                     double distance)
 {
     for (int k = 0; k < 3; k++) {
-        min[k] = fmin(min[k], or_else(low[k] - by, -INFINITY));
-        max[k] = fmax(max[k], or_else(high[k] + by, INFINITY));
+        min[k] = fmin(min[k], or_infinite(low[k] - distance, -INFINITY));
+        max[k] = fmax(max[k], or_infinite(high[k] + distance, INFINITY));
     }
 }
 
@@ -242,16 +245,16 @@ ebpo_scene_extent ebpo_scene_extent_of(const ebpo_scene *scene, const ebpo_scene
     return extent;
 }
 
-/* Extends min .. max so that it contains the box of the instance at a time, enlarged by `by` on
- * each side. */
+/* Extends min .. max so that it contains the box of the instance at a time, enlarged by
+ * `distance` on each side. */
 static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
-                   double by, double min[3], double max[3])
+                   double distance, double min[3], double max[3])
 {
     double low[3], high[3];
     ebpo_pose pose;
     pose_at(scene, i, time, &pose);
     posed_box(&pose, &scene->models[i->description.model], low, high);
-    join_box(min, max, low, high, by);
+    join_box(min, max, low, high, distance);
 }
 
 /* Extends min .. max so that it contains the instance between two times with no key between them.
@@ -416,13 +419,13 @@ static int compare_boxes(const void *a, const void *b)
     return (x->instance > y->instance) - (x->instance < y->instance);
 }
 
-/* Returns true if two boxes are at most `by` apart on each axis, or if rounding makes this
+/* Returns true if two boxes are at most `distance` apart on each axis, or if rounding makes this
  * uncertain. */
-static bool near_each_other(const box *x, const box *y, double by)
+static bool near_each_other(const box *x, const box *y, double distance)
 {
     for (int k = 0; k < 3; k++) {
         double gap = fmax(x->min[k] - y->max[k], y->min[k] - x->max[k]);
-        if (gap > by + fabs(gap) * 0x1p-50)
+        if (gap > distance + fabs(gap) * 0x1p-50)
             return false;
     }
     return true;
