@@ -89,7 +89,7 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     how.colours = o->colours;
     how.workspace = o->workspace;
     o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
-    ebpo_status status = ebpo_boolean_mesh(b, &how, &mesh, &o->report, error);
+    ebpo_status status = ebpo_boolean_mesh(b, &options, &mesh, &o->report, error);
     if (status != EBPO_OK)
         return status;
     if (ebpo_mesh_attributes_lost(&mesh))

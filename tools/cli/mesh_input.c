@@ -50,31 +50,31 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     a->collapsed_faces += b->collapsed_faces;
 }
 
-static ebpo_status apply_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
+static ebpo_status apply_chosen(mesh_input *p, ebpo_prepare_options *options, ebpo_error *error)
 {
     const ebpo_repair_record *steps = &p->repairs.tries[p->repairs.chosen].record;
     ebpo_prepared again = EBPO_PREPARED_INIT;
-    how->weld = steps->weld;
-    how->weld_distance = 0;
-    how->drop_duplicates = steps->drop_duplicates;
-    how->orient = steps->orient;
-    how->fill_holes = steps->fill_holes;
-    ebpo_status status = ebpo_mesh_prepare(&p->mesh, how, &again, error);
+    options->weld = steps->weld;
+    options->weld_distance = 0;
+    options->drop_duplicates = steps->drop_duplicates;
+    options->orient = steps->orient;
+    options->fill_holes = steps->fill_holes;
+    ebpo_status status = ebpo_mesh_prepare(&p->mesh, options, &again, error);
     if (status == EBPO_OK)
         join_preparations(&p->prepared, &again);
     return status;
 }
 
 static ebpo_status try_and_repair(mesh_input *p, repair_request requested,
-                                  ebpo_prepare_options *how, ebpo_error *error)
+                                  ebpo_prepare_options *options, ebpo_error *error)
 {
     if (steps_given(requested) || !(requested.repair || requested.advise))
         return EBPO_OK;
-    ebpo_status status = ebpo_mesh_try_repairs(&p->mesh, &p->prepared.report, how->threads,
-                                               how->progress, &p->repairs, error);
+    ebpo_status status = ebpo_mesh_try_repairs(&p->mesh, &p->prepared.report, options->threads,
+                                               options->progress, &p->repairs, error);
     p->repairs_tried = status == EBPO_OK && p->repairs.count > 0;
     return p->repairs_tried && requested.repair && p->repairs.chosen >= 0
-               ? apply_chosen(p, how, error)
+               ? apply_chosen(p, options, error)
                : status;
 }
 
@@ -91,14 +91,15 @@ static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *e
 }
 
 /* Counts shells. The sign of the volume of a 2-manifold shell gives its orientation. */
-static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, ebpo_error *error)
+static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *options,
+                                ebpo_error *error)
 {
     const ebpo_mesh_report *r = &p->prepared.report;
     if (!r->balanced || (r->manifold && r->components < 2))
         return EBPO_OK;
     p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
     p->shells_counted = true;
-    return ebpo_mesh_count_shells(&p->mesh, how->threads, how->progress, &p->shells, error);
+    return ebpo_mesh_count_shells(&p->mesh, options->threads, options->progress, &p->shells, error);
 }
 
 ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
@@ -120,13 +121,13 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repair_req
                                    ebpo_workspace *workspace, unsigned threads,
                                    ebpo_progress progress, ebpo_error *error)
 {
-    ebpo_mesh_read_options how = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
     ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
-    how.progress = wanted.progress = progress;
-    how.threads = wanted.threads = threads;
-    how.workspace = workspace;
-    how.attributes = more != READ_MESH;
-    how.embed_textures = more == READ_TEXTURES;
+    options.progress = wanted.progress = progress;
+    options.threads = wanted.threads = threads;
+    options.workspace = workspace;
+    options.attributes = more != READ_MESH;
+    options.embed_textures = more == READ_TEXTURES;
     wanted.weld = requested.weld;
     wanted.weld_distance = requested.weld_distance;
     wanted.drop_duplicates = requested.drop_duplicates;
@@ -136,8 +137,8 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repair_req
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
     out->repairs = (ebpo_repairs)EBPO_REPAIRS_INIT;
-    ebpo_status status = groups ? ebpo_mesh_read_groups(path, &how, &out->mesh, groups, error)
-                                : ebpo_mesh_read(path, &how, &out->mesh, error);
+    ebpo_status status = groups ? ebpo_mesh_read_groups(path, &options, &out->mesh, groups, error)
+                                : ebpo_mesh_read(path, &options, &out->mesh, error);
     if (status != EBPO_OK)
         return status;
     const char *unread = ebpo_mesh_ignored(&out->mesh);

@@ -32,7 +32,7 @@ bool points_open(points *p, const char *by, const char *path, points_kind kind, 
 }
 
 bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
-                       double tmax, uint64_t number, uint64_t of)
+                       double tmax, uint64_t number, uint64_t part_count)
 {
     bool standard = !path || strcmp(path, "-") == 0;
     struct stat st;
@@ -47,7 +47,7 @@ bool points_open_shard(points *p, const char *by, const char *path, points_kind 
                    .rows_per_block = POINTS_BATCH,
                    .rest_capacity = POINTS_LINE };
     if (!standard && points_is_dataset(path))
-        return points_open_dataset(p, path, number, of);
+        return points_open_dataset(p, path, number, part_count);
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)

@@ -11,10 +11,10 @@
  * cannot be opened (reported on stderr). Call points_close in any case. */
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax);
-/* Opens the input as points_open does, but reads only part `number` of `of` if it is an HDF5
- * dataset. Call points_cut(p, number, of) next. */
+/* Opens the input as points_open does, but reads only part `number` of `part_count` if it is an
+ * HDF5 dataset. Call points_cut(p, number, part_count) next. */
 bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
-                       double tmax, uint64_t number, uint64_t of);
+                       double tmax, uint64_t number, uint64_t part_count);
 void points_close(points *p);
 
 /* Reads the first bytes, and may wait for them. Returns true while there is no error; errors are

@@ -31,29 +31,33 @@ static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 
 /* --- numbers --- */
 
-static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
+static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number,
+                        uint64_t part_count)
 {
     uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
     if (p->rows_stated && (size - begin) / each != p->rows_total)
         return fail_cut(p, rows > p->rows_total
                                ? "has more rows than its shape states; it is in another format"
                                : "has fewer rows than its shape states; it is truncated");
-    uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
+    uint64_t first = points_share(rows, number, part_count),
+             end = points_share(rows, number + 1, part_count);
     p->row = first;
     p->rows_stated = false; /* checked above; take_numbers need not check it */
     p->rows_known = true;
     p->rows_total = end - first;
     /* the last part also reads the bytes after the last whole row, so that they are reported */
-    return limit_bytes(p, begin + first * each, number + 1 < of ? begin + end * each : size);
+    return limit_bytes(p, begin + first * each,
+                       number + 1 < part_count ? begin + end * each : size);
 }
 
-static bool cut_held(points *p, uint64_t number, uint64_t of)
+static bool cut_held(points *p, uint64_t number, uint64_t part_count)
 {
     uint64_t rows = p->rows_total;
     if (p->held_part)
         return true;
-    p->row = p->held_at = points_share(rows, number, of);
-    p->rows_total = points_share(rows, number + 1, of); /* take_held stops before this row */
+    p->row = p->held_at = points_share(rows, number, part_count);
+    p->rows_total =
+        points_share(rows, number + 1, part_count); /* take_held stops before this row */
     return true;
 }
 
@@ -102,25 +106,26 @@ static bool take_names(points *p, uint64_t begin, uint64_t *out)
     return success;
 }
 
-static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
+static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t part_count)
 {
     uint64_t first = begin;
     if (p->header && !take_names(p, begin, &first))
         return false;
-    uint64_t from = next_line(p, first, first + points_share(size - first, number, of), size),
+    uint64_t from =
+                 next_line(p, first, first + points_share(size - first, number, part_count), size),
              to = from == UINT64_MAX
                       ? from
-                      : next_line(p, first, first + points_share(size - first, number + 1, of),
-                                  size);
+                      : next_line(p, first,
+                                  first + points_share(size - first, number + 1, part_count), size);
     if (to == UINT64_MAX)
         return false;
     p->line_from = from;
-    return limit_bytes(p, from, number + 1 < of ? to : size);
+    return limit_bytes(p, from, number + 1 < part_count ? to : size);
 }
 
 /* --- all kinds of input --- */
 
-bool points_cut(points *p, uint64_t number, uint64_t of)
+bool points_cut(points *p, uint64_t number, uint64_t part_count)
 {
     struct stat st = { .st_size = 0 };
     if (!p->held && (p->fd < 0 || fstat(p->fd, &st) != 0 || !S_ISREG(st.st_mode)))
@@ -128,7 +133,7 @@ bool points_cut(points *p, uint64_t number, uint64_t of)
     if (!points_begin(p))
         return false;
     if (p->held)
-        return cut_held(p, number, of);
+        return cut_held(p, number, part_count);
     uint64_t begin = p->bytes_taken - p->rest_count, size = (uint64_t)st.st_size;
-    return (p->raw ? cut_numbers : cut_text)(p, begin, size, number, of);
+    return (p->raw ? cut_numbers : cut_text)(p, begin, size, number, part_count);
 }

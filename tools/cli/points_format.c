@@ -193,15 +193,16 @@ static ebpo_status read_dataset(points *p, const char *file, const char *name, u
 }
 
 static ebpo_status read_part(points *p, const char *file, const char *name, uint64_t number,
-                             uint64_t of, ebpo_error *error)
+                             uint64_t part_count, ebpo_error *error)
 {
     uint64_t first = 0, end = 0, total, now;
-    ebpo_status status = read_dataset(p, file, name, 0, of > 1 ? 0 : UINT64_MAX, &total, error);
-    if (status != EBPO_OK || of == 1)
+    ebpo_status status =
+        read_dataset(p, file, name, 0, part_count > 1 ? 0 : UINT64_MAX, &total, error);
+    if (status != EBPO_OK || part_count == 1)
         return status;
     p->held_part = true;
-    p->row = first = points_share(total, number, of);
-    end = points_share(total, number + 1, of);
+    p->row = first = points_share(total, number, part_count);
+    end = points_share(total, number + 1, part_count);
     status = read_dataset(p, file, name, first, end, &now, error);
     if (status == EBPO_OK && (now != total || p->rows_total != end - first)) {
         snprintf(error->message, sizeof error->message, "%s: changed while it was read", file);
@@ -210,13 +211,13 @@ static ebpo_status read_part(points *p, const char *file, const char *name, uint
     return status;
 }
 
-bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t of)
+bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t part_count)
 {
     const char *colon = dataset_colon(path);
     char *file = strndup(path, (size_t)(colon - path));
     ebpo_error error = { .status = EBPO_E_MEMORY };
     p->is_begun = p->rows_known = true;
-    p->failed = !file || read_part(p, file, colon + 1, number, of, &error) != EBPO_OK;
+    p->failed = !file || read_part(p, file, colon + 1, number, part_count, &error) != EBPO_OK;
     free(file);
     if (p->failed)
         fprintf(stderr, "ebpo %s: %s\n", p->command,

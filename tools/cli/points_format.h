@@ -14,8 +14,8 @@ bool points_is_dataset(const char *path);
  * the file name, or "". */
 struct stat;
 bool points_file(const char *path, struct stat *st, const char **dataset);
-/* Opens part `number` of `of` of a dataset, the same part as points_cut takes. Returns false after
- * an error, which has been reported. */
-bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t of);
+/* Opens part `number` of `part_count` of a dataset, the same part as points_cut takes. Returns
+ * false after an error, which has been reported. */
+bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t part_count);
 
 #endif

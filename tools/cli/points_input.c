@@ -23,9 +23,9 @@ bool points_fault(points_block *b, uint64_t at, const char *format, ...)
     return false;
 }
 
-uint64_t points_share(uint64_t total, uint64_t number, uint64_t of)
+uint64_t points_share(uint64_t total, uint64_t number, uint64_t part_count)
 {
-    return total / of * number + total % of * number / of;
+    return total / part_count * number + total % part_count * number / part_count;
 }
 
 void points_block_free(points_block *b)

@@ -87,9 +87,9 @@ enum { POINTS_LINE = 1 << 18, POINTS_TEXT = 1 << 17, POINTS_FIELDS = 256 };
 __attribute__((format(printf, 3, 4))) bool points_fault(points_block *b, uint64_t at,
                                                         const char *format, ...);
 
-/* Returns total * number / of, the beginning of part `number` of `of`; without overflow, as `of` is
- * at most 10^9. */
-uint64_t points_share(uint64_t total, uint64_t number, uint64_t of);
+/* Returns total * number / part_count, the beginning of part `number` of `part_count`; without
+ * overflow, as `part_count` is at most 10^9. */
+uint64_t points_share(uint64_t total, uint64_t number, uint64_t part_count);
 
 /* Appends input bytes to `rest`: those of one read, or all up to the end of the input. Returns
  * false after an error, which is then in the block. */

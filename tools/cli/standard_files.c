@@ -131,19 +131,19 @@ int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS
 {
     int code = EXIT_OK;
     for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_OK; i++) {
-        char how = args_dash(spec, i); /* "-" means: 'i' standard input, 'o' standard output */
-        if ((how == 'i' || how == 'o') && is_pipe(operand[i])) {
+        char stream = args_dash(spec, i); /* "-" means: 'i' standard input, 'o' standard output */
+        if ((stream == 'i' || stream == 'o') && is_pipe(operand[i])) {
             fprintf(stderr, "ebpo %s: %s: is a pipe or device; give '-' instead, and %s\n",
                     spec->command, operand[i],
-                    how == 'i' ? "redirect the mesh to standard input"
-                               : "redirect standard output");
+                    stream == 'i' ? "redirect the mesh to standard input"
+                                  : "redirect standard output");
             code = EXIT_FAILED;
         }
         if (strcmp(operand[i], "-") != 0)
             continue;
-        if (how == 'i')
+        if (stream == 'i')
             code = copy_input(spec->command, &operand[i]);
-        else if (how == 'o')
+        else if (stream == 'o')
             code = redirect_output(spec->command, &operand[i]);
     }
     if (code != EXIT_OK)

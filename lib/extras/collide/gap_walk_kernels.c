@@ -112,11 +112,11 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const point8 *p, const edges8 *a, int 
 }
 
 /* Offers each corner that is above the interior of a face, with its nearest point on the face.
- * sign: 1 if the corners belong to A, -1 if they belong to B. */
-EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *own,
+ * edges: those of `face`. sign: 1 if the corners belong to A, -1 if they belong to B. */
+EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *edges,
                                const triangle8 *corners, float sign)
 {
-    const point8 *e = &own->edge[0];
+    const point8 *e = &edges->edge[0];
     point8 f = point_minus8(&face->corner[2], &face->corner[0]), normal = point_cross8(e, &f),
            to_e = point_cross8(&f, &normal), to_f = point_cross8(&normal, e);
     f8 inverse = f8_div(f8_all(1), point_dot8(&normal, &normal)), zero = f8_all(0);
