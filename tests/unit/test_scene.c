@@ -84,7 +84,8 @@ static const struct {
     { "{\"ebpo_scene\": \"1.0\",\n\"models\": {\"m\": {\"file\": \"/etc/m\"}}}",
       "line 2: models.m.file: is outside" },
     { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"a/../../m\"}}}", "is outside" },
-    { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"http://h/m\"}}}", "allowed" },
+    { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"http://h/m\"}}}",
+      "use ebpo scene --remote" },
     { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"m\", \"content_sha256\": "
       "\"1\"}}}",
       "is not 64 digits" },
@@ -514,7 +515,7 @@ START_TEST(test_scene_rules_match_reference)
         in[i][EBPO_SCENE_ALL_SET] = in[i][s->sets_count - 1] = true;
         for (int g = 0; g < groups; g++) {
             uint64_t set = (uint64_t)reference_integer(&state, 1, groups);
-            fine(ebpo_scene_join_set(s, set, &error));
+            fine(ebpo_scene_put_newest_into(s, set, &error));
             in[i][set] = true;
         }
     }
