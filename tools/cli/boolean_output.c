@@ -79,15 +79,15 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
                                  ebpo_error *error)
 {
     ebpo_mesh mesh;
-    ebpo_boolean_mesh_options how = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
-    how.progress = progress;
-    how.doubles = o->doubles;
-    how.origins = true;
-    how.volume = o->volume;
-    how.changed_only = o->changed_only;
-    how.attributes = !o->changed_only;
-    how.colours = o->colours;
-    how.workspace = o->workspace;
+    ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    options.progress = progress;
+    options.doubles = o->doubles;
+    options.origins = true;
+    options.volume = o->volume;
+    options.changed_only = o->changed_only;
+    options.attributes = !o->changed_only;
+    options.colours = o->colours;
+    options.workspace = o->workspace;
     o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
     ebpo_status status = ebpo_boolean_mesh(b, &options, &mesh, &o->report, error);
     if (status != EBPO_OK)
