@@ -550,7 +550,7 @@ START_TEST(test_haptic_place_uses_previous_box)
     unsigned last = c.haptic->current_box;
     c.haptic->current_box = c.haptic->previous_box;
     c.haptic->previous_box = last;
-    c.haptic->box[c.haptic->current_box].centres.min[0] = INFINITY;
+    c.haptic->box[c.haptic->current_box].allowed.min[0] = INFINITY;
     ASSERT_OK(ebpo_haptic_reset(c.haptic, beside, error));
     ck_assert_uint_eq(c.haptic->current_box, last);
     cube_end(&c);
