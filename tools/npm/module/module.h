@@ -32,10 +32,10 @@ typedef struct ebpo_js_object {
     ebpo_stream *stream;
     ebpo_view_stream *view;
     ebpo_sampler *sampler;
-    struct ebpo_chunks *chunks;       /* decoded chunks, for reading rows of arrays; NULL: none yet */
+    struct ebpo_chunks *chunks; /* decoded chunks, for reading rows of arrays; NULL: none yet */
     struct ebpo_patch_table *patches; /* the patches of a view; NULL: none yet */
     uint64_t chunk_memory;            /* size of the cache of chunks in bytes */
-    bool within_level;                /* the stream has begun a level whose nodes are not all read */
+    bool within_level; /* the stream has begun a level whose nodes are not all read */
     ebpo_js_array array[EBPO_JS_ARRAYS];
     double number[EBPO_JS_NUMBERS]; /* result of a query of one point or ray */
     ebpo_error error;
