@@ -190,10 +190,13 @@ static double enough_of(const bounding *b)
     return fmax(b->known, fmax(b->most * CLOSE_ENOUGH, b->most + b->fine));
 }
 
-/* A convex polygon: a triangle that three planes cut has at most six corners. */
+/* CORNERS: a plane cuts a polygon of n corners into parts of at most 3 n / 2 corners: rounding
+ * errors can make the corners of a thin polygon alternate between the sides. Three planes make at
+ * most 4, 6 and 9 corners of a triangle. */
+enum { CORNERS = 9 };
 typedef struct polygon {
     int count;
-    double at[6][3];
+    double at[CORNERS][3];
 } polygon;
 
 /* Cuts a polygon by the plane of points x with n . (x - on) = 0. Appends the part in direction n to
