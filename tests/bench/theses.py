@@ -5,13 +5,13 @@
               [--run STEP... | --no-run]
 
 BUILD_DIR is a release build with -Dpeers=enabled (the step `collisions` runs crossing_ebpo).
-Each step's result is kept in WORK_DIR/results, so the script continues where it stopped; --list
-prints the steps. The page has the steps that were run, and names the others."""
+Each step's result is kept in thesis_results beside the script, so the script continues where it stopped;
+remove a result to run its step again. --list prints the steps. The page has the steps that were run, and
+names the others."""
 import argparse
 import pathlib
 import sys
 
-import measured
 import thesis_bp
 import thesis_ebp
 import thesis_figures as theirs
@@ -19,7 +19,7 @@ from query_page import Page, handwritten, reflow
 from thesis_bp import above, free_volume, of_levels, sent_factors
 from thesis_ebp import SELECTIONS, contact_times, pair_time, slower_cells
 from thesis_plots import plot
-from thesis_runs import LARGE_MINUTES, MINUTES, PERCENTS, STEPS, Runs
+from thesis_runs import MINUTES, PERCENTS, STEPS, Runs
 
 
 def levels_of(names):
@@ -103,11 +103,8 @@ def not_run(page, runs):
               f"The {len(STEPS) - len(missing)} steps on this page took {seconds / 3600:.1f} hours on the busy machine, "
               "0.8 GB of disk without temporary files, and 4.0 GB of memory. All steps need about 6 hours of one core.")
     if missing:
-        few = ", ".join(f"`{name}` ({MINUTES.get(name, 'unknown')})" for name in missing if not name.startswith("large_"))
-        many = [name for name in missing if name.startswith("large_")]
-        page.text("Not run, with the expected minutes of one core: " + ", ".join(filter(None, (
-            few, f"{len(many)} steps `large_*` ({LARGE_MINUTES} each: 256 times those of 99,970 faces)" if many else "")))
-            + ".")
+        few = ", ".join(f"`{name}` ({MINUTES.get(name, 'unknown')})" for name in missing)
+        page.text(f"Not run, with the expected minutes of one core: {few}.")
 
 
 def plots(runs, folder):
@@ -163,8 +160,8 @@ def write(runs, out, pictures):
     page.text("# Compared with the theses", "", *summary(runs))
     page.text("## Settings", "",
               f"Made by `tests/bench/theses.py BUILD_DIR MODELS_DIR WORK_DIR -o docs/measured/theses.md` on "
-              f"{measured.machine()}, with a load of {max((runs.result(s) or {'load': 0})['load'] for s in STEPS):.0f} at "
-              f"most. {'; '.join(theirs.MACHINES)}. Times of different machines are comparable in orders of magnitude only. "
+              f"{' and '.join(sorted({r['machine'] for r in runs.results()}))}, with a load of "
+              f"{max(r['load'] for r in runs.results()):.0f} at most. {'; '.join(theirs.MACHINES)}. Times of different machines are comparable in orders of magnitude only. "
               "The bunny has 69,666 faces (BP: 71,040); the dragon is BP's, with equal positions merged (`--weld`) so that it "
               "bounds a solid.")
     made = plots(runs, pathlib.Path(pictures))

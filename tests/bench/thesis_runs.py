@@ -1,11 +1,13 @@
-"""The runs of theses.py: each is a step whose result is kept as JSON, so that an interrupted script
-continues where it stopped."""
+"""The runs of theses.py: each is a step whose result is kept as JSON beside this script, with the machine
+and its load, so that an interrupted script continues where it stopped, also on another machine."""
 import json
 import os
+import pathlib
 import time
 
 import measured
 
+RESULTS = pathlib.Path(__file__).resolve().parent / "thesis_results"
 PERCENTS = (10, 20, 30, 40, 50)
 # EBP has no criterion for leaves: all are on the deepest level.
 EBP = ("--unlimited", "--leaf-faces", 0, "--points", 1)
@@ -28,7 +30,7 @@ SCENARIOS = (("lucy_lucy", "lucy_x256", "lucy_x256", 1), ("lucy_armadillo", "luc
 class Runs:
     def __init__(self, build, models, work):
         self.build, self.models, self.work = build, models, work
-        (work / "results").mkdir(parents=True, exist_ok=True)
+        work.mkdir(parents=True, exist_ok=True)
         self.ebpo, self.generate = build / "tools/ebpo", build / "samples/ebpo-generate"
 
     # --- files ---
@@ -42,18 +44,22 @@ class Runs:
         return self.work / f"{name}.ebpo.h5"
 
     def path_of(self, step):
-        return self.work / "results" / f"{step}.json"
+        return RESULTS / f"{step}.json"
 
     def result(self, step):
         """The result of a step; None if it was not run."""
         path = self.path_of(step)
         return json.loads(path.read_text()) if path.exists() else None
 
+    def results(self):
+        """The results of all steps that were run."""
+        return [found for step in STEPS if (found := self.result(step))]
+
     def run_step(self, step):
         begun = time.monotonic()
         out = STEPS[step][1](self)
         out["step_seconds"] = time.monotonic() - begun
-        out["load"] = os.getloadavg()[0]
+        out["load"], out["machine"] = os.getloadavg()[0], measured.machine()
         part = self.path_of(step).with_suffix(".part")
         part.write_text(json.dumps(out, indent=1))
         part.rename(self.path_of(step))
@@ -295,13 +301,10 @@ STEPS = {
     "dragon_sent": ("BP table 4.11", sent("dragon_solid")),
     "large_offset_40": ("EBP tables 2, 8, 12", large_selection("offset", 40)),
     "large_random_40": ("EBP tables 3, 9, 13", large_selection("random", 40)),
-} | {f"large_{select}_{percent}": (f"EBP tables 2 to 14, {percent} %",
-                                   large_selection(select, percent))
-     for percent in (10, 20, 30, 50) for select in ("kmedoids", "offset", "random")} | {
+} | {
     f"dragon_bp_{k}": (f"BP tables 3.5 and 3.6, K = {k} %", as_bp("dragon_solid", f"{k}%", "0-2"))
     for k in ("0.01", "0.05", "0.5", "5")}
 
 # Expected minutes of one core for steps that are often omitted.
 MINUTES = {"levels_uniform": 3, "lucy16_methods_40": 7, "bunny_bp_5": 10, "dragon_bp_0.5": 30, "dragon_bp_1": 30,
-           "dragon_bp_5": 30}
-LARGE_MINUTES = "11 to 16"
+           "dragon_bp_5": 30, **{f"large_{select}_40": 16 for select in ("kmedoids", "offset", "random")}}
