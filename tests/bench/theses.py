@@ -161,7 +161,8 @@ def write(runs, out, pictures):
     page.text("## Settings", "",
               f"Made by `tests/bench/theses.py BUILD_DIR MODELS_DIR WORK_DIR -o docs/measured/theses.md` on "
               f"{' and '.join(sorted({r['machine'] for r in runs.results()}))}, with a load of "
-              f"{max(r['load'] for r in runs.results()):.0f} at most. {'; '.join(theirs.MACHINES)}. Times of different machines are comparable in orders of magnitude only. "
+              f"{max(r['load'] for r in runs.results()):.0f} at most. {'; '.join(theirs.MACHINES)}. "
+              "Times of different machines are comparable in orders of magnitude only. "
               "The bunny has 69,666 faces (BP: 71,040); the dragon is BP's, with equal positions merged (`--weld`) so that it "
               "bounds a solid.")
     made = plots(runs, pathlib.Path(pictures))

@@ -31,6 +31,7 @@ class Runs:
     def __init__(self, build, models, work):
         self.build, self.models, self.work = build, models, work
         work.mkdir(parents=True, exist_ok=True)
+        RESULTS.mkdir(exist_ok=True)
         self.ebpo, self.generate = build / "tools/ebpo", build / "samples/ebpo-generate"
 
     # --- files ---
