@@ -63,7 +63,7 @@ static double gap_between(const ebpo_cap_node *n, const ebpo_cap_box *q, const d
     return distance * (1 - 0x1p-40) - n->radius * ENLARGE;
 }
 
-/* Bounds the sum of a node's half angles. *gap: lower bound of its distance, if above
+/* Bounds the sum of a node's half angles. *gap_out: lower bound of its distance, if above
  * DISTANCE_MIN. */
 static ebpo_bounded bound_node(const ebpo_cap_node *n, const ebpo_cap_box *q, double *gap_out)
 {
@@ -322,14 +322,23 @@ static void vary_by_edge(varying *v, uint64_t i, uint64_t j, double weight)
         v->sum = INFINITY;
 }
 
+/* Returns true if the distance of a node's ball from the box is greater than its radius and in the
+ * range that is used. *gap: lower bound of this distance. */
+static bool is_apart(const ebpo_cap_box *box, const ebpo_cap_node *n, double *gap)
+{
+    double x[3];
+    ebpo_vec3_subtract(n->centre, box->centre, x);
+    double distance = ebpo_vec3_length(x);
+    *gap = gap_between(n, box, x, distance);
+    return *gap > n->radius && *gap > DISTANCE_MIN && distance < DISTANCE_MAX;
+}
+
 /* Adds the variation by the path of a stretch. `at`: its node. Recursive, at most 32 deep. */
 static void vary_by_path(varying *v, uint64_t at)
 {
     const ebpo_cap_node *n = &v->tree->node[at];
-    double x[3];
-    ebpo_vec3_subtract(n->centre, v->box->centre, x);
-    double distance = ebpo_vec3_length(x), gap = gap_between(n, v->box, x, distance);
-    if (gap > n->radius && gap > DISTANCE_MIN && distance < DISTANCE_MAX) {
+    double gap;
+    if (is_apart(v->box, n, &gap)) {
         v->sum += n->length * v->box->radius / (gap * gap) / 2 * ENLARGE + TINY;
         return;
     }
@@ -350,10 +359,8 @@ static void vary_by_path(varying *v, uint64_t at)
 static void vary_by_loops(varying *v, uint64_t at)
 {
     const ebpo_cap_node *n = &v->tree->node[at];
-    double x[3];
-    ebpo_vec3_subtract(n->centre, v->box->centre, x);
-    double distance = ebpo_vec3_length(x), gap = gap_between(n, v->box, x, distance);
-    if (gap > n->radius && gap > DISTANCE_MIN && distance < DISTANCE_MAX) {
+    double gap;
+    if (is_apart(v->box, n, &gap)) {
         double s = v->box->radius, inverse = 1 / (gap * gap);
         v->sum += fmin(n->length / 2, n->area / gap) * inverse * s * ENLARGE + TINY;
     } else if (n->weight) {
