@@ -97,7 +97,9 @@ class OpenFile {
     }
     this.running = true;
     try {
-      await this.#refine();
+      do
+        await this.#refine();
+      while (this.again && !this.ended); // pump() was called between the end of #refine() and here
     } finally {
       this.running = false; // also after an error, so that the next view tries again
     }
