@@ -241,6 +241,29 @@ test('textures have names, uses, digests and bytes', async () => {
   none.dispose();
 });
 
+test('calls for drawing that wait for bytes together have their own results', { skip: !large }, async () => {
+  // Responses come in groups, so that several calls continue at the same time.
+  let waiting = [], timer;
+  const respond = () => {
+    timer = undefined;
+    waiting.splice(0).forEach((done) => done());
+  };
+  const source = { size: largeBytes.length, read: async (ranges) => {
+    await new Promise((done) => { waiting.push(done); timer ??= setTimeout(respond, 5); });
+    return ranges.map(({ offset, size }) => Uint8Array.from(largeBytes.subarray(offset, offset + size)));
+  } };
+  const calls = (view) => [() => view.levelBytes(), () => view.nodes([{ level: 0, part: -1 }]), () => view.nodes([{ level: 1, part: -1 }, { level: 2, part: -1 }]),
+    () => view.levelBytes(), () => view.nodes([{ level: 3, part: -1 }]), () => view.leafFaces([]), () => view.nodes([{ level: 2, part: -1 }])];
+  const alone = await openView(largeBytes), expected = [];
+  for (const call of calls(alone))
+    expected.push(await call());
+  const view = await openView(source), found = await Promise.all(calls(view).map((call) => call()));
+  assert.deepEqual(found, expected);
+  await view.sums;
+  alone.dispose();
+  view.dispose();
+});
+
 test('a view follows its observer, and stops at its limits', { skip: !large }, () => withServer(largeBytes, undefined, async ({ url }) => {
   const model = await open(url), { origin, size } = model.info, eye = origin.map((x, k) => x + 1.2 * size[k]), observer = { eye, direction: eye.map((x, k) => origin[k] + size[k] / 2 - x) };
   const view = model.view({ priority: 'pixels', observer, nodes: 200, polygons: true }), nodes = await view.next({ most: 100 });

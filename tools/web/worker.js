@@ -172,7 +172,7 @@ class OpenFile {
   }
 
   #later(work) {
-    work.then(() => this.ended || this.pump(), (error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
+    work.then(() => this.ended || this.pump()).catch((error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
   }
 
   async #loadNodes(missing) {

@@ -12,6 +12,32 @@ export const viewModule = () => loadModule(new URL('./ebpo-view.wasm', import.me
 /** Opens a file for drawing, as open() of the package does. `memory`: size of the cache of decoded data in bytes. */
 export const openView = (from, options = {}) => openWith(viewModule(), sourceOf(from, options, options.signal), options, View);
 
+function nodesOf(array) {
+  const facts = array(0, Float64Array), types = array(1, Uint16Array), out = [];
+  const counts = array(2, Uint8Array), planes = array(3, Uint32Array), leafCounts = array(4, Uint8Array), leafPlanes = array(5, Uint32Array), colours = array(6, Uint32Array);
+  const at = [0, 0, 0, 0, 0, 0], next = (values, k, n) => values.subarray(at[k], at[k] += n);
+  for (let i = 0; i < facts.length; i += 13) {
+    const [level, part, group, groups] = facts.subarray(i, i + 4), [c, p, lc, lp, cl] = facts.subarray(i + 8, i + 13);
+    out.push({ level, part, group, first: [...facts.subarray(i + 4, i + 8)], types: next(types, 0, groups), planeCounts: next(counts, 1, c), planes: next(planes, 2, p),
+      leafPlaneCounts: next(leafCounts, 3, lc), leafPlanes: next(leafPlanes, 4, lp), grayColours: cl ? next(colours, 5, cl) : undefined });
+  }
+  return out;
+}
+
+function patchesOf(array) {
+  const facts = array(0, Float64Array), out = [];
+  for (let i = 0; i < facts.length; i += 9) {
+    const [level, x, y, z, error, triangles, faces, child, end] = facts.subarray(i, i + 9);
+    out.push({ level, at: [x, y, z], error, triangles, faces, child, end });
+  }
+  return out;
+}
+
+function surfaceOf(array) {
+  const [triangles, faces] = array(0, Float64Array), hue = array(3, Uint8Array);
+  return { triangles, faces, position: array(1, Float32Array), normal: array(2, Int16Array), hue: hue.length ? hue : undefined, index: array(4, Uint32Array) };
+}
+
 /** A file opened for drawing. */
 export class View extends Model {
   #Corners; // class of arrays of coordinates
@@ -38,15 +64,29 @@ export class View extends Model {
     const early = this.#early;
     this.#early = undefined;
     for (const call of early)
-      await this.#read(...call); // compares the chunks
+      await this.#read({ ...call, read: () => {} }); // compares the chunks
   }
 
-  /** Evaluates a call with numbers as its first arguments, after the first `skipped` ones in rows, and returns its result arrays. */
-  async #read(name, numbers, columns, args, signal, skipped = 0) {
-    this.#early?.push([name, numbers, columns, args, signal, skipped]);
-    const { heap, object } = Model.parts(this), values = Float64Array.from(numbers);
-    await Model.repeat([this], () => heap.lend(values, (at) => heap.call(name, object, at, (values.length - skipped) / columns, ...args)), object, signal);
-    return (n, Type) => heap.result(object, n, Type);
+  /**
+   * Repeats call(heap, object) until no bytes are missing, and returns read(array) of its results; array(n, Type): result array n. The result arrays belong to all
+   * calls of this view, of which several may wait for bytes, so they are read before another call can run.
+   */
+  async #results(call, read, signal) {
+    const { heap, object } = Model.parts(this), array = (n, Type) => heap.result(object, n, Type);
+    let out;
+    await Model.repeat([this], () => {
+      const status = call(heap, object);
+      out = status ? undefined : read(array);
+      return status;
+    }, object, signal);
+    return out;
+  }
+
+  /** Returns read(array) of a call with numbers as its first arguments: rows of `columns` numbers after the first `skipped` ones. */
+  async #read({ name, numbers, columns = 1, skipped = 0, args = [], signal, read }) {
+    this.#early?.push({ name, numbers, columns, skipped, args, signal });
+    const values = Float64Array.from(numbers), count = (values.length - skipped) / columns;
+    return this.#results((heap, object) => heap.lend(values, (at) => heap.call(name, object, at, count, ...args)), read, signal);
   }
 
   /**
@@ -54,17 +94,8 @@ export class View extends Model {
    * of siblings; -1 is the whole level. Parts of the same subtree are adjacent, with ascending levels. Reads only the first
    * parts, with about `bytes` bytes of the file.
    */
-  async nodes(wanted, { bytes = Infinity, signal } = {}) {
-    const array = await this.#read('ebpo_js_nodes', wanted.flatMap(({ level, part }) => [level, part]), 2, [bytes], signal);
-    const facts = array(0, Float64Array), types = array(1, Uint16Array), out = [];
-    const counts = array(2, Uint8Array), planes = array(3, Uint32Array), leafCounts = array(4, Uint8Array), leafPlanes = array(5, Uint32Array), colours = array(6, Uint32Array);
-    const at = [0, 0, 0, 0, 0, 0], next = (values, k, n) => values.subarray(at[k], at[k] += n);
-    for (let i = 0; i < facts.length; i += 13) {
-      const [level, part, group, groups] = facts.subarray(i, i + 4), [c, p, lc, lp, cl] = facts.subarray(i + 8, i + 13);
-      out.push({ level, part, group, first: [...facts.subarray(i + 4, i + 8)], types: next(types, 0, groups), planeCounts: next(counts, 1, c), planes: next(planes, 2, p),
-        leafPlaneCounts: next(leafCounts, 3, lc), leafPlanes: next(leafPlanes, 4, lp), grayColours: cl ? next(colours, 5, cl) : undefined });
-    }
-    return out;
+  nodes(wanted, { bytes = Infinity, signal } = {}) {
+    return this.#read({ name: 'ebpo_js_nodes', numbers: wanted.flatMap(({ level, part }) => [level, part]), columns: 2, args: [bytes], signal, read: nodesOf });
   }
 
   /**
@@ -72,8 +103,12 @@ export class View extends Model {
    * their level, and `subtree` is -1 above the subtrees. Returns for each leaf the faces' numbers, corners (9 numbers each)
    * and colours (9 bytes each; undefined: none).
    */
-  async leafFaces(leaves, { signal } = {}) {
-    const array = await this.#read('ebpo_js_leaf_faces', leaves.flatMap(({ level, group, octant, subtree }) => [level, group, octant, subtree]), 4, [], signal);
+  leafFaces(leaves, { signal } = {}) {
+    const numbers = leaves.flatMap(({ level, group, octant, subtree }) => [level, group, octant, subtree]);
+    return this.#read({ name: 'ebpo_js_leaf_faces', numbers, columns: 4, signal, read: (array) => this.#facesOf(array) });
+  }
+
+  #facesOf(array) {
     const counts = array(0, Uint32Array), numbers = array(1, Uint32Array), corners = array(2, this.#Corners), colours = array(3, Uint8Array);
     let at = 0;
     return Array.from(counts, (count) => {
@@ -83,30 +118,21 @@ export class View extends Model {
   }
 
   /** Returns the table of patches of the part `surface`: [{ level, at, error, triangles, faces, child, end }]. */
-  async patches({ signal } = {}) {
-    const array = await this.#read('ebpo_js_patches', [], 1, [], signal), facts = array(0, Float64Array), out = [];
-    for (let i = 0; i < facts.length; i += 9) {
-      const [level, x, y, z, error, triangles, faces, child, end] = facts.subarray(i, i + 9);
-      out.push({ level, at: [x, y, z], error, triangles, faces, child, end });
-    }
-    return out;
+  patches({ signal } = {}) {
+    return this.#read({ name: 'ebpo_js_patches', numbers: [], signal, read: patchesOf });
   }
 
   /**
    * Reads patches as one mesh without cracks: `wanted` is [{ patch, faces }], with ascending indices in the table. With `faces`, the model's faces replace the
    * patch. Positions are (coordinate - center) * scale; normals are octahedral.
    */
-  async surface(wanted, { center, scale, signal }) {
-    const numbers = [...center, scale, ...wanted.flatMap(({ patch, faces }) => [patch, +faces])];
-    const array = await this.#read('ebpo_js_surface', numbers, 2, [], signal, 4);
-    const [triangles, faces] = array(0, Float64Array), hue = array(3, Uint8Array);
-    return { triangles, faces, position: array(1, Float32Array), normal: array(2, Int16Array), hue: hue.length ? hue : undefined, index: array(4, Uint32Array) };
+  surface(wanted, { center, scale, signal }) {
+    const place = [...center, scale], numbers = [...place, ...wanted.flatMap(({ patch, faces }) => [patch, +faces])];
+    return this.#read({ name: 'ebpo_js_surface', numbers, columns: 2, skipped: place.length, signal, read: surfaceOf });
   }
 
   /** Returns the number of bytes of the file for levels 0 to i. */
-  async levelBytes({ signal } = {}) {
-    const { heap, object } = Model.parts(this);
-    await Model.repeat([this], () => heap.call('ebpo_js_level_bytes', object), object, signal);
-    return heap.result(object, 0, Float64Array);
+  levelBytes({ signal } = {}) {
+    return this.#results((heap, object) => heap.call('ebpo_js_level_bytes', object), (array) => array(0, Float64Array), signal);
   }
 }
