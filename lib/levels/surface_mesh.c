@@ -1,10 +1,12 @@
 /* Joins patches of the simplified surface to one mesh without cracks.
  *
- * On the borders of the patches of a level there is one vertex for each cell, EBPO_PATCH_CELLS
- * levels below the patches' nodes. Patches are joined from coarse to fine: a vertex on the border
- * of a finer patch is replaced by the vertex of the coarsest cell that contains it and has a
- * vertex. Both sides of a border then have the same vertices, as each vertex of the model on the
- * border is in a cell with a vertex. Vertices of the model's faces are replaced in the same way.
+ * The border of a patch passes through cells that are EBPO_PATCH_CELLS levels below the patch's
+ * node: its border cells. All vertices of a level's patches in one border cell are one vertex.
+ * Patches are joined from coarse to fine: a vertex on the border of a finer patch is replaced by
+ * the vertex of the coarsest border cell that contains it and has a vertex. Then both sides of a
+ * border have the same vertices, because each vertex of the model on the border is in a border
+ * cell, whose only vertex both sides use. Vertices of the model's faces are replaced in the same
+ * way.
  * Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
@@ -63,8 +65,8 @@ static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return to;
 }
 
-/* Returns the vertex of the coarsest border cell of levels below `levels` that contains the point
- * and has a vertex, or NONE. */
+/* Searches the border cells that contain the point, on levels 0 to `levels` - 1, from coarse to
+ * fine. Returns the vertex of the first cell that has a vertex, or NONE. */
 static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
 {
     for (int level = 0; level < levels; level++) {

@@ -71,7 +71,8 @@ static bool number_points(ebpo_cut_mesh *cut, ebpo_face_pieces *pieces, uint32_t
 {
     for (uint32_t i = 0; i < pieces->points; i++) {
         ebpo_exact_point *p = &pieces->point[i];
-        bool exact = p->exact; /* adding the point exchanges its contents */
+        /* read before ebpo_point_set_add, which may exchange *p for an unused point */
+        bool exact = p->exact;
         if (exact ? !ebpo_corner_id(&cut->faces->corners, p->at, &number[i])
                   : !ebpo_point_set_add(&cut->set, p, &number[i]))
             return false;
@@ -115,7 +116,7 @@ static bool merge_pieces(ebpo_cut_mesh *cut, uint32_t face, ebpo_face_pieces *pi
 
 /* --- all faces --- */
 
-/* Adds the faces from `begin` on whose pieces are ready: up to face `end`. */
+/* Adds the faces [begin, end). The pieces of the faces that were cut are in c->pieces. */
 static bool merge_faces(cutting *c, uint32_t begin, uint32_t end)
 {
     uint64_t at = 0;

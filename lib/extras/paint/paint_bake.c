@@ -165,8 +165,8 @@ static ebpo_status check_point(ebpo_reach_search *reach, const ebpo_paint_point 
                : ebpo_fail_file(
                      error, EBPO_E_FORMAT, reach->context->model->file->in.shown,
                      "a point of %s %llu is not on its face %lu: the paint was made on another "
-                     "model; give that model, or remove the %s with a command without a model",
-                     what, (unsigned long long)number, (unsigned long)q->face, what);
+                     "model; give that model, or remove the %s: ebpo paint PAINT --remove-%s N",
+                     what, (unsigned long long)number, (unsigned long)q->face, what, what);
 }
 
 ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,

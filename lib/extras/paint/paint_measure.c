@@ -113,10 +113,10 @@ static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 /* --- balls that intersect a part --- */
 
 /* Copies the balls of a layer that matter for a triangle. The balls [from, end) are ordered from
- * the newest stroke to the oldest. Copies to position `to` the balls that intersect the triangle,
- * up to the newest stroke with a ball that contains the triangle; of this stroke copies only that
- * ball. Returns the number of copied balls. *sure is true if no ball intersects the triangle, or if
- * the newest stroke that intersects it has a ball that contains it. */
+ * the newest stroke to the oldest. Copies the balls that intersect the triangle to position `to`.
+ * Stops at the first ball that contains the triangle; keeps only this ball of its stroke. Returns
+ * the number of copied balls. *sure is true if no ball intersects the triangle, or if the newest
+ * stroke that intersects it has a ball that contains it. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
@@ -207,8 +207,8 @@ static layer_result evaluate_layer(const area_cut *c, const triangle *t, const d
             first = false;
         }
     }
-    /* if the oldest one of these strokes covers the whole triangle, only erasing leaves points
-     * unpainted */
+    /* if the oldest of these balls contains the whole triangle, a point can be unpainted only if
+     * a stroke erases it */
     if (end > from && area_cut_holds(&c->ball[end - 1], t)) {
         v.unpainted = false;
         for (uint64_t i = from; i < end; i++)
@@ -330,7 +330,8 @@ static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count
 
 /* --- the model --- */
 
-/* Greatest numbers of work items, and of sums of all items; greatest fineness. */
+/* Limits. PIECES_MAX: work items. SUMS_MAX: sums over all items and keys. FINENESS_MAX: value of
+ * the option `fineness`. */
 enum { PIECES_MAX = 64, SUMS_MAX = 1 << 22, FINENESS_MAX = 1 << 16 };
 
 /* A pair of a point and a face in its reach. */

@@ -71,7 +71,7 @@ typedef struct ebpo_lod_node {
     /* EBPO_GRAY (only on the requested level), EBPO_LEAF or EBPO_BLACK. */
     ebpo_node_type type;
 
-    /* Counts of the polyhedron; polygons omitted by `cell_faces` are not counted. */
+    /* Counts of the polyhedron; without `cell_faces`, polygons on cell faces are not counted. */
     uint32_t vertex_count, polygon_count;
 
     /*
@@ -179,7 +179,10 @@ typedef struct ebpo_surface_mesh {
      */
     double pixels;
 
-    /* Number of patches, and of faces of the model that replace other patches. */
+    /*
+     * Number of patches in the mesh, and number of the model's own faces in the mesh. Faces replace
+     * the finest patches if the option `faces` of ebpo_view_stream_surface is true.
+     */
     uint64_t patches, faces;
 } ebpo_surface_mesh;
 

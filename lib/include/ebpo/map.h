@@ -33,7 +33,8 @@ typedef struct ebpo_map_options {
     double max_distance;
 
     /*
-     * True: distances have no signs. Distances from surfaces have signs with EBPO_PART_BORDER only.
+     * True: distances have no signs. False: distances from a solid have signs; distances from a
+     * surface have signs if the file has the part EBPO_PART_BORDER.
      */
     bool unsigned_distance;
 
@@ -96,8 +97,9 @@ typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t fi
                                    uint64_t layers, ebpo_error *error);
 
 /*
- * Computes the distances at a lattice's points and passes them to `take` by layers. Memory: a few
- * layers, 8 bytes per point; about 64 MiB in total, or one layer if that is more.
+ * Computes the distances at a lattice's points and passes them to `take` by layers. Memory: 8
+ * bytes per point of the layers that are computed together, which are about 64 MiB, or one layer if
+ * a layer is larger.
  *
  * EBPO_E_ARGUMENT: also if a point of the lattice is not finite, or if there are too many points.
  * Other errors are those of ebpo_map_points.
@@ -283,7 +285,7 @@ typedef enum ebpo_map_format {
      */
     EBPO_MAP_VTKHDF = 0,
 
-    /* NRRD 4, uncompressed in the same file. */
+    /* NRRD 4: one file with the header and the uncompressed values. */
     EBPO_MAP_NRRD = 1
 } ebpo_map_format;
 
