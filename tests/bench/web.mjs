@@ -2,16 +2,16 @@
 //   node web.mjs PACKAGE MODEL MODULES NATIVE_TIMES [--large MODEL] [--rounds N] [-o PAGE]
 // PACKAGE: folder made by tools/npm/build.sh; MODEL: an .ebpo.h5 file of a solid; MODULES: a folder with node_modules of
 // three and three-mesh-bvh; NATIVE_TIMES: native_times (tests/bench); --large: a file of 25 million faces or more.
-// Times until the first result are wall-clock times, medians of N (default 5); those with loading of the module are in N new
-// processes. Times per query are medians of N rounds with
-// other inputs, after one more round: of processor time, so that other programs disturb less.
+// Times until the first result are wall-clock times, medians of N (default 5); those with loading of the modules are in new
+// processes. three-mesh-bvh reads the same mesh from a binary PLY file, by PLYLoader of three. Times per query are medians of N
+// rounds with other inputs, after one more round: of processor time, so that other programs disturb less.
 import { execFileSync, fork } from 'node:child_process';
 import { createServer } from 'node:http';
 import { fstatSync, openAsBlob, openSync, readFileSync, readSync, writeFileSync, mkdtempSync, rmSync } from 'node:fs';
 import { availableParallelism, cpus, loadavg, tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
-import { gzipSync } from 'node:zlib';
+import { brotliCompressSync, gzipSync } from 'node:zlib';
 
 const COUNT = 20000, NEAR = 2000, COLD = 20;
 
@@ -19,10 +19,11 @@ const COUNT = 20000, NEAR = 2000, COLD = 20;
 function serveFile(file) {
   const descriptor = openSync(file), { size } = fstatSync(descriptor);
   const server = createServer((request, response) => {
-    const [, first, last] = /bytes=(\d+)-(\d+)/.exec(request.headers.range), end = Math.min(+last, size - 1), bytes = Buffer.alloc(end - first + 1);
+    const [, first, last] = /bytes=(\d+)-(\d+)/.exec(request.headers.range) ?? [0, 0, size - 1], end = Math.min(+last, size - 1), bytes = Buffer.alloc(end - first + 1);
     readSync(descriptor, bytes, 0, bytes.length, +first);
-    response.writeHead(206, { 'content-range': `bytes ${first}-${end}/${size}`, 'content-length': bytes.length, etag: '"1"' }).end(bytes);
+    response.writeHead(request.headers.range ? 206 : 200, { 'content-range': `bytes ${first}-${end}/${size}`, 'content-length': bytes.length, etag: '"1"' }).end(bytes);
   });
+  process.on('disconnect', () => process.exit()); // the main process has ended, perhaps by an error
   server.listen(0, '127.0.0.1', () => process.send(`http://127.0.0.1:${server.address().port}/model.ebpo.h5`));
 }
 
@@ -35,6 +36,7 @@ async function startServer(file) {
 const FIRST = {
   url: 'URL, a distance', cold: 'URL, a distance, with loading of the module', file: 'File, a distance', levels: 'URL, polygons of levels 0 to 4',
   whole: 'all of the file in memory, a distance', built: 'three-mesh-bvh: tree of the mesh in memory',
+  peer: 'three-mesh-bvh: URL of a binary PLY, a nearest point, with loading of the modules',
 };
 const median = (x) => [...x].sort((a, b) => a - b)[x.length >> 1];
 const now = () => performance.now();
@@ -71,11 +73,6 @@ async function measure(inputs, count, run) {
   return median(times.slice(1)) / count;
 }
 
-const each = (count, columns, values, run) => {
-  for (let i = 0; i < count; i++)
-    run(values.subarray(columns * i, columns * i + columns));
-};
-
 /** Returns the median time of opening and a first result, each time with a new source. */
 async function timeFirst(rounds, open, use) {
   const times = [];
@@ -88,11 +85,11 @@ async function timeFirst(rounds, open, use) {
   return median(times);
 }
 
-/** Returns the median time until the first distance in new processes, which load the module. */
-async function timeNew(rounds, folder, url) {
+/** Returns the median time until the first distance in new processes, which load the module. `what`: --first or --first-peer. */
+async function timeNew(rounds, what, folder, url) {
   const times = [];
   for (let i = 0; i < rounds; i++) {
-    const child = fork(fileURLToPath(import.meta.url), ['--first', folder, url]);
+    const child = fork(fileURLToPath(import.meta.url), [what, folder, url]);
     times.push(await new Promise((done, fail) => child.once('message', done).once('exit', () => fail(new Error('the new process failed')))));
   }
   return median(times);
@@ -102,6 +99,43 @@ async function timeNew(rounds, folder, url) {
 async function reportFirst(folder, url) {
   const { open } = await import(pathToFileURL(resolve(folder, 'index.js'))), time = await timeFirst(1, () => open(url), (model) => model.distance(middle(model)));
   process.send(time, () => process.exit());
+}
+
+/** Reports the time of three-mesh-bvh until a nearest point of a PLY file in this process. */
+async function reportPeer(modules, url) {
+  const began = now(), load = (path) => import(pathToFileURL(resolve(modules, 'node_modules', path)));
+  const [bytes, THREE, { PLYLoader }, { MeshBVH }] = await Promise.all([fetch(url).then((response) => response.arrayBuffer()), load('three/build/three.module.js'),
+    load('three/examples/jsm/loaders/PLYLoader.js'), load('three-mesh-bvh/src/index.js')]);
+  const geometry = new PLYLoader().parse(bytes);
+  new MeshBVH(geometry).closestPointToPoint(new THREE.Vector3(0, 0, 0), {});
+  process.send(now() - began, () => process.exit());
+}
+
+/** Writes a mesh as binary PLY. */
+function writePly(path, { vertices, faces }) {
+  const header = Buffer.from(`ply\nformat binary_little_endian 1.0\nelement vertex ${vertices.length / 3}\nproperty float x\nproperty float y\nproperty float z\n` +
+    `element face ${faces.length / 3}\nproperty list uchar int vertex_indices\nend_header\n`);
+  const positions = Buffer.from(Float32Array.from(vertices).buffer), rows = Buffer.alloc(13 * faces.length / 3);
+  for (let i = 0; i < faces.length; i += 3) {
+    const at = 13 * i / 3;
+    rows[at] = 3;
+    for (let k = 0; k < 3; k++)
+      rows.writeUInt32LE(faces[i + k], at + 1 + 4 * k);
+  }
+  writeFileSync(path, Buffer.concat([header, positions, rows]));
+}
+
+/** Returns the median time of three-mesh-bvh from the URL of a PLY file of the mesh to a nearest point, in new processes. */
+async function timePeer(rounds, modules, mesh) {
+  const work = mkdtempSync(join(tmpdir(), 'ebpo-web-')), file = join(work, 'mesh.ply');
+  writePly(file, mesh);
+  const server = await startServer(file);
+  try {
+    return await timeNew(rounds, '--first-peer', modules, server.url);
+  } finally {
+    server.close();
+    rmSync(work, { recursive: true });
+  }
 }
 
 async function readLevels(model) {
@@ -160,8 +194,11 @@ function nativeTimes(program, file, inputs) {
   }
 }
 
+const item = (values, columns, i) => values.subarray(columns * i, columns * i + columns);
+
 /** Evaluates all queries with the package and with three-mesh-bvh. Batches and single queries have different inputs, because
- * the first query in a leaf prepares it. */
+ * the first query in a leaf prepares it. Each query has its own loop, which the compiler optimizes for this query alone, as
+ * in a program that makes one kind of query. */
 async function measureQueries(model, bvh, THREE, inputs, others) {
   const ray = new THREE.Ray(), target = {}, at = new THREE.Vector3();
   const many = {
@@ -170,35 +207,53 @@ async function measureQueries(model, bvh, THREE, inputs, others) {
     inside: await measure(inputs, COUNT, ({ points }) => model.insideSync(points)),
   };
   const one = {
-    'first hit': await measure(others, COUNT, ({ rays }) => each(COUNT, 6, rays, (x) => model.raysSync(x))),
-    nearest: await measure(others, COUNT, ({ points }) => each(COUNT, 3, points, (x) => model.distanceSync(x, { unsigned: true }))),
-    inside: await measure(others, COUNT, ({ points }) => each(COUNT, 3, points, (x) => model.insideSync(x))),
+    'first hit': await measure(others, COUNT, ({ rays }) => {
+      for (let i = 0; i < COUNT; i++)
+        model.raysSync(item(rays, 6, i));
+    }),
+    nearest: await measure(others, COUNT, ({ points }) => {
+      for (let i = 0; i < COUNT; i++)
+        model.distanceSync(item(points, 3, i), { unsigned: true });
+    }),
+    inside: await measure(others, COUNT, ({ points }) => {
+      for (let i = 0; i < COUNT; i++)
+        model.insideSync(item(points, 3, i));
+    }),
   };
   const theirs = {
-    'first hit': await measure(inputs, COUNT, ({ rays }) => each(COUNT, 6, rays, (x) => {
-      ray.origin.fromArray(x);
-      ray.direction.fromArray(x, 3).normalize();
-      bvh.raycastFirst(ray, THREE.DoubleSide);
-    })),
-    nearest: await measure(inputs, NEAR, ({ points }) => each(NEAR, 3, points, (x) => bvh.closestPointToPoint(at.fromArray(x), target))),
-    inside: await measure(inputs, NEAR, ({ points }) => each(NEAR, 3, points, (x) => { // by parity
-      ray.origin.fromArray(x);
-      ray.direction.set(0.371, 0.557, 0.743);
-      new Set(bvh.raycast(ray, THREE.DoubleSide).map((hit) => hit.distance)).size % 2;
-    })),
+    'first hit': await measure(inputs, COUNT, ({ rays }) => {
+      for (let i = 0; i < COUNT; i++) {
+        ray.origin.fromArray(rays, 6 * i);
+        ray.direction.fromArray(rays, 6 * i + 3).normalize();
+        bvh.raycastFirst(ray, THREE.DoubleSide);
+      }
+    }),
+    nearest: await measure(inputs, NEAR, ({ points }) => {
+      for (let i = 0; i < NEAR; i++)
+        bvh.closestPointToPoint(at.fromArray(points, 3 * i), target);
+    }),
+    inside: await measure(inputs, NEAR, ({ points }) => { // by parity
+      for (let i = 0; i < NEAR; i++) {
+        ray.origin.fromArray(points, 3 * i);
+        ray.direction.set(0.371, 0.557, 0.743);
+        new Set(bvh.raycast(ray, THREE.DoubleSide).map((hit) => hit.distance)).size % 2;
+      }
+    }),
   };
   return { many, one, theirs };
 }
 
+const packedSizes = (bytes) => ({ brotli: brotliCompressSync(bytes).length, gzip: gzipSync(bytes, { level: 9 }).length }); // best quality
+
 const short = (x) => x >= 1000 ? Math.round(x).toLocaleString('en') : String(+x.toPrecision(3));
 
 /** Returns the page. */
-function makePage({ info, counts, first, queries: { many, one, theirs }, native, memory, gzip, args }) {
+function makePage({ info, counts, first, queries: { many, one, theirs }, native, memory, packed, args }) {
   const goals = [], add = (what, goal, value, met) => goals.push({ what, goal, value, met });
   const ratio = (what, goal, value) => add(what, `at least ${goal}`, short(value), value >= goal);
   const most = (what, goal, value) => add(what, `at most ${short(goal)}`, short(value), value <= goal);
   ratio('first distance: tree of three-mesh-bvh / URL', 20, first.built / first.url);
-  ratio('first distance: tree of three-mesh-bvh / URL, with loading of the module', 20, first.built / first.cold);
+  ratio('first distance by URL, with loading of the modules: three-mesh-bvh (PLY, tree) / ours', 20, first.peer / first.cold);
   ratio('first distance: tree of three-mesh-bvh / file', 20, first.built / first.file);
   for (const [name, goal] of [['first hit', 1.3], ['nearest', 5], ['inside', 10]])
     ratio(`${name}: three-mesh-bvh / one query a call`, goal, theirs[name] / one[name]);
@@ -208,12 +263,12 @@ function makePage({ info, counts, first, queries: { many, one, theirs }, native,
   most('cold distance near the surface: bytes', 350000, counts.near[2]);
   if (memory)
     most(`memory.buffer, ${short(memory.faces)} faces by URL, MiB`, 512, memory.heap / 2 ** 20);
-  most('ebpo.wasm with gzip, bytes', 400000, gzip);
+  most('ebpo.wasm with brotli, bytes', 400000, packed.brotli);
   const missed = goals.filter((x) => !x.met), row = (...x) => `| ${x.join(' | ')} |\n`;
   return `# The npm package
 
-- On ${short(info.faces)} faces, the first distance by URL takes ${short(first.url)} ms; three-mesh-bvh first builds
-  its tree in ${short(first.built)} ms.
+- On ${short(info.faces)} faces, a new process has the first distance by URL after ${short(first.cold)} ms, with three-mesh-bvh
+  (PLY file, tree) after ${short(first.peer)} ms; later files take ${short(first.url)} ms.
 - One query a call takes ${Object.keys(one).map((name) => `${short(one[name])} us (${name})`).join(', ')}; three-mesh-bvh takes
   ${Object.keys(one).map((name) => short(theirs[name])).join(', ')} us.
 - ${missed.length ? `Missed goals: ${missed.length} of ${goals.length}.` : `All ${goals.length} goals are met.`}
@@ -228,7 +283,7 @@ ${[...missed, ...goals.filter((x) => x.met)].map((x) => row(x.what, x.goal, x.va
 
 node ${process.version}, ${cpus()[0].model.trim()}, ${availableParallelism()} cores, load average ${loadavg()[0].toFixed(1)}.
 Model: \`ebpo-generate --base igea.ply --subdivide 2 igea4.ply\`${memory ? '; large model: that of [remote files](remote.md)' : ''}.
-Server and client are on this machine; real round trips take longer.
+Server and client are on this machine; real round trips take longer. With gzip, ebpo.wasm has ${short(packed.gzip)} bytes.
 
 ${row('until the first result', 'ms')}|---|---|
 ${Object.entries(FIRST).map(([name, what]) => row(what, short(first[name]))).join('')}
@@ -243,7 +298,7 @@ async function main() {
   const rounds = +option('--rounds', 5), large = option('--large'), page = option('-o');
   const { open } = await import(pathToFileURL(resolve(folder, 'index.js'))), load = (path) => import(pathToFileURL(resolve(modules, 'node_modules', path)));
   const server = await startServer(file), distance = (model) => model.distance(middle(model)), fromUrl = () => open(server.url), first = {};
-  first.cold = await timeNew(rounds, folder, server.url);
+  first.cold = await timeNew(rounds, '--first', folder, server.url);
   first.url = await timeFirst(rounds, fromUrl, distance);
   first.file = await timeFirst(rounds, async () => open(await openAsBlob(file)), distance);
   first.levels = await timeFirst(rounds, fromUrl, readLevels);
@@ -263,10 +318,11 @@ async function main() {
   geometry.setIndex(new THREE.BufferAttribute(mesh.faces.slice(), 1));
   const bvh = new MeshBVH(geometry);
   first.built = now() - building;
+  first.peer = await timePeer(Math.min(rounds, 5), modules, mesh);
   const queries = await measureQueries(model, bvh, THREE, inputs, others), native = nativeTimes(program, file, inputs);
   model.dispose();
   server.close();
-  const text = makePage({ info, counts, first, queries, native, memory, gzip: gzipSync(readFileSync(join(folder, 'ebpo.wasm')), { level: 9 }).length,
+  const text = makePage({ info, counts, first, queries, native, memory, packed: packedSizes(readFileSync(join(folder, 'ebpo.wasm'))),
     args: `PACKAGE igea4.ebpo.h5 MODULES NATIVE_TIMES${large ? ' --large lucy28.ebpo.h5' : ''}${page ? ' -o docs/measured/web.md' : ''}` });
   if (page)
     writeFileSync(page, text);
@@ -274,4 +330,5 @@ async function main() {
     console.log(text);
 }
 
-await (process.argv[2] === '--serve' ? serveFile(process.argv[3]) : process.argv[2] === '--first' ? reportFirst(...process.argv.slice(3)) : main());
+const PARTS = { '--serve': serveFile, '--first': reportFirst, '--first-peer': reportPeer }; // in other processes
+await (PARTS[process.argv[2]] ? PARTS[process.argv[2]](...process.argv.slice(3)) : main());
