@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""query_threads.py EBPO EBPO-GENERATE [few]: checks that every query gives the same bytes on 1 to 8 threads, with
+"""query_threads.py EBPO EBPO-GENERATE [SHARE]: checks that every query gives the same bytes on 1 to 8 threads, with
 the whole model in memory, with parts of it, and with the default. No command waits for ever. The results for a
-block or a row are longer than the buffers. `few`: only 8 threads, and a quarter of the rows.
+block or a row are longer than the buffers. SHARE: only 8 threads, and one of SHARE rows.
 """
 import os
 import random
@@ -100,12 +100,12 @@ def compare(ebpo, model, query, path, threads):
 
 def main():
     ebpo, generate = (os.path.abspath(path) for path in sys.argv[1:3])
-    few = "few" in sys.argv[3:]
-    threads = (8,) if few else range(1, 9)
+    share = int(sys.argv[3]) if sys.argv[3:] else 1
+    threads = (8,) if share > 1 else range(1, 9)
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        make_inputs(ebpo, generate, 4 if few else 1)
+        make_inputs(ebpo, generate, share)
         for model in MEMORY:
             for query, path in QUERIES + (LISTS if model != CATALOGUE else []):
                 wrong += compare(ebpo, model, query, path, threads)
