@@ -1,6 +1,7 @@
-/* Reads, checks and encodes the border of a surface: closed loops of points with weights. The
- * points are stored like the vertices of the mesh, but not as indices of vertices: subsets number
- * vertices anew, and a reader needs all loops at once. Source: format-spec/border.md. */
+/* Reads, checks and encodes the border of a surface: closed loops of points with weights. The file
+ * stores the coordinates of the points, coded like the vertices of the mesh, and not the indices of
+ * vertices, because subsets number vertices anew, and because a reader needs all loops at once.
+ * Source: format-spec/border.md. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 #include "format/reader.h"
 #include "hdf5_read/coding.h"
 
-/* Coordinates of a chunk. */
+/* Maximum number of coordinates of a chunk. */
 enum { CHUNK_FLOATS = EBPO_CHUNK_BYTES_MAX / sizeof(float) };
 
 void ebpo_border_loops_free(ebpo_border_loops *loops)
@@ -22,13 +23,15 @@ void ebpo_border_loops_free(ebpo_border_loops *loops)
     *loops = (ebpo_border_loops){ 0, 0, NULL, NULL };
 }
 
+/* Returns the text of the first error in the loops, or NULL. */
 static const char *find_fault(const ebpo_info *info, const ebpo_border_loops *loops)
 {
     uint64_t points = 0, longest = 0;
     for (uint64_t i = 0; i < loops->loop_count; i++) {
         uint64_t count = loops->loop[2 * i];
         if (count < 3 || count > loops->point_count - points || loops->loop[2 * i + 1] == 0)
-            return "a loop has fewer than three points, or the weight 0";
+            return "a loop has fewer than three points, more points than the header states, or the "
+                   "weight 0";
         points += count;
         longest = count > longest ? count : longest;
     }
@@ -88,7 +91,7 @@ ebpo_status ebpo_border_read(const ebpo_file *file, ebpo_border_loops *out, ebpo
     ebpo_check check = ebpo_reader_check(file, NULL);
     ebpo_hints hints = EBPO_HINTS_INIT(file);
     read.threads = 1;
-    if (info->subtree_level) { /* what queries need first, in one range of the file */
+    if (info->subtree_level) { /* also prefetches the data that queries need first */
         ebpo_hint_top(file);
     } else {
         ebpo_hint_root(&hints, EBPO_NEEDS_BORDER);
@@ -97,7 +100,7 @@ ebpo_status ebpo_border_read(const ebpo_file *file, ebpo_border_loops *out, ebpo
     *out =
         (ebpo_border_loops){ .loop_count = info->border_loops, .point_count = info->border_points };
     ebpo_status status = EBPO_OK;
-    if (out->loop_count) { /* an array of no rows is not in the file */
+    if (out->loop_count) { /* the file omits arrays without rows */
         out->loop = ebpo_alloc(out->loop_count, 2 * sizeof *out->loop);
         out->point = ebpo_alloc(out->point_count, 3 * sizeof *out->point);
         status = out->loop && out->point

@@ -1,4 +1,5 @@
-/* Reads and checks the part `border` of a file: closed loops. */
+/* Reads and checks the part `border` of a file: the border of a surface as closed loops of points.
+ */
 #ifndef EBPO_FORMAT_BORDER_LOOPS_H
 #define EBPO_FORMAT_BORDER_LOOPS_H
 

@@ -1,9 +1,9 @@
-/* Manages the chunk directory: the offset, the stored size and the checksum of every chunk of an
- * open file. Offsets are read from the file's list of all chunks (/subtrees/chunk_directory), or
- * from HDF5's index of each array. The list and the indexes may be long or remote. They are
- * therefore read only when needed, and only once, under the file's lock. The checksums
- * (/chunk_checksums) detect an intact chunk that belongs to another position or another version of
- * the file. Each of the two lists is a single chunk, however long, so they have a separate encoder
+/* Finds the offset, the stored size and the checksum of every chunk of an open file. Offsets and
+ * sizes are read from the file's list of all chunks, /subtrees/chunk_directory, or, in a file
+ * without this list, from HDF5's chunk index of each array. The list and the indexes may be long or
+ * remote, so they are read only when needed, and only once, under the file's lock. The checksums in
+ * the list /chunk_checksums detect an intact chunk that belongs to another position or another
+ * version of the file. Both lists are single chunks, however long, so they have a separate encoder
  * and decoder. The sum of stored sizes is checked against the size of the file before chunks are
  * decoded. Source: format-spec/subtrees.md and checksums.md. */
 #include <stdio.h>
@@ -16,7 +16,13 @@
 #include "format/file_in.h"
 #include "mesh/attributes.h"
 
-enum { LEVEL_NUMBERS = 64, MESH_NUMBERS = 4096, TABLE_NUMBERS = 4112, ATTRIBUTE_NUMBERS = 8191 };
+/* Numbers of arrays in both lists (format-spec/subtrees.md, section 3). */
+enum {
+    LEVEL_NUMBERS = 64,      /* numbers for each level */
+    MESH_NUMBERS = 4096,     /* first number of the root's arrays */
+    TABLE_NUMBERS = 4112,    /* first number of the tables of subtrees */
+    ATTRIBUTE_NUMBERS = 8191 /* number of the header of attributes; attribute arrays follow */
+};
 _Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 &&
                    EBPO_A_LEAF_INDEX == 12 && EBPO_A_LEAF_PLANES == 14 &&
                    EBPO_A_GRAY_COLOURS == 15 && EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
@@ -34,8 +40,8 @@ uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
                                        : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
 }
 
-/* Returns the array of a number in a list, or EBPO_ARRAYS for an unknown number. *level: level, or
- * number of the attribute array. */
+/* Returns the array with this number in a list, or EBPO_ARRAYS for an unknown number. *level: level
+ * of the array; of an attribute array, its number in /attributes. */
 static ebpo_array_id find_array(uint32_t number, int *level)
 {
     *level = 0;
@@ -59,8 +65,8 @@ static ebpo_array_id find_array(uint32_t number, int *level)
  * decoded. */
 static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
 
-/* Returns true if the pipeline shuffles the elements. This file shuffles lists itself, as the
- * coder's scratch memory is too small for a long list. */
+/* Returns true if the pipeline shuffles the elements. The functions below shuffle lists themselves,
+ * as the coder's scratch memory is too small for a long list. */
 static bool is_shuffled(ebpo_pipeline pipeline)
 {
     return ebpo_pipeline_facts_of(pipeline)->compresses;
@@ -162,7 +168,7 @@ ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, 
 /* --- stored sizes --- */
 
 /* Returns the stored bytes of a level. If `located` is false, counts only arrays with a single
- * chunk, as the sizes of the others are not known yet. */
+ * chunk, as the sizes of other arrays are not known yet. */
 static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
 {
     uint64_t bytes = 0;
@@ -179,7 +185,7 @@ uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
     return level_bytes(file, level, atomic_load(&file->located));
 }
 
-/* Returns the sizes of the arrays whose chunks are known. */
+/* Returns the sizes of the arrays whose chunks are located. */
 static ebpo_stored_sizes reader_sizes(const ebpo_file *file)
 {
     ebpo_stored_sizes sizes = { .map_bytes = 0 };
@@ -203,7 +209,7 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
     if (stored > file->end)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, file->in.shown,
-            "the arrays' chunks take more space than the file has; get a fresh copy of the file");
+            "the arrays' chunks have more bytes than the file; get a fresh copy of the file");
     return EBPO_OK;
 }
 
@@ -229,12 +235,13 @@ ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, eb
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, file->in.shown,
         "the decoded arrays take %.0f MB, %.0f times the size of the file (limit: %llu times); the "
-        "file may be designed to exhaust memory; if you trust it, use --max-expansion %.0f",
+        "file may be designed to exhaust memory; if you trust the file, use --max-expansion %.0f",
         bytes / 1e6, bytes / file_bytes, (unsigned long long)most, bytes / file_bytes + 1);
 }
 
-/* Finds the rows of one array from *row on, and moves *row past them. Skips rows of unknown arrays
- * that precede the array's rows. */
+/* Finds the rows of one array in the list of chunk checksums, and stores the first of these rows in
+ * a->first_checksum. Searches from *row on, skips rows of unknown arrays, and moves *row past the
+ * array's rows. */
 static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint64_t *list,
                              uint64_t rows, uint64_t *row, ebpo_error *error)
 {
@@ -259,7 +266,7 @@ static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows
     for (uint64_t i = 1; i < rows; i++)
         if (ebpo_list_row_number(list[i]) < ebpo_list_row_number(list[i - 1]))
             return long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS, "the list is not in the order of",
-                                   "arrays' numbers", error);
+                                   "the arrays' numbers", error);
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         if (ebpo_array_number(file, i)->present &&
             !ebpo_schema_is_list(ebpo_array_number(file, i)->id))
@@ -344,7 +351,7 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
 
 /* --- chunk offsets from the list of all chunks (format-spec/subtrees.md) --- */
 
-/* Number of chunks of each array in the rows read so far. */
+/* State of list_chunks: for each array, the number of its chunks in the rows read so far. */
 typedef struct listing {
     ebpo_file *file;
     uint64_t of_level[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], of_root[EBPO_ARRAYS];
@@ -364,7 +371,8 @@ static ebpo_status list_fails(const ebpo_file *file, const char *what, const cha
     return long_chunk_fail(file, EBPO_A_CHUNK_DIRECTORY, what, path, error);
 }
 
-/* Stores the location of the next chunk of the array with this number. */
+/* Stores the location of the next chunk of the array with this number in the list. For an array
+ * with a single chunk, compares the location with that in the array's header. */
 static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location chunk,
                               ebpo_error *error)
 {
@@ -393,8 +401,8 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
     return EBPO_OK;
 }
 
-/* Allocates an array's table of chunks. First checks that the list has enough rows for the table.
- */
+/* Allocates an array's table of chunks. Adds the array's chunks to *chunks, and first checks that
+ * the list has at least *chunks rows. */
 static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
                                ebpo_error *error)
 {
@@ -468,7 +476,7 @@ static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* --- chunk offsets from either source --- */
+/* --- chunk offsets from the list or from the indexes --- */
 
 static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
 {
@@ -505,7 +513,8 @@ ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array
 
 /* --- information about each array --- */
 
-/* Returns present array number n, in the order of the format, or NULL. */
+/* Returns the n-th array of those that the file has, in the order of the format. n begins at 0.
+ * Returns NULL if the file has at most n arrays. */
 static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
 {
     for (int level = 0; level < file->info.level_count; level++)

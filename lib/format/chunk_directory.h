@@ -1,5 +1,6 @@
-/* Declares the chunk directory: offset, stored size and checksum of every chunk of an open file
- * (format-spec/subtrees.md, checksums.md). A chunk is the unit of compression in HDF5. */
+/* Declares the lists of all chunks of a file. The chunk directory gives the offset and stored size
+ * of each chunk (format-spec/subtrees.md), the list of chunk checksums gives its checksum
+ * (checksums.md). A chunk is the unit of compression in HDF5. */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H
 
@@ -10,7 +11,8 @@
 #include "format/schema.h"
 #include "hdf5_read/chunk.h"
 
-/* A common index for all arrays that a file can have, in the order of their numbers in the format
+/* Indices of all arrays that a file can have: first the arrays of the levels, then those of the
+ * root, then attributes. Ascending indices have ascending numbers in the format
  * (ebpo_array_list_number). */
 enum {
     EBPO_ARRAYS_OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,
@@ -18,8 +20,8 @@ enum {
     /* attributes follow */
 };
 
-/* Returns the number of array indices: of all arrays of the format, present or absent, and of the
- * file's attributes. */
+/* Returns the number of indices: all arrays of the format, present or absent, plus the file's
+ * attribute arrays. */
 static inline int ebpo_all_arrays(const ebpo_file *file)
 {
     return EBPO_ARRAYS_OF_FORMAT + file->attributes.arrays;
@@ -35,13 +37,12 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
                : &file->attributes.array[i - EBPO_ARRAYS_OF_FORMAT];
 }
 
-/* --- the list of all chunks, /subtrees/chunk_directory: format-spec/subtrees.md, section 3
- * --- */
+/* --- rows of both lists: format-spec/subtrees.md, section 3 --- */
 
-/* Array number of a list row that describes bytes between chunks. */
+/* Array number of a row of the chunk directory that describes bytes between chunks. */
 #define EBPO_ROW_NO_ARRAY UINT32_MAX
 
-/* Returns the number that the list uses for an array. */
+/* Returns the number that both lists use for an array. */
 uint32_t ebpo_array_list_number(ebpo_array_id id, int level);
 
 /* Encode and decode a row of a list of chunks: the array's number, and the stored bytes or the
@@ -53,7 +54,7 @@ static inline uint64_t ebpo_list_row(uint32_t number, uint64_t value)
 static inline uint32_t ebpo_list_row_number(uint64_t row) { return (uint32_t)(row >> 32); }
 static inline uint32_t ebpo_list_row_value(uint64_t row) { return (uint32_t)row; }
 
-/* --- lists of u64 in a single chunk, however long --- */
+/* --- lists of uint64_t that are stored as a single chunk, however long --- */
 
 /* Encodes a list into *stored, which the caller frees. *bytes is its size. `codec_level`: as in
  * ebpo_write_options. */
@@ -62,8 +63,8 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_
                                                  uint8_t **stored, size_t *bytes,
                                                  ebpo_error *error);
 
-/* Decodes a list from untrusted `stored_bytes`. The caller frees *values. EBPO_E_FORMAT: *why
- * describes the error. */
+/* Decodes a list of `count` values from `stored`, which may be untrusted. The caller frees *values.
+ * Returns EBPO_E_FORMAT for damaged bytes; *why then describes the damage. */
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
                                                  ebpo_pipeline pipeline, uint64_t count,
                                                  uint64_t **values, const char **why,
@@ -76,7 +77,8 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo
 
 /* --- stored sizes --- */
 
-/* Returns EBPO_E_FORMAT if the arrays with known chunks take more bytes than the file has. */
+/* Returns EBPO_E_FORMAT if the arrays whose chunks are located take more bytes than the file has.
+ */
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* Returns EBPO_E_LIMIT if the decoded size of all arrays exceeds both `most` times the file size
@@ -86,9 +88,9 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* --- checksums --- */
 
-/* The list /chunk_checksums contains the last four bytes of every chunk of a file. The checksum
- * inside a chunk does not identify the chunk. Without the list, a chunk of another position or file
- * version would be accepted. Source: format-spec/checksums.md. */
+/* The list /chunk_checksums contains the last four bytes of every chunk of a file, which are its
+ * checksum. The list is necessary because a chunk with a correct checksum may be a wrong chunk: one
+ * of another position or of another version of the file. Source: format-spec/checksums.md. */
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */
@@ -97,8 +99,8 @@ static inline uint32_t ebpo_chunk_checksum(const uint8_t *stored, size_t bytes)
     return ebpo_load32(stored + bytes - 4);
 }
 
-/* Reads the list of chunk checksums, once, if the file has a valid list. Required before
- * ebpo_chunk_fits. Any thread may call this function. */
+/* Reads the list of chunk checksums if the file has the list; later calls do nothing. Must be
+ * called before ebpo_chunk_fits. Any thread may call this function. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error);
 
 /* Returns true if the bytes have the chunk's checksum in the list, or if the file has no list. */

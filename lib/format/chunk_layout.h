@@ -1,5 +1,5 @@
-/* Layout of a file to write: the list of arrays, the rows and order of their chunks, and the counts
- * of subtrees. format-spec/subtrees.md. */
+/* Computes the layout of a file to write: the list of arrays, the number of rows in their chunks,
+ * the order of the chunks, and the counts of subtrees. format-spec/subtrees.md. */
 #ifndef EBPO_FORMAT_CHUNK_LAYOUT_H
 #define EBPO_FORMAT_CHUNK_LAYOUT_H
 
@@ -10,20 +10,20 @@
 #include "hdf5_write/h5.h"
 #include "mesh/attributes.h"
 
-/* Counts of the items of each subtree, and prefix sums of these counts. A column is an array of a
- * level or of the mesh (ebpo_subtree_column). */
+/* Counts of the items of each subtree, and prefix sums of these counts. The columns are those of
+ * /subtrees/counts: EBPO_S_... and ebpo_subtree_column (schema.h). */
 typedef struct ebpo_subtree_sums {
-    uint64_t subtrees;
-    uint32_t cols;
-    uint64_t *before; /* [subtrees + 1][cols] sums of the columns before each subtree */
-    uint32_t *counts; /* [subtrees][cols] /subtrees/counts */
-    uint64_t *index;  /* [chunks of counts][cols] sums before each chunk of counts */
-    uint32_t *shared; /* [shared_count] /subtrees/shared_chunks */
+    uint64_t subtrees; /* number of subtrees */
+    uint32_t cols;     /* number of columns */
+    uint64_t *before;  /* [subtrees + 1][cols] sums of the columns before each subtree */
+    uint32_t *counts;  /* [subtrees][cols] /subtrees/counts */
+    uint64_t *index;   /* [chunks of counts][cols] sums before each chunk of counts */
+    uint32_t *shared;  /* [shared_count] rows of /subtrees/shared_chunks */
     uint64_t shared_count, shared_capacity;
 } ebpo_subtree_sums;
 
-/* Returns the level of the subtrees' roots for a requested number of faces in a subtree, or 0 if
- * the file is written without subtrees. `subtree_faces`: as in ebpo_write_options. */
+/* Returns the level of the subtrees' roots for a requested number of faces in a subtree. Returns 0
+ * if the file is to be written without subtrees. `subtree_faces`: as in ebpo_write_options. */
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces);
 
 /* Computes the counts of the subtrees and the sums of these counts. `info`: as in the file to
@@ -45,7 +45,8 @@ typedef struct ebpo_array_out {
     uint8_t value_size;
     ebpo_h5_id handle; /* of the array in the file, while it is written */
     bool columns;      /* for attributes: true if written as columns */
-    /* for attributes: the array that has the same rows (vertices or faces), or EBPO_A_ATTRIBUTE */
+    /* for attributes: array of the mesh that has the same rows (EBPO_A_VERTICES or EBPO_A_FACES);
+     * EBPO_A_ATTRIBUTE: neither */
     ebpo_array_id rows_of;
 } ebpo_array_out;
 
@@ -57,12 +58,13 @@ typedef struct ebpo_attribute_plan {
     double range[2]; /* least and greatest value */
 } ebpo_attribute_plan;
 
+/* A file to write (write_plan.h). */
 typedef struct ebpo_plan {
     const ebpo_tree *tree;
-    ebpo_info info; /* as stated in the file */
-    ebpo_array_out *array;
+    ebpo_info info;        /* as stated in the file */
+    ebpo_array_out *array; /* [count] the arrays of the file */
     unsigned count;
-    uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES];
+    uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES]; /* the index arrays of each level */
     uint64_t *faces_index;             /* number of vertices that the faces before each chunk use */
     ebpo_subtree_sums subtrees;        /* empty if info.subtree_level is 0 */
     const ebpo_attributes *attributes; /* NULL: no attributes */
@@ -72,15 +74,16 @@ typedef struct ebpo_plan {
 
 /* --- rows of chunks --- */
 
-/* Returns the number of rows in each chunk of an array: all rows, or a power of two. `rows`: all
- * rows of the array. */
+/* Returns the number of rows in each chunk of an array: `rows` (a single chunk), or a power of two.
+ * `rows`: number of rows of the array. */
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size);
 
-/* Returns the original number of rows in each chunk for a file that another program has rewritten.
- * See ebpo_h5_chunk_rows_fn. Codes restart at each chunk, so the values can only be decoded with
- * this number of rows. If `kept` is true, arrays whose chunk size the format does not fix keep
- * their current chunk size, if the format allows it. */
+/* Returns the number of rows that each chunk of an array had before another program rewrote the
+ * file with other chunks (callback ebpo_h5_chunk_rows_fn of hdf5_write/h5.h). Codes restart at each
+ * chunk, so the values can only be decoded with the original number of rows. `kept`: true: an array
+ * whose chunk size the format does not fix keeps its current chunk size, if the format allows this
+ * size. */
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
                                     bool kept);
 
@@ -95,9 +98,10 @@ typedef struct ebpo_ordered_chunk {
 typedef struct ebpo_chunk_order {
     ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/chunk_directory */
     uint64_t count;
-    uint64_t top; /* number of chunks at the beginning that are needed to locate a subtree */
+    uint64_t top; /* the first `top` chunks are needed to locate a subtree */
 } ebpo_chunk_order;
 
+/* Computes the order in which the chunks are written. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan,
                                                 ebpo_error *error);
 void ebpo_chunk_order_free(ebpo_chunk_order *order);

@@ -1,7 +1,8 @@
-/* Reads ranges of rows of a file's arrays through a cache of decoded chunks under a budget. A chunk
- * is decoded and checked when it is loaded; later uses only find it in the cache. Any number of
- * threads share the cache. A counted cache belongs to one thread. It reads and prefetches only
- * requested chunks, and refuses loads beyond a limit of bytes read (EBPO_E_LIMIT). */
+/* Reads ranges of rows of a file's arrays through a cache of decoded chunks under a budget of
+ * memory. A chunk is decoded and checked when it is loaded into the cache. Several threads may
+ * share a cache, except a counted cache, which belongs to one thread. A counted cache reads and
+ * prefetches only requested chunks, and refuses loads beyond a limit of bytes read (EBPO_E_LIMIT).
+ */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -15,11 +16,16 @@
 #include "format/read_attributes.h"
 #include "hdf5_read/coding.h"
 
-/* Bits of a key for the number of the chunk; number of adjacent chunks that are fetched together.
- */
-enum { CHUNK_BITS = 48, AROUND = 4 };
-/* Limits of prefetched bytes of a counted cache: a maximum, and shares of the remaining limit. */
-enum { AHEAD_MAX = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
+enum {
+    CHUNK_BITS = 48, /* bits of a key for the number of the chunk */
+    AROUND = 4       /* number of adjacent chunks that are fetched together */
+};
+/* Limits of prefetched bytes of a counted cache (ebpo_chunks_capacity). */
+enum {
+    AHEAD_MAX = 4 << 20, /* bytes */
+    AHEAD_SHARE = 4,     /* a quarter of the remaining limit */
+    BATCH_SHARE = 16     /* a sixteenth of the remaining limit, and of AHEAD_MAX */
+};
 
 /* Returns the key of a chunk in the cache: the array's number and the chunk's number. */
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
@@ -32,6 +38,7 @@ static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
     return number << CHUNK_BITS | chunk;
 }
 
+/* Returns the array of a key. */
 static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
 {
     uint64_t number = key >> CHUNK_BITS, levels = (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
@@ -42,6 +49,7 @@ static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
                : &c->file->attributes.array[number - levels - EBPO_A_ATTRIBUTE - 1];
 }
 
+/* Returns the chunk's number of a key. */
 static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
 
 /* Returns the rows of a chunk without the padding of the last chunk. */
@@ -51,6 +59,8 @@ static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
     return remaining < array->shape.chunk_rows ? remaining : array->shape.chunk_rows;
 }
 
+/* Callback of the cache: computes the memory of a chunk, which is the same during and after
+ * loading. */
 static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                                   ebpo_error *error)
 {
@@ -60,8 +70,8 @@ static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint
     return EBPO_OK;
 }
 
-/* Decodes the corners of faces and checks that the vertices exist and agree with the index array.
- */
+/* Decodes the corners of faces. Checks that the vertices exist, and that the number of vertices
+ * used so far agrees with the array /mesh/faces_index. */
 static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t rows,
                                 const uint8_t *raw, uint32_t *corners, ebpo_error *error)
 {
@@ -155,8 +165,8 @@ void ebpo_chunks_hint(ebpo_chunks *c, ebpo_hints *e, ebpo_array_id id, int level
     hint_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
 }
 
-/* Sends prefetch hints for adjacent chunks, which are likely to be read next. A request for a few
- * chunks takes about as long as a request for one. */
+/* Sends prefetch hints for a chunk and adjacent chunks, which are likely to be read next. A request
+ * for a few chunks takes about as long as a request for one chunk. */
 static void hint_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t begin = chunk / AROUND * AROUND, count = ebpo_shape_chunks(&array->shape);
@@ -170,8 +180,8 @@ static void hint_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chu
 
 /* --- counting --- */
 
-/* Returns the number of bytes that must be read for a chunk, including the chunk offsets if they
- * are not known yet. */
+/* Returns the number of bytes that must be read for a chunk. If the chunk's offset is not known
+ * yet, this is an upper bound, which includes the data with the chunk offsets. */
 static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     if (ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&c->file->located))
@@ -187,7 +197,7 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     return header + index + ebpo_reader_chunk_bound(array);
 }
 
-/* Returns true if `more` bytes can be read within the limit. */
+/* Returns true if `more` bytes can be read within the limit. Prefetched bytes count as read. */
 static bool fits_budget(const ebpo_chunks *c, uint64_t more)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes) + c->ahead_bytes;
@@ -201,9 +211,8 @@ static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_
                         "reading more would exceed the limit of %" PRIu64 " bytes", c->limit);
 }
 
-/* Checks the limit before a chunk is read. Prefetched chunks were counted when they were
- * prefetched.
- */
+/* Checks the limit before a chunk is read. Always admits a prefetched chunk, whose bytes were
+ * counted when it was prefetched, and removes it from c->ahead. */
 static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
                               ebpo_error *error)
 {
@@ -228,10 +237,9 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
 
 static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* Returns a share of the remaining limit, minus the prefetched bytes that are not yet read. Those
+/* Returns a quarter of the remaining limit, minus the prefetched bytes that are not yet read. These
  * bytes may remain unread for long, for example when a view turns away. The result is therefore at
- * least a smaller share of the remaining limit, so that batches do not degenerate to single chunks.
- */
+ * least a sixteenth of the remaining limit, so that chunks are not fetched one by one. */
 uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),
@@ -242,8 +250,8 @@ uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
 }
 
 /* Sends prefetch hints for chunks of a counted cache, within its limit. The bytes of a chunk count
- * as read from its hint on. The first `now` chunks are needed at once. The other chunks are
- * prefetched only while few bytes are prefetched and unread (ebpo_chunks_capacity). */
+ * as read as soon as its hint is sent. The first `now` chunks are needed at once. The other chunks
+ * are prefetched only within ebpo_chunks_capacity. */
 static void chunks_hint(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -285,7 +293,7 @@ void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys)
     clear_slots(keys, 16);
 }
 
-/* Returns the slot in which the key is or belongs. */
+/* Returns the slot of a key, or the free slot for a new key. */
 static uint64_t slot_of(const ebpo_chunk_keys *keys, uint64_t key)
 {
     uint64_t at;
@@ -330,8 +338,8 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
 
 void ebpo_chunks_collect(ebpo_chunks *c, ebpo_chunk_keys *keys) { c->collecting = keys; }
 
-/* Returns true for chunks of the table of subtrees, and of the types down to the subtrees' roots.
- * Their content determines which further chunks are needed. */
+/* Returns true for chunks whose content determines which further chunks are needed: chunks of the
+ * table of subtrees, and of the node types down to the subtrees' roots. */
 static bool locates_more(const ebpo_chunks *c, uint64_t key)
 {
     const ebpo_array_in *a = array_of(c, key);
@@ -356,8 +364,8 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
     return status;
 }
 
-/* Reads the number of vertices that the faces before each chunk of faces use. A counted cache reads
- * this when the first chunk of faces is read. */
+/* Reads c->vertices_before. A counted cache calls this function when it reads its first chunk of
+ * faces; other caches call it when they are created. */
 static ebpo_status read_vertices_before(ebpo_chunks *c, ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
@@ -422,7 +430,7 @@ static void release_chunk(void *user, void *item)
     free(item);
 }
 
-/* Creates a cache. `pool`: shared budget, or NULL for the separate `budget`. */
+/* Creates a cache. `pool`: shared budget; NULL: the cache has the budget `budget`. */
 static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
@@ -512,6 +520,7 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 
 /* --- rows of plain arrays --- */
 
+/* Converts integers as in the file to native integers of `size` bytes. */
 static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t count,
                            uint8_t *values, size_t size)
 {
@@ -521,6 +530,7 @@ static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_
         ebpo_integers_decode(rows, shape->element_size, shape->is_signed, count, values, size);
 }
 
+/* Checks a caller's request: the array has integers, the rows exist, and `size` is sufficient. */
 static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
                               uint64_t rows, size_t size, ebpo_error *error)
 {
@@ -534,9 +544,10 @@ static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int l
     if (!array->present || row > array->shape.rows || rows > array->shape.rows - row ||
         size < array->shape.element_size)
         return ebpo_fail_at(error, EBPO_E_ARGUMENT, shown, array->path, -1,
-                            "rows %" PRIu64 " to %" PRIu64
-                            " of %zu bytes were requested, but the array has %" PRIu64 " of %d",
-                            row, row + rows, size, array->shape.rows, array->shape.element_size);
+                            "%" PRIu64 " rows from row %" PRIu64
+                            " on, with elements of %zu bytes, were requested, but the array has "
+                            "%" PRIu64 " rows with elements of %d bytes",
+                            rows, row, size, array->shape.rows, array->shape.element_size);
     return EBPO_OK;
 }
 

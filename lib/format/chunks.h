@@ -1,5 +1,6 @@
-/* Reads ranges of arrays through a cache of decoded chunks. Results are checked: untrusted input
- * gives EBPO_E_FORMAT, never an index out of range. Any thread may call these functions. */
+/* Reads ranges of arrays through a cache of decoded chunks. A chunk is the unit of compression in
+ * HDF5. Values that are read are checked: wrong values in a file give EBPO_E_FORMAT, never an index
+ * out of range. Any thread may call these functions. */
 #ifndef EBPO_FORMAT_CHUNKS_H
 #define EBPO_FORMAT_CHUNKS_H
 
@@ -12,13 +13,13 @@
 typedef struct ebpo_chunks ebpo_chunks;
 EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
                                            uint64_t budget, ebpo_error *error);
-/* Creates a cache under a shared budget. */
+/* Creates a cache that shares the budget of `pool` with other caches. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file,
                                               ebpo_cache_pool *pool, ebpo_error *error);
-/* Creates a counted cache for one thread at a time. The cache reads and prefetches only requested
- * data. ebpo_chunks_limit sets the maximum number of bytes read from the file; a new cache has no
- * limit. A read beyond the limit returns EBPO_E_LIMIT, and ebpo_chunks_refused then returns true.
- */
+/* Creates a counted cache, for one thread at a time. A counted cache counts the bytes that it reads
+ * from the file, and reads and prefetches only requested data. ebpo_chunks_limit sets the maximum
+ * of these bytes; a new cache has no limit. A read beyond the limit returns EBPO_E_LIMIT, and
+ * ebpo_chunks_refused then returns true. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
                                                    uint64_t budget, ebpo_error *error);
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
@@ -40,30 +41,31 @@ struct ebpo_chunks {
     /* [chunks of /mesh/faces] number of vertices that the faces before each chunk use;
      * NULL: a single chunk, or no mesh */
     uint64_t *vertices_before;
-    pthread_mutex_t lock;        /* guards `rows` */
+    pthread_mutex_t lock;        /* protects `rows` */
     struct ebpo_kept_rows *rows; /* recently used rows of the table of subtrees, or NULL */
-    /* State of counted chunks (ebpo_chunks_make_counted), which one thread uses at a time. */
+    /* state of a counted cache (ebpo_chunks_make_counted), which one thread uses at a time */
     bool counted;
     bool refused;    /* a load was refused because of the limit */
     uint64_t limit;  /* maximum number of bytes read from the file, including prefetched bytes */
-    uint64_t *ahead; /* [ahead_count] keys that are prefetched and not yet read */
+    uint64_t *ahead; /* [ahead_count] keys of chunks that are prefetched and not yet read */
     uint64_t ahead_count, ahead_capacity;
-    uint64_t ahead_bytes;               /* stored bytes of these chunks */
+    uint64_t ahead_bytes;               /* stored bytes of the chunks in `ahead` */
     struct ebpo_chunk_keys *collecting; /* set by ebpo_chunks_collect; NULL: chunks are read */
 };
 
-/* A position in an array, with at most one chunk pinned while its rows are needed. Initialise with
- * { .array = ... }, end with ebpo_held_chunk_release. One thread. */
+/* A position in an array, for one thread. At most one chunk is pinned: it stays in the cache while
+ * its rows are needed. Initialise with { .array = ... }, end with ebpo_held_chunk_release. */
 typedef struct ebpo_held_chunk {
     const ebpo_array_in *array;
-    uint64_t key;
+    uint64_t key;        /* key of the pinned chunk in the cache */
     uint64_t begin, end; /* row range of the pinned chunk */
-    /* NULL: no chunk is pinned. Integers as in the file; faces as u32 corners, vertices as floats
-     * or doubles, source indices as u32 */
+    /* rows of the pinned chunk; NULL: no chunk is pinned. Faces: three uint32_t corners. Vertices:
+     * three floats or doubles. Source indices: uint32_t. Other arrays: integers as in the file */
     const uint8_t *rows;
 } ebpo_held_chunk;
 
-/* Pins the chunk of a row, as ebpo_held_chunk_move does when the row is in another chunk. */
+/* Pins the chunk of a row. Use ebpo_held_chunk_move, which calls this function only if the row is
+ * not in the pinned chunk. */
 EBPO_MUST_USE ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view,
                                                uint64_t row, ebpo_error *error);
 void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view);
@@ -84,14 +86,16 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id
                                            uint64_t row, uint64_t rows, size_t size,
                                            void *values_out, ebpo_error *error);
 
-/* Adds the chunks of existing rows in [row, row + rows) that are not in memory to `hints`. In a
- * counted cache, adds the chunks only to the keys of ebpo_chunks_collect, if any, and not to
- * `hints`; callers of a counted cache use the functions below. */
+/* Adds to `hints` the chunks that are not in memory and contain existing rows of
+ * [row, row + rows). For a counted cache, adds these chunks to the keys of ebpo_chunks_collect
+ * instead, or nowhere if chunks are not being collected: callers of a counted cache prefetch with
+ * ebpo_chunks_missing and ebpo_chunks_fetch. */
 void ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *hints, ebpo_array_id id, int level,
                       uint64_t row, uint64_t rows);
 
-/* Set of chunk keys. Chunks that do not fit are omitted, and later read without a prefetch hint.
- * Initialise a set with ebpo_chunk_keys_begin, which clears only the parts that it uses. */
+/* Set of chunk keys. A key identifies a chunk in the cache. Keys that do not fit are omitted; their
+ * chunks are later read without a prefetch hint. Initialise a set with ebpo_chunk_keys_begin, which
+ * clears only the members that are used first (the struct is large). */
 enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
     unsigned count, mask; /* mask + 1 slots */
@@ -101,23 +105,26 @@ typedef struct ebpo_chunk_keys {
 } ebpo_chunk_keys;
 void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys);
 
-/* Adds the chunks of existing rows in [row, row + rows) that are not in memory to `keys`. Returns
- * true if there are such chunks. */
+/* Adds to `keys` the chunks that are not in memory and contain existing rows of [row, row + rows).
+ * Returns true if there are such chunks. */
 bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
                          uint64_t rows, ebpo_chunk_keys *keys);
 
 /* Returns the number of bytes that a counted cache may prefetch now for later use. */
 uint64_t ebpo_chunks_capacity(const ebpo_chunks *chunks);
 
-/* Returns true if all of these counted chunks are prefetched and not yet read. */
+/* Returns true if all chunks of `keys` in this counted cache are prefetched and not yet read. */
 bool ebpo_chunks_hinted(const ebpo_chunks *chunks, const ebpo_chunk_keys *keys);
-/* Starts collecting the counted chunks that an operation needs. Until the call with NULL, nothing
- * is read: a chunk that is not in memory is added to `keys`, and its read returns EBPO_E_LIMIT. */
+/* Collects in `keys` the chunks that an operation on a counted cache needs, until this function is
+ * called with NULL. Meanwhile the cache reads nothing: a read of a chunk that is not in memory adds
+ * the chunk to `keys` and returns EBPO_E_LIMIT. */
 void ebpo_chunks_collect(ebpo_chunks *chunks, ebpo_chunk_keys *keys);
-/* Sends prefetch hints for counted chunks and reads the first `now` chunks of `keys`. */
+/* Sends prefetch hints for the chunks of `keys` of a counted cache, and reads the first `now` of
+ * these chunks. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_fetch(ebpo_chunks *chunks, const ebpo_chunk_keys *keys,
                                             unsigned now, ebpo_error *error);
 
+/* Reports a wrong array, as ebpo_check_fail does. */
 static inline ebpo_status ebpo_chunks_fail(const ebpo_chunks *chunks, int level, ebpo_array_id id,
                                            const char *what, ebpo_error *error)
 {

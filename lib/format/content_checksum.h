@@ -17,8 +17,8 @@ typedef struct ebpo_content_entry {
     uint8_t digest[32];
 } ebpo_content_entry;
 
-/* Returns true if a checksum includes the array. The tables of subtrees are excluded, as the
- * checksum does not depend on the layout. */
+/* Returns true if one of the four checksums below includes the array. They exclude the tables of
+ * subtrees, because checksums do not depend on the layout of the file. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
 /* The four checksums. Colours, the border of a surface with its winding numbers, and the simplified
@@ -43,16 +43,17 @@ static inline int ebpo_content_of(ebpo_array_id id, bool solid)
                                        : EBPO_DIGEST_CONTENT;
 }
 
-/* Digest of one array, computed chunk by chunk. In a file with subtrees, chunks have fewer rows
- * than in a file without. The digest joins these chunks to the larger chunks, and recodes codes
- * that restart with each chunk. */
+/* Digest of one array, computed chunk by chunk. Files with subtrees have chunks with fewer rows
+ * than other files. So that the digest is the same, such chunks are joined to the larger chunks of
+ * other files, and codes that restart with each chunk are recoded. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
     uint64_t last[3]; /* running sums of the components at the end of the previous chunk */
 } ebpo_array_digest;
 
 void ebpo_array_digest_begin(ebpo_array_digest *digest);
-/* Adds the chunk that begins with `row` of an array of this shape, without padding. */
+/* Adds the chunk with the rows [row, row + rows) of an array of this shape, without padding. Chunks
+ * must be added in order. */
 void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebpo_array_id id,
                            const ebpo_shape *shape, uint64_t row, uint64_t rows,
                            const uint8_t *bytes);

@@ -6,7 +6,8 @@
 #include "format/file_in.h"
 #include "format/pick_rows.h"
 
-/* Returns true if the file states that all values of the columns are equal. */
+/* Returns true if the file states, by the ranges of values, that each of the three columns has only
+ * one value. */
 static bool is_constant(const ebpo_file *file, const ebpo_attributes *arrays,
                         const ebpo_colour_column *column)
 {
@@ -31,7 +32,7 @@ ebpo_status ebpo_face_colours_find(const ebpo_file *file, ebpo_face_colours *out
                 out->arrays->array[i].values = NULL;
             return ebpo_fail_memory(error, sizeof *a);
         }
-        a->values = &none; /* arrays without values are not searched */
+        a->values = &none; /* not NULL, because ebpo_colour_columns skips arrays without values */
     }
     if (!out->arrays)
         return ebpo_fail_memory(error, sizeof(ebpo_attribute));

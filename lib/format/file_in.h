@@ -42,9 +42,9 @@ typedef struct ebpo_array_in {
     ebpo_array_id id;
     int level; /* of attributes: number of the array; 0 for other arrays without a level */
     char path[EBPO_PATH_BYTES];
-    ebpo_shape shape; /* of the result of ebpo_reader_chunk */
-    bool gates;       /* true: faces, stored as gates in the shape of ebpo_stored_shape */
-    uint64_t stored_bytes;
+    ebpo_shape shape; /* shape of the rows that ebpo_reader_chunk returns */
+    bool gates;       /* true: faces that are stored as gates, in the shape of ebpo_stored_shape */
+    uint64_t stored_bytes; /* size in the file; 0: the chunks are not located yet */
     /* [ebpo_shape_chunks(&shape)] location of each chunk; NULL when the array is absent. Valid
      * after ebpo_reader_locate, or always for a single chunk */
     ebpo_chunk_location *chunks;
@@ -62,16 +62,16 @@ static inline size_t ebpo_reader_chunk_bound(const ebpo_array_in *array)
 /* Properties of an attribute array that its HDF5 attributes state. */
 typedef struct ebpo_attribute_in {
     ebpo_attribute head; /* names and types, without values */
-    bool different;      /* true: the lists have different lengths */
+    bool different;      /* true: the values are lists of different lengths */
     bool has_range;
-    double range[2];
+    double range[2]; /* if has_range: least and greatest value */
 } ebpo_attribute_in;
 
 typedef struct ebpo_attributes_in {
     uint64_t count;
     ebpo_attribute_in *head; /* [count] */
-    ebpo_array_in *array;    /* [arrays], see ebpo_attribute_path */
-    int arrays;
+    ebpo_array_in *array;    /* [arrays] header, values and items (ebpo_values_number) */
+    int arrays;              /* 1 + 2 * count; 0: the file has no attributes */
     uint8_t sha256[32];
 } ebpo_attributes_in;
 
@@ -80,9 +80,9 @@ struct ebpo_file {
     uint64_t end; /* end of the HDF5 data in bytes; the stored file may be longer */
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
-    ebpo_array_in root_array[EBPO_ARRAYS]; /* from EBPO_A_VERTICES on */
+    ebpo_array_in root_array[EBPO_ARRAYS]; /* used from EBPO_A_VERTICES on */
     ebpo_attributes_in attributes;
-    pthread_mutex_t lock;
+    pthread_mutex_t lock;       /* held while chunks are located or checksums are read */
     atomic_bool located;        /* the chunks of all arrays are located */
     bool has_directory;         /* the file has a list of chunk offsets */
     bool has_checksums;         /* the file has a list of chunk checksums: chunk_directory.h */
@@ -94,11 +94,14 @@ struct ebpo_file {
 /* Opens a file that this process has written, without a limit on its decoded size. */
 EBPO_MUST_USE ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error);
 
-/* Locates the chunks of an array that is present. The first call locates the chunks of all arrays;
- * later calls do not read the file. Any thread may call this function. */
+/* Locates the chunks of an array that is present. The first call for an array with several chunks
+ * locates the chunks of all arrays; later calls do not read the file. Any thread may call this
+ * function. */
 EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,
                                              ebpo_error *error);
 
+/* Returns an array of the file, which may be absent. `level`: of attributes, the array's number; of
+ * other arrays of the root, not used. */
 static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id,
                                                      int level)
 {
@@ -107,7 +110,7 @@ static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo
                                     : &file->root_array[id];
 }
 
-/* Returns the context for checks. `workspace`: contains the arrays, or NULL. */
+/* Returns the context for the checks of schema.h. */
 static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace *workspace)
 {
     return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };

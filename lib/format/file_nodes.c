@@ -1,8 +1,9 @@
 /* Reads single nodes of a file through a cache of chunks: the children of a gray node, and the
- * planes and the winding number of a node. Also reads groups of eight siblings with their planes
- * and winding numbers, for streams that do not follow the file's order. Each function reads only
- * the chunks that contain the node, and checks the values against the header and the index arrays.
- * For remote files, several groups are fetched together. */
+ * planes and the winding number of a node. Also reads groups (the eight children of a gray node)
+ * with their planes and winding numbers, for streams that do not follow the file's order. Each
+ * function reads only the chunks with the node's data, including the sums that locate these data,
+ * and checks the values against the header and the index arrays. For remote files, several groups
+ * are fetched together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,19 +29,23 @@ ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *n
     const uint64_t counts[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
     if (node->rank >= counts[node->type])
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                              "level %d has %" PRIu64 " nodes of type %d; number %" PRIu64
-                              " was requested",
+                              "level %d has %" PRIu64
+                              " nodes of type %d (ebpo_node_type), but node "
+                              "number %" PRIu64 " was requested",
                               node->cell.level, counts[node->type], (int)node->type, node->rank);
     return EBPO_OK;
 }
 
+/* Returns EBPO_E_ARGUMENT unless the node can exist and is of `type`, which is EBPO_GRAY. `what`:
+ * the requested data, in the plural. */
 static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_node *node, ebpo_node_type type,
                               const char *what, ebpo_error *error)
 {
     if (node->type != type)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
-                              "%s of a node of type %d were requested; only gray nodes have them",
-                              what, (int)node->type);
+                              "%s of a node of type %d (ebpo_node_type) were requested, but such "
+                              "nodes have no %s",
+                              what, (int)node->type, what);
     return ebpo_chunks_check_node(chunks, node, error);
 }
 
@@ -49,10 +54,8 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
 {
     uint64_t counts[4];
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
-    if (status == EBPO_OK &&
-        gray->cell.level + 1 ==
-            chunks->file->info.level_count) { /* a pruned node (without children in the file):
-                                                 ebpo_facts_check excludes other nodes */
+    if (status == EBPO_OK && gray->cell.level + 1 == chunks->file->info.level_count) {
+        /* pruned: ebpo_facts_check rejects files with other gray nodes on the last level */
         *types = 0;
         memset(ranks, 0, 4 * sizeof *ranks);
         return EBPO_OK;
@@ -84,7 +87,7 @@ static plane_list planes_of(const ebpo_chunks *chunks, const ebpo_node *node)
                                                    EBPO_PART_PLANES, s->plane_count };
 }
 
-/* Reads and checks the plane codes of one node. */
+/* Reads and checks the plane codes of one node. `first`: rank of its first plane in the level. */
 static ebpo_status read_codes(ebpo_chunks *chunks, const plane_list *list, int level,
                               uint64_t first, unsigned count, uint32_t *codes, ebpo_error *error)
 {
@@ -198,7 +201,7 @@ static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_
 
 const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };
 
-/* Returns the item of the index row before an item. */
+/* Returns the item before which the preceding index row has the sums. */
 static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
 
 /* Reads the types and ranks of a group, and counts its nodes by type. */
@@ -223,8 +226,9 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
 
 /* --- planes --- */
 
-/* Appends the plane codes of the group's nodes of one type to the group. `all`: number of planes in
- * the level. */
+/* Appends the plane codes of the group's nodes of one type to out->codes. `first`: position of the
+ * first of these codes in the level. `all`: number of planes in the level. `counts`: [nodes] number
+ * of planes of each of these nodes. */
 static ebpo_status read_group_codes(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                     uint64_t first, uint64_t all, const uint8_t *counts,
                                     uint64_t nodes, ebpo_group *out, ebpo_node_type type,
@@ -254,6 +258,7 @@ static ebpo_status read_group_codes(ebpo_chunks *chunks, ebpo_array_id id, int l
     return status;
 }
 
+/* Reads the planes of the group's gray nodes. `count`: number of these nodes. */
 static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
                                     ebpo_error *error)
 {
@@ -272,6 +277,7 @@ static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t cou
                             EBPO_GRAY, error);
 }
 
+/* Reads the stored planes of the group's leaves. `count`: number of these leaves. */
 static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
                                     ebpo_error *error)
 {
@@ -290,8 +296,8 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
                             EBPO_LEAF, error);
 }
 
-/* Sorts the plane codes into node order. In the input, codes of gray nodes precede those of leaves.
- */
+/* Sorts the plane codes by octant. In the input, the codes of gray nodes (`gray_codes` codes)
+ * precede the codes of leaves. */
 static void sort_codes(ebpo_group *group, unsigned gray_codes)
 {
     uint32_t sorted[EBPO_GROUP_CODES];
@@ -361,8 +367,10 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
 
 /* --- chunks of a group that are not in memory --- */
 
-/* Adds the missing chunks of an item's index row, and of the counts from this row to the last of
- * `items` items. Returns true if chunks are missing. */
+/* Adds to `keys` the missing chunks that are needed to read the counts of the items
+ * [item, item + items), and to sum the counts before `item`: the preceding row of the array `index`
+ * (or of the table of subtrees), and the array `counts` from this row on. Returns true if chunks
+ * are missing. */
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
@@ -378,8 +386,8 @@ static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array
            missing;
 }
 
-/* Adds the missing chunks of the plane codes of `count` nodes. Returns true if chunks are missing.
- */
+/* Adds to `keys` the missing chunks of the plane codes of `count` nodes from rank `rank` on.
+ * `first`: position of the first code. Returns true if chunks are missing. */
 static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_id codes, int level,
                           uint64_t rank, uint64_t count, uint64_t first, ebpo_chunk_keys *keys)
 {
@@ -393,13 +401,14 @@ static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_
     return ebpo_chunks_missing(chunks, codes, level, first, sum, keys);
 }
 
+/* Returns the number of chunks of an array that may be absent. */
 static uint64_t chunks_of(const ebpo_array_in *array)
 {
     return array->present ? ebpo_shape_chunks(&array->shape) : 0;
 }
 
-/* Adds the missing single-chunk arrays of a level, which every group needs. Returns their stored
- * bytes. */
+/* Adds to `keys` the missing chunks of the level's arrays with a single chunk, because every group
+ * of the level needs these chunks. Returns their stored bytes. */
 static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_chunk_keys *keys)
 {
     static const struct {
@@ -426,8 +435,9 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
     return bytes;
 }
 
-/* Adds the missing chunks that the group needs next; returns false when there are none. Reads only
- * chunks in memory. Ignores errors, which the later read reports. */
+/* Adds to `keys` the missing chunks that the group needs next; returns false when there are none.
+ * Reads only chunks that are in memory, so several calls with reads between them are necessary
+ * (STAGES). Ignores errors, which the later read reports. */
 static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
                              ebpo_chunk_keys *keys)
 {
@@ -443,25 +453,26 @@ static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *numbe
         return false;
     bool gray = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_PLANES && counts[EBPO_GRAY];
     bool leaf = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_LEAF_PLANES && counts[EBPO_LEAF],
-         any = false;
+         missing = false;
     const uint64_t *rank = group.rank;
     if (gray)
-        any |= missing_counted(chunks, EBPO_A_GRAY_INDEX, EBPO_A_PLANE_COUNTS, level,
-                               rank[EBPO_GRAY], counts[EBPO_GRAY], keys);
+        missing |= missing_counted(chunks, EBPO_A_GRAY_INDEX, EBPO_A_PLANE_COUNTS, level,
+                                   rank[EBPO_GRAY], counts[EBPO_GRAY], keys);
     if (leaf)
-        any |= missing_counted(chunks, EBPO_A_LEAF_INDEX, EBPO_A_LEAF_PLANE_COUNTS, level,
-                               rank[EBPO_LEAF], counts[EBPO_LEAF], keys);
+        missing |= missing_counted(chunks, EBPO_A_LEAF_INDEX, EBPO_A_LEAF_PLANE_COUNTS, level,
+                                   rank[EBPO_LEAF], counts[EBPO_LEAF], keys);
     for (unsigned type = 0; type < 3 && wanted & EBPO_GROUP_WINDINGS; type++)
-        any |= ebpo_chunks_missing(chunks, windings[type], level, rank[type], counts[type], keys);
-    if (any)
+        missing |=
+            ebpo_chunks_missing(chunks, windings[type], level, rank[type], counts[type], keys);
+    if (missing)
         return true;
     if (gray && ebpo_ranks_planes(chunks, level, rank[EBPO_GRAY], &first, NULL) == EBPO_OK)
-        any |= missing_codes(chunks, EBPO_A_PLANE_COUNTS, EBPO_A_PLANES, level, rank[EBPO_GRAY],
-                             counts[EBPO_GRAY], first, keys);
+        missing |= missing_codes(chunks, EBPO_A_PLANE_COUNTS, EBPO_A_PLANES, level, rank[EBPO_GRAY],
+                                 counts[EBPO_GRAY], first, keys);
     if (leaf && ebpo_ranks_leaf_planes(chunks, level, rank[EBPO_LEAF], &first, NULL) == EBPO_OK)
-        any |= missing_codes(chunks, EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES, level,
-                             rank[EBPO_LEAF], counts[EBPO_LEAF], first, keys);
-    return any;
+        missing |= missing_codes(chunks, EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES, level,
+                                 rank[EBPO_LEAF], counts[EBPO_LEAF], first, keys);
+    return missing;
 }
 
 bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted)
@@ -476,7 +487,8 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
                              unsigned wanted, ebpo_error *error)
 {
     enum {
-        STAGES = 4,            /* rows of the table of subtrees, types, counts, planes */
+        STAGES = 4, /* chunks of each stage locate those of the next: rows of the table of subtrees;
+                       types; counts of planes; planes */
         FIRST_BYTES = 32 << 10 /* bytes of the next levels that are fetched with level 0 */
     };
     ebpo_status status = EBPO_OK;

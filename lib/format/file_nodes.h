@@ -1,4 +1,6 @@
-/* Reads single nodes and groups of siblings of a file through a cache of chunks. */
+/* Reads single nodes and groups of a file through a cache of chunks. A group is the eight children
+ * of a gray node (a node with children). The rank of a node is its position among the nodes of its
+ * type (gray, leaf, white, black) in its level. */
 #ifndef EBPO_FORMAT_FILE_NODES_H
 #define EBPO_FORMAT_FILE_NODES_H
 
@@ -16,8 +18,9 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_n
                                                uint16_t *types, uint64_t ranks[4],
                                                ebpo_error *error);
 
-/* Reads the codes of the planes that a gray node adds, or that are stored for a leaf. *count is 0
- * if the part is absent. */
+/* Reads the codes of the envelope planes that a gray node adds to those of its ancestors, or that
+ * are stored for a leaf. *count is 0 if the file lacks these planes (EBPO_PART_PLANES,
+ * EBPO_PART_LEAF_PLANES). */
 EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *node,
                                              uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
                                              ebpo_error *error);
@@ -27,26 +30,29 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_nod
 EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
                                               int32_t *winding, ebpo_error *error);
 
-/* Reads the root. With ebpo_chunks_source, this function serves cursors (geometry/cursor.h) whose
- * holder is an ebpo_chunks. */
+/* Reads the root. Cursors (geometry/cursor.h) whose holder is an ebpo_chunks begin with this node
+ * and read other nodes with ebpo_chunks_source. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error);
 
 extern const ebpo_node_source ebpo_chunks_source;
 
 /* --- groups: the children of one gray node, for streams in any order --- */
 
-enum { EBPO_GROUP_CODES = 8 * 255, EBPO_GROUP_BLOCK = EBPO_INDEX_ROWS };
+enum {
+    EBPO_GROUP_CODES = 8 * 255,        /* maximum number of planes of a group */
+    EBPO_GROUP_BLOCK = EBPO_INDEX_ROWS /* adjacent groups whose chunks are fetched together */
+};
 
-/* Data that a caller requests (`wanted`) in addition to the types. Data that the file lacks are
- * omitted. */
+/* Bits of `wanted`: data that a caller requests in addition to the types. Data that the file lacks
+ * are omitted. */
 enum { EBPO_GROUP_PLANES = 1, EBPO_GROUP_WINDINGS = 2 };
 
 typedef struct ebpo_group {
     uint16_t types;
-    uint64_t rank[4]; /* rank in the level of the group's first node of each type */
+    uint64_t rank[4]; /* rank of the group's first node of each type */
     /* by octant: number of planes that a gray node adds, or that are stored for a leaf */
     uint8_t plane_count[8];
-    uint32_t codes[EBPO_GROUP_CODES]; /* in node order; valid codes */
+    uint32_t codes[EBPO_GROUP_CODES]; /* [code_count] valid plane codes, by octant */
     unsigned code_count;
     int32_t winding[8]; /* by octant; 0 for gray nodes and in surfaces */
 } ebpo_group;
@@ -65,8 +71,8 @@ typedef struct ebpo_group_number {
     uint64_t group;
 } ebpo_group_number;
 
-/* Returns true if the file's source uses prefetch hints (remote files) and the group is not
- * completely in memory. */
+/* Returns true if the file's source uses prefetch hints (remote files) and memory lacks wanted data
+ * of the group. */
 bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *group, unsigned wanted);
 
 /* Fetches the missing chunks of the first group from a remote file. Prefetches the missing chunks

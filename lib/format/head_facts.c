@@ -1,9 +1,9 @@
-/* Writes and reads the HDF5 attributes of a file's root and of its levels. They contain ebpo_info,
- * except for values that the reader measures. The tables in the first part have one row for each
- * attribute. Writing and reading loop over these rows, and so agree on names and types. A reader
- * rejects a newer version and unknown required parts before it reads anything else. The check_
- * functions test ranges, and sums over the levels, before memory is allocated by these values.
- * Source: format-spec/README.md, section 5. */
+/* Writes and reads the HDF5 attributes of a file's root and of its levels: the values of ebpo_info.
+ * A fact is one attribute. The tables in the first part have one row for each attribute. Writing
+ * and reading loop over these rows, and so agree on names and types. A reader rejects a newer
+ * version and unknown required parts before it reads anything else. The functions check_... test
+ * ranges, and sums over the levels, before memory is allocated by these values. Source:
+ * format-spec/README.md, section 5. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -29,7 +29,7 @@ typedef enum fact_kind {
     FACT_INTEGER, /* int64_t as i64 */
     FACT_COUNT32, /* uint32_t as u64 */
     FACT_COUNT,   /* uint64_t as u64 */
-    FACT_HINT,    /* uint64_t as u64, may be absent */
+    FACT_HINT,    /* uint64_t as u64; 0 if the attribute is absent or has another type */
     FACT_YES_NO,  /* bool as u64 0 or 1 */
     FACT_REAL,    /* double */
     FACT_REAL3,   /* double[3] */
@@ -40,7 +40,7 @@ typedef enum fact_kind {
 typedef struct fact {
     const char *name;
     fact_kind kind;
-    size_t offset, size;      /* of the member, in bytes */
+    size_t offset, size;      /* offset and size of the member, in bytes */
     const char *const *words; /* for FACT_WORD: words by value, then NULL */
 } fact;
 
@@ -55,7 +55,8 @@ typedef struct part_word {
     bool required;
 } part_word;
 
-/* Bits of required parts that are no ebpo_part: info.pruned, info.subtree_level, info.gates. */
+/* Bits of required parts that have no ebpo_part, but a member of ebpo_info: pruned, subtree_level,
+ * gates. */
 enum { WORD_PRUNED = 1 << 30, WORD_SUBTREES = 1 << 29, WORD_GATES = 1 << 28 };
 
 static const char *const KINDS[] = { "surface", "solid", NULL }; /* indexed by info.solid */
@@ -223,8 +224,10 @@ const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection)
 
 /* --- consistency of the attributes --- */
 
+/* Maximum number of vertices or faces, and of the nodes of one type in a level. */
 static const uint64_t MESH_MAX = UINT32_MAX - 1, NODES_MAX = UINT64_C(1) << 40;
 
+/* The functions check_... return the error's text, or NULL. */
 static const char *check_mesh_counts(const ebpo_info *info)
 {
     if (info->face_count == 0 || info->face_count > MESH_MAX || info->vertex_count == 0 ||
@@ -264,7 +267,7 @@ static const char *check_border(const ebpo_info *info)
 
 static const char *check_surface(const ebpo_info *info)
 {
-    const uint64_t most = UINT64_C(1) << 40;
+    const uint64_t most = UINT64_C(1) << 40; /* so that sums of sizes do not overflow */
     if (!(info->parts & EBPO_PART_SURFACE))
         return NULL;
     bool possible = info->surface_patches > 0 && info->surface_patches <= info->surface_triangles &&
@@ -279,7 +282,7 @@ static const char *check_weld(const ebpo_repair_record *m)
 {
     return m->weld_distance > 0 && !(m->weld && isfinite(m->weld_distance) && m->weld_moved >= 0 &&
                                      isfinite(m->weld_moved))
-               ? "the record of welding within a distance has impossible values"
+               ? "an attribute mend_weld, mend_weld_distance or mend_weld_moved is impossible"
                : NULL;
 }
 
@@ -303,8 +306,7 @@ static const char *check_box(const ebpo_info *info)
     return NULL;
 }
 
-/* Checks the counts of a level against the level above, the next level and the parts. Returns the
- * error's text or NULL; the other check_ functions return the same. */
+/* Checks the counts of a level against the level above, the next level and the parts. */
 static const char *check_level_counts(const ebpo_info *info, int level)
 {
     const ebpo_level_summary *s = &info->level[level];
@@ -313,19 +315,20 @@ static const char *check_level_counts(const ebpo_info *info, int level)
         s->black_count > NODES_MAX)
         return "a level has too many nodes";
     if (s->gray_count + s->leaf_count + s->white_count + s->black_count != nodes)
-        return "a level does not have eight nodes for each gray node above";
+        return "a level does not have eight nodes for each gray node of the level above";
     bool last = level == info->level_count - 1;
     if (last ? s->gray_count && !info->pruned : s->gray_count == 0)
-        return "a level has no gray nodes, or the deepest level has gray nodes";
+        return "a level above the deepest has no gray nodes, or the deepest level has gray nodes";
     if (info->pruned ? s->pruned_count > s->gray_count || (s->pruned_count == s->gray_count) < last
                      : s->pruned_count != 0)
-        return "a level's pruned nodes exceed its gray nodes, or differ from them at the deepest "
-               "level";
+        return "a level has more pruned nodes than gray nodes, or the deepest level has a gray "
+               "node "
+               "that is not pruned";
     if (!last && info->pruned &&
         (s->pruned_count == s->gray_count ||
          info->level[level + 1].white_count / 8 < s->pruned_count))
-        return "all gray nodes of a level are pruned, or the next level lacks empty groups of "
-               "pruned nodes";
+        return "all gray nodes of a level above the deepest are pruned, or the next level has too "
+               "few white nodes for the groups of pruned nodes";
     if (s->plane_count > (info->parts & EBPO_PART_PLANES ? 255 * s->gray_count : 0) ||
         s->leaf_plane_count > (info->parts & EBPO_PART_LEAF_PLANES ? 255 * s->leaf_count : 0))
         return "a level has more planes than its nodes can have";
@@ -336,7 +339,7 @@ static const char *check_level_counts(const ebpo_info *info, int level)
     if (s->black_count && !info->solid)
         return "a surface has black nodes";
     if (s->leaf_count && s->ref_count / s->leaf_count > info->face_count)
-        return "a level refers to more faces than the mesh has";
+        return "the leaves of a level list more faces than the mesh has";
     return NULL;
 }
 
@@ -381,6 +384,7 @@ static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes 
                             "divided; down to level grid_level all cell faces are exact doubles, "
                             "and levels above level_count - 1 are not in the file.";
 
+/* Writes a member that is a bool or an ebpo_rule. */
 static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field,
                             ebpo_error *error)
 {
@@ -572,6 +576,7 @@ static ebpo_status wrong_value(ebpo_head *in, const char *object, const char *na
                         name);
 }
 
+/* Reads a word into a member that is a bool or an ebpo_rule. */
 static ebpo_status get_word(ebpo_head *in, ebpo_head_object id, const char *object, const fact *f,
                             void *field, ebpo_error *error)
 {
@@ -625,7 +630,8 @@ ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id, const char
                : status;
 }
 
-/* Reads a number that must fit the member's type. */
+/* Reads a number of kind FACT_NUMBER, FACT_COUNT32 or FACT_YES_NO, which must be in the range of
+ * the member. A FACT_NUMBER is at most 2^20. */
 static ebpo_status get_limited(ebpo_head *in, ebpo_head_object id, const char *object,
                                const fact *f, void *field, ebpo_error *error)
 {
@@ -648,6 +654,8 @@ static ebpo_status get_limited(ebpo_head *in, ebpo_head_object id, const char *o
     return EBPO_OK;
 }
 
+/* Reads one attribute into its member of `record`. A missing attribute is an error, unless it is a
+ * FACT_NOTE or FACT_HINT. */
 static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *object, const fact *f,
                             void *record, ebpo_error *error)
 {
@@ -691,19 +699,20 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
         return status;
     if (status != EBPO_OK || strcmp(format, FORMAT_NAME) != 0)
         return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
-                              "an HDF5 file, but not an EBP-Octree (its root attribute format is "
-                              "not \"%s\"); %s",
+                              "the file is an HDF5 file, but not an EBP-Octree (its root attribute "
+                              "format is not \"%s\"); %s",
                               FORMAT_NAME,
                               status == EBPO_OK && strncmp(format, "EBP-Octree paint", 16) == 0
-                                  ? "it is paint: `ebpo paint` prints its model"
-                                  : "make one with `ebpo convert`");
+                                  ? "it is a file of paint: `ebpo paint` prints its model"
+                                  : "make an EBP-Octree with `ebpo convert`");
     status = get_fact(in, root, "/", &major, info, error);
     if (status == EBPO_OK)
         status = get_fact(in, root, "/", &minor, info, error);
     if (status == EBPO_OK && info->version_major != EBPO_FORMAT_MAJOR)
         status = ebpo_fail_file(
             error, EBPO_E_VERSION, in->shown,
-            "format version %d.%d, but this library reads version %d; use a newer library",
+            "the file has format version %d.%d, but this library reads version %d; use a newer "
+            "library",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
     char words[32] = ""; /* only this text distinguishes files of the draft and of version 1.0 */
     if (status == EBPO_OK)
@@ -712,13 +721,13 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
         return EBPO_OK;
     if (status == EBPO_OK && strcmp(words, "1.0-draft") == 0)
         status = ebpo_fail_file(error, EBPO_E_VERSION, in->shown,
-                                "was written by a draft of the format, which is no longer "
+                                "the file has a draft version of the format, which is no longer "
                                 "supported; convert the model again");
     return status;
 }
 
-/* Sets the bit of a known part in *found (bit i: part_words[i]). A part may be in either of the two
- * lists, but only once. */
+/* Sets the bit of a part in *found (bit i: part_words[i]). A known part may be in the list of
+ * required or in that of optional parts, but only once. An unknown required part is an error. */
 static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, unsigned *found,
                              ebpo_error *error)
 {
@@ -767,9 +776,10 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
         if (found >> i & 1)
             info->parts |= part_words[i].part;
     info->pruned = info->parts & WORD_PRUNED;
-    info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* get_subtrees reads the level */
+    info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* get_subtrees replaces the 1 */
     info->gates = info->parts & WORD_GATES;
     info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES);
+    /* bit 0: the part `levels`, which every file has */
     return found & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }
 
@@ -785,8 +795,8 @@ static ebpo_status get_subtrees(ebpo_head *in, ebpo_head_object root, ebpo_info 
     return status;
 }
 
-/* Reads the attributes that only subsets have. subset_levels, subset_box and subset_error may be
- * absent. */
+/* Reads the attributes that only subsets have: subset_of, and subset_levels, subset_box and
+ * subset_error, which may be absent. */
 static ebpo_status get_subset(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                               ebpo_error *error)
 {
@@ -850,7 +860,8 @@ static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info
     return status;
 }
 
-/* Reads the number of dropped faces. If this number is not 0, dropping was requested. */
+/* Reads the number of dropped faces, which may be absent. A number above 0 shows that dropping was
+ * requested, which the file does not state. */
 static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                ebpo_error *error)
 {
@@ -863,8 +874,8 @@ static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* Reads the record of welding within a distance, which few files have. ebpo_facts_check checks it.
- */
+/* Reads the record of welding within a distance, which may be absent. ebpo_facts_check checks its
+ * values. */
 static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                             ebpo_error *error)
 {

@@ -7,15 +7,16 @@
 #include "core/error.h"
 #include "format/reader.h"
 
-/* The arrays that store vertices and codes of patches. */
+/* The arrays with the triangle codes and the vertices of patches. */
 static const struct {
     ebpo_array_id id;
-    unsigned columns, size;
-    bool of_code;
+    unsigned columns, size; /* columns, and bytes of an element */
+    bool of_code;           /* true: rows are bytes of code; false: rows are vertices */
 } ARRAYS[] = { { EBPO_A_SURFACE_TRIANGLES, 1, 1, true },
                { EBPO_A_SURFACE_POINTS, 3, 2, false },
                { EBPO_A_SURFACE_NORMALS, 2, 1, false },
                { EBPO_A_SURFACE_COLOURS, 3, 1, false } };
+/* COLOURS: index of the array of colours, which is the last because a file may lack it. */
 enum { ARRAY_COUNT = sizeof ARRAYS / sizeof *ARRAYS, COLOURS = ARRAY_COUNT - 1 };
 
 void ebpo_patch_table_free(ebpo_patch_table *table)
@@ -28,6 +29,8 @@ void ebpo_patch_table_free(ebpo_patch_table *table)
     memset(table, 0, sizeof *table);
 }
 
+/* Computes the first vertices, first bytes of code and children from the rows of the table. Patches
+ * ascend by octcode, so the children of successive patches also ascend. */
 static void fill_table(ebpo_patch_table *t)
 {
     uint64_t next = 0;
@@ -92,7 +95,7 @@ double ebpo_patch_table_error(const ebpo_patch_table *table, const ebpo_info *in
            ebpo_patch_error_step(info);
 }
 
-/* Returns the first row of a patch in an array, and the number of rows in *rows. */
+/* Returns the first row of a patch in array ARRAYS[array]. *rows: number of the patch's rows. */
 static uint64_t rows_of(const ebpo_patch_table *t, int array, uint64_t patch, uint64_t *rows)
 {
     const uint64_t *first = ARRAYS[array].of_code ? t->code : t->vertex;
@@ -100,6 +103,7 @@ static uint64_t rows_of(const ebpo_patch_table *t, int array, uint64_t patch, ui
     return first[patch];
 }
 
+/* Returns the number of arrays that the file has. */
 static int array_count(const ebpo_chunks *chunks)
 {
     return chunks->file->info.surface_colours ? ARRAY_COUNT : COLOURS;
@@ -127,7 +131,7 @@ ebpo_status ebpo_patches_take(const ebpo_patch_table *table, ebpo_chunks *chunks
                               const uint64_t *patches, uint64_t count, ebpo_surface *out,
                               ebpo_error *error)
 {
-    uint8_t *to[ARRAY_COUNT] = { NULL };
+    uint8_t *to[ARRAY_COUNT] = { NULL }; /* where the next rows of each array are written */
     ebpo_status status = EBPO_OK;
     memset(out, 0, sizeof *out);
     for (uint64_t i = 0; i < count; i++) {

@@ -16,21 +16,22 @@
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
 
-/* A run's range in a list of planes or references: rows [first, first + count) in the file. */
+/* The list items (planes or references) of a run's nodes: rows [first, first + count) of the list's
+ * array in the file. */
 typedef struct span {
     uint64_t first, count;
-    uint64_t end; /* for references: end of the new faces of the leaf before the run */
+    uint64_t end; /* for references: one past the last new face of the leaf before the run */
 } span;
 
 /* State of ebpo_runs_read. */
 typedef struct reading {
     ebpo_chunks *chunks;
     int level;
-    const ebpo_run *run;
+    const ebpo_run *run; /* [run_count] */
     uint64_t run_count;
-    uint32_t needs;
-    ebpo_quota *space;
-    span *span; /* [run_count] ranges in the current list */
+    uint32_t needs;    /* EBPO_NEEDS_... (schema.h): arrays to read */
+    ebpo_quota *space; /* NULL: no limit of memory */
+    span *span;        /* [run_count] list items of each run, in the list that is being read */
     ebpo_level *out;
     ebpo_error *error;
 } reading;
@@ -62,8 +63,9 @@ static int index_of(int id)
     }
 }
 
-/* Collects the chunks of an array with a row for each node of a type. An array with an index array
- * is read from the preceding index row on. */
+/* Collects the chunks of an array with a row for each node of a type. If the array has an index
+ * array, its rows are summed from the preceding index row on, so their chunks are also collected.
+ */
 static void hint_column(const reading *r, ebpo_hints *e, int id, int type)
 {
     int index = ebpo_subtree_table_has(r->chunks->file, r->level) ? -1 : index_of(id);
@@ -93,6 +95,7 @@ void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *hints, int level, const ebp
 
 /* --- arrays with a row for each node of a type --- */
 
+/* Allocates an array of the level. Returns NULL on failure, with the reason in *status. */
 static void *make_array(const reading *r, int id, uint64_t count, ebpo_status *status)
 {
     size_t size = ebpo_schema[id].held_size;
@@ -123,7 +126,8 @@ static ebpo_status read_column(const reading *r, int id, int type)
 
 /* --- lists of planes and references --- */
 
-/* Returns the number of list items of the nodes [begin, begin + nodes). */
+/* Returns the number of list items of the nodes [begin, begin + nodes) of `out`. `id`: array with
+ * the number of list items of each node. */
 static uint64_t sum_counts(const reading *r, int id, uint64_t begin, uint64_t nodes)
 {
     const uint8_t *small = ebpo_level_array(r->out, id);
@@ -145,11 +149,12 @@ static ebpo_status find_span(const reading *r, ebpo_per per, uint64_t rank, span
         return ebpo_ranks_leaf(r->chunks, r->level, rank, &s->end, &s->first, r->error);
     default:
         return ebpo_fail(r->error, EBPO_E_UNSUPPORTED,
-                         "no index locates this list; add it to find_span");
+                         "no index locates this list; add the list to find_span");
     }
 }
 
-/* Finds the ranges of the runs in a list, and sets the total number of items in `out`. */
+/* Finds the list items of each run (r->span), and sets their total number in `out`. `id`: array of
+ * the list items. */
 static ebpo_status find_spans(const reading *r, int id, const ebpo_list_spec *list)
 {
     ebpo_per per = ebpo_schema[id].per;
@@ -237,8 +242,10 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
     return EBPO_OK;
 }
 
-/* Converts the skips in leaf_first to first faces, for leaves [begin, begin + leaves). `end`: end
- * of the new faces of the leaf before leaf `begin`. */
+/* Converts leaf_first of the leaves [begin, begin + leaves) to the first new face of each leaf. In
+ * the file, a leaf has a skip: the number of faces between the new faces of the previous leaf of
+ * this level and its own new faces. `end`: one past the last new face of the leaf before leaf
+ * `begin`. */
 static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leaves, uint64_t end)
 {
     ebpo_level *out = r->out;
@@ -254,7 +261,7 @@ static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leave
     return EBPO_OK;
 }
 
-/* Decodes the face indices of leaves. Requires the spans of the references. */
+/* Decodes the face indices of leaves. r->span must be that of the references. */
 static ebpo_status decode_faces(const reading *r)
 {
     ebpo_level *out = r->out;
@@ -273,7 +280,8 @@ static ebpo_status decode_faces(const reading *r)
     return status;
 }
 
-/* Checks and decodes an array after reading. */
+/* Checks an array that has been read. Also decodes face indices after the references, the last of
+ * their arrays. */
 static ebpo_status finish_array(const reading *r, int id)
 {
     switch (id) {
@@ -294,7 +302,7 @@ static ebpo_status read_array(const reading *r, int id)
     ebpo_status status = EBPO_OK;
     if (type >= 0 && is_wanted_array(r, id))
         status = read_column(r, id, type);
-    else if (list && ebpo_level_array(r->out, list->counts)) /* a list of no items, too */
+    else if (list && ebpo_level_array(r->out, list->counts)) /* also reads lists without items */
         status = read_list(r, id, list);
     return status == EBPO_OK ? finish_array(r, id) : status;
 }
@@ -327,8 +335,8 @@ typedef struct picking {
     ebpo_error *error;
 } picking;
 
-/* Sends prefetch hints for the types of the runs, and for the types and index rows from which the
- * ranks are counted. */
+/* Sends prefetch hints for the types of the runs. The ranks of a run are counted from the preceding
+ * index row, so also sends hints for this row and for the types since this row. */
 static void hint_types(const picking *p)
 {
     ebpo_hints e = EBPO_HINTS_INIT(p->chunks->file);
@@ -400,6 +408,7 @@ static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_
     return has;
 }
 
+/* Collects the chunks of vertices, and of their source indices if `parts` has EBPO_PART_MAPS. */
 static void hint_vertices(ebpo_chunks *chunks, ebpo_hints *e, uint64_t row, uint64_t rows,
                           uint32_t parts)
 {
@@ -452,9 +461,9 @@ typedef struct gathering {
     const ebpo_array_in *array;
     const uint32_t *rows;
     const uint32_t *order; /* indices into `rows`, sorted by chunk */
-    const uint64_t *begin; /* [chunks + 1] begin of each chunk's range in `order` */
+    const uint64_t *begin; /* [chunks + 1] first index in `order` of each chunk's rows */
     size_t row_bytes;
-    uint8_t *out;
+    uint8_t *out; /* receives the rows in the order of `rows` */
 } gathering;
 
 static ebpo_status gather_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -477,7 +486,9 @@ static ebpo_status gather_chunks(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-/* Sorts the requested rows by chunk with a counting sort. */
+/* Sorts the requested rows by chunk with a counting sort: fills in `begin` and `order` of
+ * gathering.
+ */
 static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin, uint32_t *order,
                              uint64_t chunks, ebpo_error *error)
 {
@@ -539,7 +550,7 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
                      error);
 }
 
-/* Reads rows of the array `number` of /attributes: values, ends of lists, or items of lists. */
+/* Reads rows of array `number` of /attributes (ebpo_values_number, ebpo_items_number). */
 static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
                                        uint64_t count, unsigned threads, void *out,
                                        ebpo_error *error)
@@ -550,6 +561,7 @@ static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const ui
 
 /* --- rows of attributes --- */
 
+/* Arguments of ebpo_pick_attributes. */
 typedef struct attribute_picking {
     ebpo_chunks *chunks;
     const uint32_t *rows;
@@ -573,8 +585,9 @@ static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_att
                      : ebpo_fail_memory(p->error, p->count * bytes);
 }
 
-/* Computes the file indices of the items of all selected lists. List i begins at before[i], the end
- * of the preceding list in the file. Replaces a->ends by the ends in the selection. */
+/* Computes the file indices of the items of all selected lists. before[i]: begin of selected list i
+ * in the file. a->ends[i]: its end in the file, which is replaced by its end among the selected
+ * items. */
 static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
                                 const uint64_t *before, uint32_t **items)
 {
@@ -600,7 +613,7 @@ static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
     return EBPO_OK;
 }
 
-/* Reads the ends of the lists before the selected lists. */
+/* Reads the begin of each selected list: the end of the preceding list in the file, or 0. */
 static ebpo_status pick_before(const attribute_picking *p, uint64_t n, uint64_t *before)
 {
     uint32_t *rows = ebpo_alloc(p->count, sizeof *rows);

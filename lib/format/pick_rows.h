@@ -15,14 +15,15 @@ typedef struct ebpo_run {
     uint64_t rank[4], count[4];
 } ebpo_run;
 
-/* Collects the first chunks that ebpo_runs_read needs, for remote sources. */
+/* Collects the chunks that ebpo_runs_read needs first, for remote sources: those of arrays with a
+ * row for each node. */
 void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *hints, int level, const ebpo_run *runs,
                     uint64_t run_count, uint32_t needs);
 
-/* Reads the arrays of the nodes of ascending runs into `out`, concatenated, and sets the counts.
- * `out` already has the types. Reads the arrays that any of `needs` (EBPO_NEEDS_..., schema.h)
- * requires. Face indices are those of the file. Memory is first reserved from `space` (NULL: no
- * limit). */
+/* Reads the arrays of the nodes of ascending runs into `out`, one run after another, and sets the
+ * counts. `out` already has the types. Reads the arrays that any of `needs` (EBPO_NEEDS_...,
+ * schema.h) requires. Face indices are indices in the file. Memory is first reserved from `space`
+ * (NULL: no limit). */
 EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
                                          uint64_t run_count, uint32_t needs, ebpo_quota *space,
                                          ebpo_level *out, ebpo_error *error);
@@ -49,11 +50,11 @@ EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attribu
                                                const char *element, const uint32_t *rows,
                                                uint64_t count, unsigned threads, ebpo_error *error);
 
-/* Sends prefetch hints for reading these faces in the mesh and, if `parts` has EBPO_PART_MAPS,
- * their source indices. Includes the vertices that the chunks of these faces use first: these are
- * most vertices of the faces. */
+/* Sends prefetch hints for reading these faces of the mesh and, if `parts` has EBPO_PART_MAPS,
+ * their source indices. Also sends hints for the vertices that the chunks of these faces use first,
+ * because most vertices of the faces are among them. */
 void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts);
-/* Sends prefetch hints for reading these vertices in the mesh and, if `parts` has EBPO_PART_MAPS,
+/* Sends prefetch hints for reading these vertices of the mesh and, if `parts` has EBPO_PART_MAPS,
  * their source indices. */
 void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
                         uint32_t parts);

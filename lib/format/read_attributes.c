@@ -1,7 +1,9 @@
-/* Reads attributes of vertices, faces and other elements. When a file is opened, the arrays of
- * /attributes are located, and their HDF5 attributes are checked (names, types, ranges, lists of
- * different lengths). Values are read later, as whole arrays, and compared with the checksum of the
- * part. Source: format-spec/attributes.md. */
+/* Reads attributes of vertices, faces and other elements of the source. When a file is opened, the
+ * arrays of /attributes are located, and their HDF5 attributes (names, types, ranges, lists of
+ * different lengths) are checked. Values are read later, as whole arrays; ebpo_attributes_check
+ * compares them with the part's checksum. A row of an array may be a list. For lists of different
+ * lengths, one array has the ends of the lists, and another array has their items. Source:
+ * format-spec/attributes.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +20,7 @@
 #include "hdf5_read/coding.h"
 #include "mesh/textures.h"
 
+/* Returns EBPO_E_FORMAT for a wrong array or HDF5 attribute at `path`. */
 static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path, const char *what,
                                         ebpo_error *error)
 {
@@ -48,8 +51,8 @@ static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     return *type >= 0 ? EBPO_OK : attribute_head_wrong(file, path, "unknown number type", error);
 }
 
-/* Reads whether each row is a list: the type of the stored lengths, and whether the lengths differ.
- */
+/* Reads the HDF5 attributes of lists. Sets a->list to the type of the lists' lengths in the source,
+ * or to EBPO_ATTRIBUTE_NO_LIST if rows are not lists. *different: true if the lengths differ. */
 static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
                             ebpo_attribute *a, bool *different, ebpo_error *error)
 {
@@ -107,6 +110,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     char coding[EBPO_HEAD_CODING_BYTES];
     *a = (ebpo_array_in){ .id = EBPO_A_ATTRIBUTE, .level = number };
     ebpo_attribute_path(number, a->path);
+    /* for remote files and files with a chunk directory, locates only a single chunk now */
     uint64_t most = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     ebpo_status status =
         ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, EBPO_A_ATTRIBUTE),
@@ -119,7 +123,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     a->present = true;
     if (!a->chunks)
         atomic_store(&file->located, false);
-    if (strcmp(coding, a->coding) != 0)
+    if (strcmp(coding, a->coding) != 0) /* neither of the two codings */
         return attribute_head_wrong(file, a->path, "the array's coding is not valid for this array",
                                     error);
     return a->shape.is_signed
@@ -131,10 +135,10 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
 
 /* Checks the shape of an array against its HDF5 attributes. Returns the error's text or NULL. */
 static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array,
-                               const ebpo_attribute_in *of)
+                               const ebpo_attribute_in *attribute)
 {
-    const ebpo_attribute *a = &of->head;
-    uint32_t names = 1; /* number of names, which one space separates */
+    const ebpo_attribute *a = &attribute->head;
+    uint32_t names = 1; /* number of names, which single spaces separate */
     for (const char *s = a->names; *s; s++) {
         names += *s == ' ';
         if (*s == ' ' && (s == a->names || s[1] == ' ' || !s[1]))
@@ -142,12 +146,14 @@ static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array
     }
     if (!a->element[0] || strchr(a->element, ' ') || !a->names[0])
         return "the array has no names, or no element";
-    bool list = a->list != EBPO_ATTRIBUTE_NO_LIST, flat = of->different || (!list && names == 1);
+    /* flat: the array has one dimension */
+    bool list = a->list != EBPO_ATTRIBUTE_NO_LIST,
+         flat = attribute->different || (!list && names == 1);
     if ((list && names != 1) || (array->shape.cols == 0) != flat ||
         array->shape.cols > EBPO_ATTRIBUTE_COLUMNS ||
         (!flat && !list && array->shape.cols != names))
         return "the array does not have a column for each name";
-    if (array->shape.element_size != (of->different ? 8 : ebpo_attribute_bytes(a->type)))
+    if (array->shape.element_size != (attribute->different ? 8 : ebpo_attribute_bytes(a->type)))
         return "the array's element size does not match its type";
     bool vertex = ebpo_attribute_is_of(a, "vertex");
     if (ebpo_attribute_is_of_mesh(a) &&
@@ -156,8 +162,8 @@ static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array
     return NULL;
 }
 
-/* Checks that all arrays of an element ("vertex", "material") have the same number of rows. Returns
- * the error's text or NULL. */
+/* Checks that attribute array n has as many rows as all preceding arrays of its element ("vertex",
+ * "material"). Returns the error's text or NULL. */
 static const char *check_element(const ebpo_file *file, uint64_t n)
 {
     const ebpo_attribute_in *all = file->attributes.head;
@@ -168,21 +174,21 @@ static const char *check_element(const ebpo_file *file, uint64_t n)
     return NULL;
 }
 
-/* Checks the sizes of the arrays of textures. Texts must be small, because `ebpo info` reads them.
+/* Checks the sizes of an array of textures. Texts must be small, because `ebpo info` reads them.
  * Returns the error's text or NULL. */
-static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_in *items)
+static const char *check_textures(const ebpo_attribute_in *attribute, const ebpo_array_in *items)
 {
-    bool texts = strcmp(of->head.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) != 0;
-    if (!ebpo_attribute_is_of_textures(&of->head))
+    bool texts = strcmp(attribute->head.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) != 0;
+    if (!ebpo_attribute_is_of_textures(&attribute->head))
         return NULL;
-    if (of->head.rows > EBPO_TEXTURES)
+    if (attribute->head.rows > EBPO_TEXTURES)
         return "too many textures";
     return texts && items->present && items->shape.rows > EBPO_TEXTURE_TEXTS
                ? "the texts of textures are too long"
                : NULL;
 }
 
-/* Opens the array of the items of lists. */
+/* Opens the array with the items of the lists of attribute array n. */
 static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_error *error)
 {
     const ebpo_array_in *items = &file->attributes.array[ebpo_items_number(n)];
@@ -197,6 +203,7 @@ static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo
     return status;
 }
 
+/* Opens and checks attribute array n. */
 static ebpo_status open_one(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_error *error)
 {
     ebpo_attribute_in *to = &file->attributes.head[n];
@@ -220,6 +227,7 @@ static ebpo_status open_one(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_e
     return what ? attribute_head_wrong(file, values->path, what, error) : status;
 }
 
+/* Opens the array with the source's header text, if the file has it. */
 static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     const ebpo_array_in *header = &file->attributes.array[0];
@@ -238,6 +246,7 @@ static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *err
     return status;
 }
 
+/* Reads the HDF5 attributes of the group /attributes, and allocates file->attributes. */
 static ebpo_status open_group(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     static const char path[] = "/attributes";
@@ -288,14 +297,14 @@ bool ebpo_file_attribute(const ebpo_file *file, unsigned n, ebpo_attribute_facts
     if (n >= file->attributes.count)
         return false;
     const ebpo_attribute_in *of = &file->attributes.head[n];
-    ebpo_attribute_facts facts = { .type = of->head.type,
-                                   .rows = of->head.rows,
-                                   .columns = of->different ? 0 : of->head.columns,
-                                   .list = of->head.list != EBPO_ATTRIBUTE_NO_LIST,
-                                   .has_range = of->has_range,
-                                   .range = { of->range[0], of->range[1] } };
-    snprintf(facts.element, sizeof facts.element, "%s", of->head.element);
-    snprintf(facts.names, sizeof facts.names, "%s", of->head.names);
+    ebpo_attribute_facts facts = { .type = attribute->head.type,
+                                   .rows = attribute->head.rows,
+                                   .columns = attribute->different ? 0 : attribute->head.columns,
+                                   .list = attribute->head.list != EBPO_ATTRIBUTE_NO_LIST,
+                                   .has_range = attribute->has_range,
+                                   .range = { attribute->range[0], attribute->range[1] } };
+    snprintf(facts.element, sizeof facts.element, "%s", attribute->head.element);
+    snprintf(facts.names, sizeof facts.names, "%s", attribute->head.names);
     for (int i = ebpo_values_number(n); i <= ebpo_items_number(n); i++)
         facts.stored_bytes += ebpo_reader_stored_bytes(file, &file->attributes.array[i]);
     return EBPO_GIVE(ebpo_attribute_facts, out, &facts) == EBPO_OK;
@@ -308,14 +317,16 @@ const char *ebpo_attribute_type_text(uint64_t type)
 }
 
 /* --- reading whole arrays, and checking the part's checksum --- */
-/* Returns true if the array contains floating-point numbers. */
+
+/* Returns true if an array of /attributes contains floating-point numbers. Array 0 is the header;
+ * odd numbers are values (or ends of lists), even numbers are items of lists. */
 static bool floats_in(const ebpo_file *file, const ebpo_array_in *array)
 {
     if (array->level == 0)
         return false;
-    const ebpo_attribute_in *of = &file->attributes.head[(array->level - 1) / 2];
-    bool ends = array->level % 2 && of->different;
-    return !ends && ebpo_attribute_is_float(of->head.type);
+    const ebpo_attribute_in *attribute = &file->attributes.head[(array->level - 1) / 2];
+    bool ends = array->level % 2 && attribute->different;
+    return !ends && ebpo_attribute_is_float(attribute->head.type);
 }
 
 void ebpo_attribute_decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t rows,
@@ -329,6 +340,7 @@ void ebpo_attribute_decode(const ebpo_file *file, const ebpo_array_in *array, ui
         ebpo_integers_decode(raw, size, false, rows * cols, values, size);
 }
 
+/* Memory for the decoded values of an array. */
 typedef struct target {
     const ebpo_file *file;
     uint8_t *values;
@@ -380,8 +392,8 @@ static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attr
                                  "the ends of the lists do not match their items", error);
 }
 
-/* Reads the values of an attribute array; for lists of different lengths, reads the ends and,
- * unless `ends_only` is true, the items. */
+/* Reads the values of attribute array n into a->values. For lists of different lengths, reads the
+ * ends into a->ends and, unless `ends_only` is true, the items into a->values. */
 static ebpo_status read_parts(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
                               bool ends_only, ebpo_attribute *a, ebpo_error *error)
 {
@@ -401,6 +413,7 @@ static ebpo_status read_parts(const ebpo_file *file, uint64_t n, const ebpo_read
                : status;
 }
 
+/* Reads attribute array n. */
 static ebpo_status read_one(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
                             ebpo_attribute *a, ebpo_error *error)
 {
@@ -458,7 +471,7 @@ ebpo_status ebpo_attributes_read(const ebpo_file *file, const ebpo_read_options 
 static ebpo_status fail_images(const ebpo_file *file, ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
-                        "an image does not match its digest; get a fresh copy");
+                        "an image does not match its digest; get a fresh copy of the file");
 }
 
 ebpo_status ebpo_attributes_read_textures(const ebpo_file *file, const ebpo_read_options *read,
@@ -480,6 +493,7 @@ void ebpo_attribute_values_free(ebpo_attribute_values *values)
     memset(values, 0, sizeof *values);
 }
 
+/* Checks the digests of the texture images. */
 static ebpo_status check_images(const ebpo_file *file, const ebpo_read_options *read,
                                 ebpo_error *error)
 {
@@ -493,6 +507,8 @@ static ebpo_status check_images(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
+/* Checks a caller's arguments and reads attribute array n. Also checks the images before it returns
+ * their bytes. */
 static ebpo_status read_public(const ebpo_file *file, unsigned n, const ebpo_read_options *options,
                                bool ends_only, ebpo_attribute_values *out, ebpo_error *error)
 {
@@ -532,7 +548,8 @@ ebpo_status ebpo_file_attribute_ends(const ebpo_file *file, unsigned n,
     return read_public(file, n, options, true, out, error);
 }
 
-/* Reads all attributes into memory, because they are small compared to the mesh. */
+/* Reads all attributes into memory, without a limit, because they are small compared to the mesh.
+ */
 ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options *read,
                                   ebpo_error *error)
 {
@@ -546,8 +563,8 @@ ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options
     ebpo_attributes_free(all);
     if (status == EBPO_OK && ebpo_digest_differs(file->attributes.sha256, digest))
         status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
-                              "the attributes do not match sha256: the file was changed; get a "
-                              "fresh copy");
+                              "the attributes do not match the attribute sha256: the file was "
+                              "changed; get a fresh copy");
     if (status == EBPO_OK && !textures)
         status = fail_images(file, error);
     return status;

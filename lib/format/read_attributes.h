@@ -4,11 +4,12 @@
 
 #include "format/file_in.h"
 
-/* Reads all attribute arrays into *out; NULL if the file has no attributes. Memory is from the
- * workspace of the options. */
+/* Reads all attribute arrays into *out, which is NULL if the file has no attributes. Memory is from
+ * the workspace of the options. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_read(const ebpo_file *file, const ebpo_read_options *read,
                                                ebpo_attributes **out, ebpo_error *error);
-/* Reads only names, types and the header. The arrays have no values; the caller fills them in. */
+/* Reads only names, types and the header of attributes. The arrays have no values; the caller fills
+ * them in. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_read_head(const ebpo_file *file,
                                                     const ebpo_read_options *read,
                                                     ebpo_attributes **out, ebpo_error *error);
@@ -16,7 +17,7 @@ EBPO_MUST_USE ebpo_status ebpo_attributes_read_head(const ebpo_file *file,
 EBPO_MUST_USE ebpo_status ebpo_attributes_read_textures(const ebpo_file *file,
                                                         const ebpo_read_options *read,
                                                         ebpo_attributes *to, ebpo_error *error);
-/* Decodes `rows` rows of a chunk to native values. */
+/* Decodes `rows` rows of a chunk of an attribute array to native values. */
 void ebpo_attribute_decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t rows,
                            const uint8_t *raw, void *values);
 /* Checks the part's checksum and the digests of images. Succeeds if the file lacks the part. */

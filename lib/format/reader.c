@@ -1,8 +1,9 @@
 /* Reads chunks of an open file: fetches the stored bytes, compares their checksum, decompresses and
  * unshuffles them. Several threads read independent chunks at once, each with a separate chunk
- * reader. The file keeps idle chunk readers, because creating a decoder takes longer than decoding
- * a chunk. Before reading, callers collect the chunks (ebpo_hints) and send prefetch hints, so that
- * a remote source fetches the chunks in few requests. A failed hint never fails a read. */
+ * reader. The file keeps some idle chunk readers, because creating a decoder takes longer than
+ * decoding a chunk. Before reading, callers collect the chunks (ebpo_hints) and send prefetch
+ * hints, so that a remote source fetches the chunks in few requests. If a hint fails, the chunks
+ * are read without it. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,9 +18,10 @@
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
 
-/* Maximum number of idle readers, and maximum bytes of an idle reader's buffer for stored chunks.
- */
-enum { IDLE_MAX = 4, STORED_MAX = 1 << 18 };
+enum {
+    IDLE_MAX = 4,        /* maximum number of idle readers of a file */
+    STORED_MAX = 1 << 18 /* maximum bytes of an idle reader's buffer for stored chunks */
+};
 
 void ebpo_idle_readers_make(ebpo_idle_readers *readers)
 {
@@ -90,13 +92,13 @@ void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *r)
 
 /* --- prefetch hints --- */
 
+/* Adds a range of the file to the collection. Adds nothing if memory is short. */
 static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
 {
     ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
     if (last && last->offset + last->size == offset)
         last->size += size;
-    else if (ebpo_grow(&e->range, &e->capacity, e->count + 1,
-                       sizeof *e->range)) /* if memory is short, the range has no prefetch hint */
+    else if (ebpo_grow(&e->range, &e->capacity, e->count + 1, sizeof *e->range))
         e->range[e->count++] = (ebpo_range){ offset, size };
 }
 
@@ -110,8 +112,8 @@ void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
 {
     if (!ebpo_hints_wanted(e) || !array->present || e->failed)
         return;
-    /* not repeated after a failure, because each attempt makes all retries; the later read reports
-     * the error */
+    /* not tried again after a failure, because each attempt may make several requests; the later
+     * read reports the error */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
@@ -169,10 +171,11 @@ static void join_ranges(ebpo_hints *e, uint64_t gap)
     e->count = kept;
 }
 
-/* Sends hints to the operating system. Joins close ranges, as each range takes a system call. */
+/* Sends hints to the operating system. Joins ranges that are close together, as each range takes a
+ * system call. */
 static void hint_system(ebpo_hints *e)
 {
-    enum { BETWEEN = 16 << 10 };
+    enum { BETWEEN = 16 << 10 }; /* bytes; not longer to read than a system call takes */
     join_ranges(e, BETWEEN);
     ebpo_input_advise(&ebpo_reader_own(e->file)->in, e->range, e->count);
 }
@@ -214,8 +217,8 @@ void ebpo_hint_all(ebpo_hints *e)
     *e = (ebpo_hints)EBPO_HINTS_INIT(e->file);
 }
 
-/* Returns true if the stated size top_bytes is plausible: at most 1 MiB more than a sixteenth of
- * the file. */
+/* Returns true if top_bytes, which the file states, is plausible: at most 1 MiB more than a
+ * sixteenth of the file. A false value would cause long requests. */
 static bool is_plausible_top(const ebpo_info *info)
 {
     enum { SHARE = 16, ANYWAY = 1 << 20 };
@@ -232,6 +235,8 @@ void ebpo_hint_top(const ebpo_file *file)
         !is_plausible_top(info))
         return;
     const ebpo_chunk_location *directory = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
+    /* the chunk directory, the checksums, and the top bytes without HDF5's chunk indexes, which a
+     * reader of the directory does not need */
     ebpo_range range[4] = { { directory->address, directory->bytes } };
     size_t count = 1;
     if (wants_checksums(file))
@@ -276,11 +281,11 @@ typedef struct job {
     ebpo_rows_fn take;
     void *context;
     ebpo_workspace *workspace;
-    ebpo_idle_reader **reader; /* [threads] created when first needed */
+    ebpo_idle_reader **reader; /* [threads] NULL: the thread has not started */
 } job;
 
-/* Reads bytes [address, address + bytes) of the file to reader->stored. Enlarges the buffer to
- * `capacity` bytes if it is smaller. */
+/* Reads bytes [address, address + bytes) of the file into reader->stored. If this buffer has fewer
+ * than `capacity` or `bytes` bytes, allocates a buffer of the larger number. */
 static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
                                 size_t bytes, size_t capacity, ebpo_error *error)
 {
@@ -322,8 +327,8 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
     return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);
 }
 
-/* Decodes a chunk of gates to high-water codes, with padding. Uses the coder's buffer for
- * shuffling, which is free because gates are single bytes and not shuffled. */
+/* Decodes a chunk of gates to high-water codes (hdf5_read/coding.h), and sets the padding to 0.
+ * Uses the coder's buffer for shuffling, because gates are single bytes and not shuffled. */
 static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
                                 ebpo_error *error)
@@ -340,6 +345,7 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
                : chunk_damaged(file, array, chunk, "its streams do not encode faces", error);
 }
 
+/* Decodes a chunk to rows of array->shape. */
 static ebpo_status decode_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                  ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
                                  ebpo_error *error)
@@ -348,6 +354,7 @@ static ebpo_status decode_stored(const ebpo_file *file, const ebpo_array_in *arr
                         : unpack_stored(file, array, chunk, coder, stored, raw, error);
 }
 
+/* Reads the stored bytes of a chunk into reader->stored. */
 static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                ebpo_chunk_reader *reader, ebpo_error *error)
 {
@@ -380,9 +387,9 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
                : status;
 }
 
-/* Returns the end of a run of chunks that one read fetches. The chunks [begin, result) are
+/* Returns the end of a run of chunks that one read fetches: the chunks [begin, result). They are
  * contiguous in the file, end at or before chunk `end`, and take at most RUN_BYTES, unless the run
- * is a single chunk. */
+ * is a single chunk. *bytes: size of the run. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
     const ebpo_chunk_location *c = array->chunks;
@@ -394,6 +401,8 @@ static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t en
     return next;
 }
 
+/* Fetches the chunks [begin, end), which take `bytes` bytes, with one read, and passes the rows of
+ * each chunk to the callback. */
 static ebpo_status read_run(job *j, ebpo_idle_reader *idle, uint64_t begin, uint64_t end,
                             size_t bytes, ebpo_error *error)
 {
@@ -452,7 +461,8 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     j.reader = ebpo_alloc_zero(threads, sizeof *j.reader);
     if (!j.reader)
         return ebpo_fail_memory(error, threads * sizeof *j.reader);
-    /* each thread takes chunks about four times, so that runs are long */
+    /* chunks that a thread takes at a time: about four times for each thread, so that runs are long
+     */
     uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;

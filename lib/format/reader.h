@@ -14,7 +14,7 @@ typedef struct ebpo_hints {
     const ebpo_file *file;
     ebpo_range *range;
     uint64_t count, capacity;
-    bool failed; /* chunk offsets could not be read: nothing is collected any more */
+    bool failed; /* true: chunk offsets could not be read, so nothing more is collected */
     bool local;  /* also collect chunks of local files: the operating system receives the hints */
     bool counts_bytes; /* collect chunks of any file, for ebpo_hints_bytes */
 } ebpo_hints;
@@ -28,7 +28,7 @@ void ebpo_hint_chunks(ebpo_hints *hints, const ebpo_array_in *array, uint64_t be
 void ebpo_hint_array(ebpo_hints *hints, const ebpo_array_in *array);
 /* Collects a level's arrays, except those of the parts `without`. */
 void ebpo_hint_level(ebpo_hints *hints, int level, uint32_t without);
-/* Collects the arrays of the root that any of these needs require. */
+/* Collects the arrays of the root that any of `needs` (EBPO_NEEDS_..., schema.h) requires. */
 void ebpo_hint_root(ebpo_hints *hints, uint32_t needs);
 /* Collects the arrays of attributes. */
 void ebpo_hint_attributes(ebpo_hints *hints);
@@ -38,7 +38,7 @@ void ebpo_hint_tree(const ebpo_file *file);
  * subtrees' roots, the sums before the subtrees, and the chunk offsets. Does nothing unless the
  * file has subtrees and states the size of these data (top_bytes). */
 void ebpo_hint_top(const ebpo_file *file);
-/* Returns true if hints have an effect. */
+/* Returns true if chunks are collected: the source prefetches, or another reason in `hints`. */
 bool ebpo_hints_wanted(const ebpo_hints *hints);
 /* Sends hints for the collected chunks, and clears the collection. */
 void ebpo_hint_all(ebpo_hints *hints);
@@ -67,14 +67,14 @@ EBPO_MUST_USE ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chun
                                             ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
 
-/* Callback that receives rows [row, row + rows) of an array, which are chunk number `chunk`,
- * decoded to `bytes`. Several threads call it at once. */
+/* Callback that receives the rows [row, row + rows) of an array, which are chunk number `chunk`.
+ * `bytes`: the rows as ebpo_reader_chunk returns them. Several threads may call it at once. */
 typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, uint64_t chunk,
                                     uint64_t row, uint64_t rows, const uint8_t *bytes,
                                     ebpo_error *error);
 
-/* Reads all chunks of an array that is present. Chunks come in any order, unless threads is 1.
- * Releases pages of the workspace meanwhile. */
+/* Reads all chunks of an array that is present, and passes them to `take`: in any order, or in
+ * ascending order if options->threads is 1. Releases pages of the workspace meanwhile. */
 EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
                                            const ebpo_read_options *options, ebpo_rows_fn take,
                                            void *context, ebpo_error *error);

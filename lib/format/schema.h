@@ -1,5 +1,7 @@
-/* Declares the arrays of a file: the rows of array_table.inc as an enumeration and a table. Source:
- * format-spec/README.md, sections 6 and 9. */
+/* Declares the arrays of a file: the rows of array_table.inc as an enumeration and a table. Nodes
+ * are gray (with children), leaves, white (outside) or black (inside): ebpo_node_type. The eight
+ * children of a gray node are a group. The rank of a node is its position among the nodes of its
+ * type in its level. Source: format-spec/README.md, sections 6 and 9. */
 #ifndef EBPO_FORMAT_SCHEMA_H
 #define EBPO_FORMAT_SCHEMA_H
 
@@ -32,26 +34,28 @@ typedef enum ebpo_per {
 #include "format/array_table.inc"
     EBPO_COUNTS,
     EBPO_PER_GROUP = EBPO_COUNTS,
-    EBPO_PER_GROUP_BLOCK, /* EBPO_INDEX_ROWS groups; in the next two rows: gray nodes, leaves */
-    EBPO_PER_GRAY_BLOCK,
-    EBPO_PER_LEAF_BLOCK,
+    EBPO_PER_GROUP_BLOCK, /* EBPO_INDEX_ROWS groups */
+    EBPO_PER_GRAY_BLOCK,  /* EBPO_INDEX_ROWS gray nodes */
+    EBPO_PER_LEAF_BLOCK,  /* EBPO_INDEX_ROWS leaves */
     EBPO_PER_VERTEX,
     EBPO_PER_FACE,
     EBPO_PER_FACE_CHUNK,
     EBPO_PER_BORDER_LOOP,
     EBPO_PER_BORDER_POINT,
-    EBPO_PER_PATCH, /* of the simplified surface; the next three rows: of all patches */
-    EBPO_PER_PATCH_BYTE,
-    EBPO_PER_PATCH_VERTEX,
-    EBPO_PER_PATCH_COLOUR,
-    EBPO_PER_SUBTREE_CHUNK, /* chunk of the rows of subtrees */
+    EBPO_PER_PATCH,         /* patch of the simplified surface */
+    EBPO_PER_PATCH_BYTE,    /* byte of the triangle codes of all patches */
+    EBPO_PER_PATCH_VERTEX,  /* vertex of any patch */
+    EBPO_PER_PATCH_COLOUR,  /* vertex with a colour of any patch */
+    EBPO_PER_SUBTREE_CHUNK, /* chunk of /subtrees/counts */
     EBPO_PER_SUBTREE,
-    EBPO_PER_SHARED_BLOCK,
-    EBPO_PER_CHUNK
+    EBPO_PER_SHARED_BLOCK, /* chunk of faces or vertices that a subtree uses, but that precedes it
+                            */
+    EBPO_PER_CHUNK         /* chunk of the file */
 } ebpo_per;
 
-/* Conditions for the presence of an array, as bits. The last three bits are not parts of the file:
- * the file has subtrees; the model is a solid; no condition. */
+/* Conditions for the presence of an array, as bits. Most conditions are that the file has a part.
+ * EBPO_NEEDS_SUBTREES: the file has subtrees. EBPO_NEEDS_SOLID: the model is a solid.
+ * EBPO_NEEDS_ALWAYS: no condition. */
 enum {
     EBPO_NEEDS_PLANES = EBPO_PART_PLANES,
     EBPO_NEEDS_MESH = EBPO_PART_MESH,
@@ -71,28 +75,29 @@ enum {
 enum {
     EBPO_INDEX_ROWS = 4096,            /* items between two rows of an index array */
     EBPO_COLOUR_OF_NOTHING = 0x808080, /* for gray nodes without a known colour */
-    EBPO_PATH_BYTES = 48,
-    EBPO_COLUMNS_BYTES = 2048, /* of the attribute `columns`, with its end */
-    /* with the part `subtrees` (format-spec/subtrees.md) */
-    EBPO_FACE_BLOCK = 2048, /* rows of a chunk */
-    EBPO_VERTEX_BLOCK = 1024,
-    EBPO_SUBTREE_ROWS = 128,
+    EBPO_PATH_BYTES = 48,              /* size of an array's path, including the final zero byte */
+    EBPO_COLUMNS_BYTES = 2048, /* size of the attribute `columns`, including the final zero byte */
+    /* rows of a chunk in files with subtrees (format-spec/subtrees.md) */
+    EBPO_FACE_BLOCK = 2048,     /* /mesh/faces */
+    EBPO_VERTEX_BLOCK = 1024,   /* /mesh/vertices */
+    EBPO_SUBTREE_ROWS = 128,    /* /subtrees/counts */
     EBPO_COLS_OF_SUBTREES = 255 /* see ebpo_schema_cols */
 };
 
 /* Columns of /subtrees/counts: numbers of items of a subtree. Columns with BEFORE count the items
- * between the previous subtree and this one. These items belong to leaves that are at or above the
- * level of the subtrees' roots. */
+ * between the previous subtree and this subtree. These items belong to leaves that are at or above
+ * the level of the subtrees' roots. A new face of a leaf is in the list of no earlier leaf (depth
+ * first). */
 enum {
     EBPO_S_FACES_BEFORE, /* new faces */
     EBPO_S_FACES,
-    EBPO_S_VERTICES_BEFORE, /* first used by these faces */
-    EBPO_S_VERTICES,
+    EBPO_S_VERTICES_BEFORE, /* vertices that the faces of EBPO_S_FACES_BEFORE use first */
+    EBPO_S_VERTICES,        /* vertices that the faces of EBPO_S_FACES use first */
     EBPO_S_SHARED_FACES,    /* rows of /subtrees/shared_chunks for chunks of faces */
     EBPO_S_SHARED_VERTICES, /* rows of /subtrees/shared_chunks for chunks of vertices */
-    EBPO_SUBTREE_LEVELS     /* first of the columns of levels */
+    EBPO_SUBTREE_LEVELS     /* first column of ebpo_subtree_column */
 };
-/* Columns of each level below the subtrees' roots. */
+/* Columns for each level below the subtrees' roots: numbers of nodes, planes and references. */
 enum {
     EBPO_S_GRAY,
     EBPO_S_LEAF,
@@ -116,7 +121,7 @@ static inline unsigned ebpo_subtree_column(const ebpo_info *info, int level, uns
 /* Returns the number of rows in a chunk of /subtrees/counts. The array may have fewer rows. */
 uint32_t ebpo_subtree_rows(const ebpo_info *info);
 
-/* Number of rows of an array whose length is not derived from the header's counts. */
+/* Result of ebpo_schema_rows for an array whose length the header's counts do not determine. */
 #define EBPO_ROWS_STATED UINT64_MAX
 
 /* The index arrays of a level, in the order of the items that they count. */
@@ -129,20 +134,20 @@ typedef struct ebpo_array_spec {
     uint8_t cols;   /* 0: one dimension */
     uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
-    bool if_needed; /* true: may be absent although its items exist; all values are then the default
-                     */
+    bool if_needed; /* true: the file may omit the array if all values are default_value */
     int8_t default_value;
-    uint8_t since;      /* first minor version of the format with this array */
-    uint8_t held_size;  /* size of an element in ebpo_level; 0: ebpo_level lacks the array */
-    uint16_t held;      /* offset of the pointer in ebpo_level */
-    uint16_t bytes;     /* arrays of the root: offset of their size in ebpo_stored_sizes */
+    uint8_t since;     /* first minor version of the format with this array */
+    uint8_t held_size; /* size of an element in ebpo_level; 0: ebpo_level lacks the array */
+    uint16_t held;     /* offset in ebpo_level of the pointer to the array */
+    uint16_t bytes;    /* arrays of the root: offset in ebpo_stored_sizes of the counter of bytes */
     const char *coding; /* value of the array's attribute `coding` */
     const char *about;  /* value of the array's attribute `about` */
 } ebpo_array_spec;
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
 
-/* Coding of faces as gates across edges (hdf5_read/face_gates.h). */
+/* Value of the attribute `coding` for faces that are stored as gates: relative to an edge of a
+ * preceding face (hdf5_read/face_gates.h). */
 #define EBPO_GATES_CODING "gates"
 /* Returns the shape in the file of an array with values of shape `given`. The result differs from
  * `given` only for gates. */
@@ -175,20 +180,19 @@ static inline uint64_t ebpo_schema_groups(const ebpo_info *info, int level)
     return level == 0 ? 1 : info->level[level - 1].gray_count;
 }
 
-/* Returns the conditions (EBPO_NEEDS_...) that a file or tree fulfils. */
+/* Returns the conditions (EBPO_NEEDS_...) that a file or tree meets. */
 static inline uint32_t ebpo_schema_has(const ebpo_info *info)
 {
     return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) |
            (info->subtree_level ? EBPO_NEEDS_SUBTREES : 0) | EBPO_NEEDS_ALWAYS;
 }
 
-/* A list of planes, leaf planes or references. Another array contains the number of list items of
- * each node of one type. */
+/* A list of planes, leaf planes or references of nodes. */
 typedef struct ebpo_list_spec {
-    ebpo_array_id counts; /* the array of these numbers */
-    ebpo_per of;          /* the type of node */
+    ebpo_array_id counts; /* the array with the number of list items of each node */
+    ebpo_per of;          /* type of the nodes that have list items */
 } ebpo_list_spec;
-/* Returns the list that consists of such items; NULL for items that are in no list. */
+/* Returns the list that consists of items of kind `per`; NULL for items that are in no list. */
 const ebpo_list_spec *ebpo_schema_list(ebpo_per per);
 
 /* Returns the type of node (ebpo_node_type) that `per` stands for, or -1. */
@@ -196,7 +200,8 @@ int ebpo_schema_node_type(ebpo_per per);
 
 /* --- a level in memory --- */
 
-/* Returns true for index arrays: sums before each EBPO_INDEX_ROWS-th item. */
+/* Returns true for index arrays. An index array has sums over the items before each
+ * EBPO_INDEX_ROWS-th item, so that a reader can begin in the middle of a level. */
 static inline bool ebpo_schema_is_index(int id)
 {
     return ebpo_schema[id].per >= EBPO_PER_GROUP_BLOCK &&
@@ -210,9 +215,10 @@ static inline bool ebpo_schema_is_list(ebpo_array_id id)
     return id == EBPO_A_CHUNK_DIRECTORY || id == EBPO_A_CHUNK_CHECKSUMS;
 }
 
-/* Returns true if ebpo_level has the array. */
+/* Returns true if ebpo_level has a member for the array. */
 static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }
 
+/* Returns the level's array; NULL if it is absent. */
 static inline void *ebpo_level_array(const ebpo_level *level, int id)
 {
     void *array;
@@ -225,7 +231,7 @@ static inline void ebpo_level_set_array(ebpo_level *level, int id, const void *a
     memcpy((char *)level + ebpo_schema[id].held, &array, sizeof array);
 }
 
-/* Returns the number of items of a level, except index rows. */
+/* Returns the number of items of a level. `per`: not a block of an index array. */
 uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per);
 void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count);
 
@@ -246,14 +252,14 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
 /* Returns a level with the header's counts and no arrays. */
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
-/* Constraints on a tree, which is read from a file or comes from a caller who writes it:
- * format-spec/README.md, sections 6 and 9. */
+/* The functions ebpo_check_... check the constraints of format-spec/README.md, sections 6 and 9, on
+ * a tree that is read from a file, or that a caller passes for writing. */
 
-/* Subject of the check: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
 typedef struct ebpo_check {
-    const char *shown;         /* the file's name */
-    ebpo_status as;            /* status of an error */
-    ebpo_workspace *workspace; /* contains the arrays, or NULL */
+    const char *shown; /* the file's name for messages */
+    ebpo_status as;    /* status of an error: EBPO_E_FORMAT for a file, EBPO_E_ARGUMENT for a
+                          caller's tree */
+    ebpo_workspace *workspace; /* workspace that contains the arrays; NULL: allocated with malloc */
 } ebpo_check;
 
 /* Reports a wrong array of a level, for example "shown: /levels/03/planes: what; advice". `level`:
@@ -279,14 +285,16 @@ EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *ar
 EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh,
                                             ebpo_error *error);
 
-/* Numbers of the arrays in /attributes: 0 is the header. Attribute array n has an array of values
- * and, for lists of different lengths, an array of their items. format-spec/attributes.md. */
+/* Numbers of the arrays in /attributes (format-spec/attributes.md): 0 is the header. Attribute
+ * array n has an array of values. If the values are lists of different lengths, the array of values
+ * contains the end of each list, and a second array contains the items of all lists. */
 static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
 static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
 /* Writes the absolute path of an array in /attributes. */
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
 
-/* Returns the attribute `about`. `ends`: the array's lists have different lengths. */
+/* Returns the attribute `about` of an array in /attributes. `ends`: the array's lists have
+ * different lengths. */
 const char *ebpo_attribute_about(int number, bool ends);
 
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];

@@ -1,7 +1,8 @@
 /* Reads slices: a complete subtree or the whole tree. A subtree is a contiguous range of nodes in
  * every level. A slice contains these ranges, the faces that its leaves list, and the vertices of
- * these faces. Faces have local indices: first the shared faces, in ascending order of their file
- * indices, then the owned faces. A hash table (ebpo_compact) maps scattered indices to dense ones.
+ * these faces. Faces have local indices: first the shared faces (an earlier leaf of the file lists
+ * them), in ascending order of their file indices, then the owned faces (no earlier leaf lists
+ * them). A hash table (ebpo_compact) maps scattered indices to dense indices.
  * A caller may limit the memory (ebpo_quota); the bytes of each array are reserved before it is
  * allocated. Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
@@ -20,7 +21,7 @@
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
 
-static const uint32_t FREE = UINT32_MAX;
+static const uint32_t FREE = UINT32_MAX; /* number of a free slot */
 
 uint64_t ebpo_compact_bytes(uint64_t capacity)
 {
@@ -72,8 +73,8 @@ static void compact_add(ebpo_compact *compact, uint32_t number)
     compact->sorted[compact->count++] = number;
 }
 
-/* Sorts with a radix sort, from the lowest byte to the highest. Skips bytes that are equal in all
- * numbers. `temporary`: memory of the same size. */
+/* Sorts with a radix sort, from the lowest byte to the highest. Skips a byte position if all
+ * numbers have the same byte there. `temporary`: memory for `count` numbers. */
 static void sort_numbers(uint32_t *numbers, uint32_t *temporary, uint64_t count)
 {
     uint64_t begin[4][256] = { { 0 } };
@@ -123,7 +124,8 @@ static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 
 /* --- faces --- */
 
-/* Sends prefetch hints for the rows `single` and [first, first + rows). */
+/* Sends prefetch hints for the `singles` rows in `single`, which ascend, and for the rows
+ * [first, first + rows). */
 static void hint_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
                       uint64_t singles, uint64_t first, uint64_t rows)
 {
@@ -143,8 +145,8 @@ static void hint_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *sin
     ebpo_hint_all(&e);
 }
 
-/* Reads decoded rows of an array: first the rows `single`, in ascending order, then the rows
- * [first, first + rows). A chunk stays pinned while its rows are read. */
+/* Reads decoded rows of an array: first the `singles` rows in `single`, which ascend, then the rows
+ * [first, first + rows). */
 static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
                                const uint32_t *single, uint64_t singles, uint64_t first,
                                uint64_t rows, void *out, ebpo_error *error)
@@ -194,7 +196,8 @@ static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *shared, ebpo_
 /* Replaces file indices of faces by local indices. */
 static void localise_faces(ebpo_slice *slice, const ebpo_compact *shared)
 {
-    /* the index of an owned face decreases by the number of earlier faces that are not shared */
+    /* an owned face's index decreases by the number of faces before first_face that the slice lacks
+     */
     uint64_t decrease = slice->first_face - shared->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
@@ -241,11 +244,12 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
         return status;
     const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
                    *owned_corners = slice->mesh.faces + 3 * (uint64_t)slice->shared_count;
+    /* number of vertices that the chunks before this chunk of faces use */
     uint64_t used = chunks->vertices_before
                         ? chunks->vertices_before[view.begin / view.array->shape.chunk_rows]
                         : 0;
-    /* one past the largest vertex of the faces before the owned faces, and of the owned faces;
-     * vertex indices are below 2^32 - 2 */
+    /* one past the largest vertex: of the faces in this chunk before the owned faces; of the owned
+     * faces. Vertex indices are below 2^32 - 2 */
     uint32_t end_before = 0, end_owned = 0;
     for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
         end_before = corners[i] + 1 > end_before ? corners[i] + 1 : end_before;
@@ -257,7 +261,8 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     return EBPO_OK;
 }
 
-/* Collects the vertices of the slice before `begin`, which earlier faces of the file use first. */
+/* Collects the slice's vertices before `begin`: earlier faces of the file use these vertices first.
+ * *bytes: size of the table `older`. */
 static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quota *space,
                                  ebpo_compact *older, uint64_t *bytes, ebpo_error *error)
 {
@@ -326,9 +331,9 @@ static ebpo_status read_source_indices(ebpo_slice *slice, ebpo_chunks *chunks, e
                        slice->face_source, error);
 }
 
-/* Completes a slice that has levels with file indices, first_face and face_count. Reads faces and
- * vertices, and converts the levels to local indices. If `maps` is true, also reads source indices
- * (positions in the source mesh). `space`: see ebpo_slice_read_within. */
+/* Completes a slice whose levels (with file indices), first_face and face_count are set. Reads
+ * faces and vertices, and converts the levels to local indices. If `maps` is true, also reads
+ * source indices (positions in the source mesh). `space`: see ebpo_slice_read_within. */
 static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
                                     ebpo_quota *space, ebpo_error *error)
 {
@@ -387,8 +392,8 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
 
 /* Selected levels of a subtree, and the data to read. */
 typedef struct extent {
-    uint32_t needs;    /* EBPO_NEEDS_... */
-    int end;           /* one past the deepest level */
+    uint32_t needs;    /* EBPO_NEEDS_... (schema.h) */
+    int end;           /* one past the deepest selected level, as a level of the file */
     bool faces;        /* the faces that the leaves list will also be read */
     ebpo_quota *space; /* NULL: no limit */
 } extent;
@@ -409,7 +414,8 @@ static bool has_next_level(const extent *e, const range *r)
     return r->run.count[EBPO_GRAY] && r->level + 1 < e->end;
 }
 
-/* Moves the range to the next level. `types`: receives the types of its groups, or NULL. */
+/* Replaces the range by the range of its nodes' children. `types`: receives the types of the groups
+ * of this new range; may be NULL. */
 static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, ebpo_error *error)
 {
     uint64_t group = r->run.rank[EBPO_GRAY], groups = r->run.count[EBPO_GRAY];
@@ -431,6 +437,7 @@ static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, e
 static void hint_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
+    /* ranks are counted from the group of the preceding index row on */
     uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
              counted = index * EBPO_INDEX_ROWS;
     ebpo_runs_hint(chunks, &e, r->level, &r->run, 1, x->needs);
@@ -495,7 +502,7 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ext
     return status;
 }
 
-/* State of the visit of all leaves in depth-first order. */
+/* State of a visit of all leaves of a slice in depth-first order. */
 typedef struct walk {
     ebpo_chunks *chunks;
     ebpo_slice *slice;
@@ -503,8 +510,9 @@ typedef struct walk {
     bool begun;                                             /* true after the first leaf */
 } walk;
 
-/* Checks that the new faces of the leaves, in depth-first order, are one range without gaps. This
- * range is the owned faces; the first leaf determines its start. */
+/* Visits a group and the groups below it. Checks that the new faces of the leaves, in depth-first
+ * order, are one range without gaps. This range is the owned faces: sets first_face, from the first
+ * leaf, and face_count of the slice. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];
@@ -617,7 +625,7 @@ ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_nod
     return ebpo_slice_read_parts(out, chunks, root, ~(uint32_t)EBPO_NEEDS_LEAF_PLANES, error);
 }
 
-/* Adds the references and the new faces of the leaves of a range. */
+/* Adds to *out the numbers of references and new faces of the leaves of a range. */
 static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice_size *out,
                                  ebpo_error *error)
 {
@@ -637,7 +645,7 @@ static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice
     return status;
 }
 
-/* Adds the planes of the nodes of one type in a range. */
+/* Adds to *out the number of planes of the nodes of one type in a range. */
 static ebpo_status measure_planes(ebpo_chunks *chunks, const range *r, ebpo_node_type type,
                                   ebpo_slice_size *out, ebpo_error *error)
 {
@@ -650,7 +658,7 @@ static ebpo_status measure_planes(ebpo_chunks *chunks, const range *r, ebpo_node
     return status;
 }
 
-/* Adds the sizes of the nodes of a range. */
+/* Adds to *out the numbers of leaves, faces and planes of the nodes of a range. */
 static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const range *r,
                                  ebpo_slice_size *out, ebpo_error *error)
 {
@@ -665,7 +673,7 @@ static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const ran
     return status;
 }
 
-/* Adds the sizes of a subtree, except its root, from the table. */
+/* Adds to *out the sizes of a subtree, except its root, from the table of subtrees. */
 static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_t subtree,
                                    ebpo_slice_size *out, ebpo_error *error)
 {
@@ -711,7 +719,7 @@ ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
         if (status == EBPO_OK)
             status = measure_nodes(chunks, &x, &r, out, error);
     }
-    out->shared = root->cell.level == 0 ? 0 : out->refs;
+    out->shared = root->cell.level == 0 ? 0 : out->refs; /* the whole tree owns all faces */
     return status;
 }
 

@@ -1,5 +1,6 @@
-/* Reads a complete subtree of a file into memory. Results are checked: untrusted input gives
- * EBPO_E_FORMAT, never an index out of range. Any thread may call these functions. */
+/* Reads a complete subtree of a file into memory: a slice. Values that are read are checked: wrong
+ * values in a file give EBPO_E_FORMAT, never an index out of range. Any thread may call these
+ * functions. */
 #ifndef EBPO_FORMAT_SLICE_H
 #define EBPO_FORMAT_SLICE_H
 
@@ -17,8 +18,8 @@
  * - 1. leaf_first and leaf_refs of the levels contain local indices. */
 typedef struct ebpo_slice {
     ebpo_node root;
-    /* true: the file is a subset, in which nodes with empty groups, and gray nodes on the last
-     * level, are pruned (their children are not in the file) */
+    /* true: the file is a subset. A gray node is then pruned (its children are not in the file) if
+     * the types of its children are 0, or if it is on the last level */
     bool pruned;
     int level_count;
     ebpo_level level[EBPO_LEVELS_MAX];
@@ -63,14 +64,16 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *ch
 EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file,
                                               unsigned threads, ebpo_error *error);
 
-/* Computes the sizes of a slice that ebpo_slice_read would read for this node. Reads no faces. */
+/* Numbers of items of a slice. */
 typedef struct ebpo_slice_size {
     uint64_t groups, leaves;
     uint64_t refs;      /* references of leaves to faces that an earlier leaf already lists */
     uint64_t new_faces; /* owned faces */
     uint64_t shared;    /* maximum number of shared faces */
-    uint64_t planes;    /* if planes are requested */
+    uint64_t planes;    /* planes of gray nodes, if these planes are requested; else 0 */
 } ebpo_slice_size;
+/* Computes the sizes of the slice that ebpo_slice_read would read for the node `root`. Reads no
+ * faces. */
 EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root,
                                              ebpo_slice_size *out, ebpo_error *error);
 /* Same as ebpo_slice_measure, for ebpo_slice_read_nodes. */
@@ -87,7 +90,8 @@ static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t lo
 
 /* --- set of indices --- */
 
-/* Set of distinct indices below 2^32 - 1, sorted, with the position of each in the sorted order. */
+/* Set of indices below 2^32 - 1. After sorting, gives the position of each index in the sorted
+ * order. */
 typedef struct ebpo_compact {
     /* hash table with open addressing, at most half full; a free slot has number UINT32_MAX */
     struct {

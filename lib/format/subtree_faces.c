@@ -1,8 +1,9 @@
-/* Checks the faces of a subtree against the file's table of subtrees. Only a visit of all leaves in
- * depth-first order determines where the new faces of each level begin: a wrong value in the column
- * EBPO_S_ENDS shifts the faces of one level, and no sum detects this error. Readers of a whole
- * subtree check its leaves themselves (slice.c); this check is for readers of a part of a subtree.
- * At a time, one chunk of each array and level is pinned. No memory is allocated. Source:
+/* Checks the faces of a subtree against the file's table of subtrees (/subtrees/counts). A new face
+ * of a leaf is in the list of no earlier leaf, depth first. A wrong value in the column EBPO_S_ENDS
+ * shifts the new faces of the leaves of one level, and no sum detects this error. So this check
+ * visits all leaves of the subtree in depth-first order. Readers of a whole subtree check its
+ * leaves themselves (slice.c); this check is for readers of a part of a subtree. It pins at most
+ * one chunk of each array and level at a time, and allocates no memory. Source:
  * format-spec/subtrees.md, rule RC.4. */
 #include <string.h>
 
@@ -11,13 +12,16 @@
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
 
+/* The three arrays of a level that are read. SKIP: number of faces between the new faces of the
+ * previous leaf of the level and those of a leaf. NEW: number of new faces of a leaf. */
 enum { TYPES, SKIP, NEW, LISTS };
 
+/* State of a visit of all leaves of a subtree. */
 typedef struct visit {
     ebpo_chunks *chunks;
     const ebpo_subtree_row *row;
     ebpo_held_chunk view[EBPO_LEVELS_MAX][LISTS];
-    /* for each level: next group, next leaf, and the end of the new faces of the previous leaf */
+    /* for each level: next group, next leaf, and one past the last new face of the previous leaf */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], end[EBPO_LEVELS_MAX];
     uint64_t face; /* next new face */
 } visit;
@@ -28,7 +32,7 @@ static ebpo_status faces_differ(const visit *v, ebpo_error *error)
                             "a row contradicts the faces of its subtree", error);
 }
 
-/* Reads element `at` of one of the three arrays of a level. */
+/* Reads element `at` of a level's array `list`: TYPES, SKIP or NEW. */
 static ebpo_status load_item(visit *v, int level, int list, uint64_t at, uint64_t *value,
                              ebpo_error *error)
 {
@@ -44,6 +48,7 @@ static ebpo_status load_item(visit *v, int level, int list, uint64_t at, uint64_
     return EBPO_OK;
 }
 
+/* Checks that the level's next leaf begins with the next new face. */
 static ebpo_status visit_leaf(visit *v, int level, ebpo_error *error)
 {
     uint64_t at = v->leaf[level]++, skip = 0, new_faces = 0;
@@ -57,6 +62,7 @@ static ebpo_status visit_leaf(visit *v, int level, ebpo_error *error)
     return status;
 }
 
+/* Visits the leaves in and below the level's next group. */
 static ebpo_status visit_group(visit *v, int level, ebpo_error *error)
 {
     const ebpo_info *info = &v->chunks->file->info;

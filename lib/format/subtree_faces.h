@@ -1,5 +1,5 @@
-/* Checks the faces of a subtree against the file's table of subtrees. Any thread may call this
- * function. */
+/* Checks the faces of a subtree against the file's table of subtrees (/subtrees/counts). Any thread
+ * may call this function. */
 #ifndef EBPO_FORMAT_SUBTREE_FACES_H
 #define EBPO_FORMAT_SUBTREE_FACES_H
 
@@ -8,8 +8,8 @@
 
 /* Finds the subtree that contains `node`, a node below the subtrees' roots. Checks that the new
  * faces of this subtree's leaves, in depth-first order, are the faces that the table's row states.
- * The file must have a mesh. Reads the lists of the whole subtree, but not again for subtrees that
- * were checked recently. Does nothing for counted chunks. */
+ * The file must have a mesh. Reads the lists of all leaves of the subtree, but not for a subtree
+ * that was checked recently. Does nothing for counted chunks (ebpo_chunks_make_counted). */
 EBPO_MUST_USE ebpo_status ebpo_subtree_faces_check(ebpo_chunks *chunks, const ebpo_node *node,
                                                    ebpo_error *error);
 

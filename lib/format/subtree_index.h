@@ -1,22 +1,24 @@
-/* Locates the rows of subtrees, groups, planes and faces in every array. Results are consistent
- * with the counts in the header. Any thread may call these functions. format-spec/subtrees.md. */
+/* Locates the rows of subtrees, groups, planes and faces in every array, by the table
+ * /subtrees/counts or by the index arrays. Results are consistent with the counts in the header.
+ * Any thread may call these functions. Source: format-spec/subtrees.md. */
 #ifndef EBPO_FORMAT_SUBTREE_INDEX_H
 #define EBPO_FORMAT_SUBTREE_INDEX_H
 
 #include "format/chunks.h"
 
+/* Maximum number of columns of /subtrees/counts. */
 enum { EBPO_SUBTREE_COLS = EBPO_SUBTREE_LEVELS + EBPO_SUBTREE_LEVEL_COLS * EBPO_LEVELS_MAX };
 
-/* Position of a subtree in the file's arrays, from the table /subtrees/counts. */
+/* Position of a subtree in the file's arrays, from the table /subtrees/counts (columns: EBPO_S_...
+ * of schema.h). */
 typedef struct ebpo_subtree_row {
-    uint64_t subtree;
+    uint64_t subtree;                   /* index of the subtree */
     uint64_t before[EBPO_SUBTREE_COLS]; /* sums of the columns over the preceding subtrees */
     uint64_t after[EBPO_SUBTREE_COLS];  /* sums of the columns including this subtree */
     uint64_t face, vertex;              /* first owned face and vertex of the subtree */
 } ebpo_subtree_row;
 
-/* Returns true if the table has columns for a level: it has columns for the levels below the
- * subtrees' roots. */
+/* Returns true if the table has columns for a level: if the level is below the subtrees' roots. */
 static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 {
     return file->info.subtree_level && level > file->info.subtree_level;
@@ -25,8 +27,8 @@ static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 /* Reads a subtree's row; the index must be less than the number of subtrees. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree,
                                                  ebpo_subtree_row *out, ebpo_error *error);
-/* Finds the subtree that contains item number `item` of the items that column `column` counts. More
- * exactly, finds the last subtree that has at most `item` such items before it. */
+/* Finds the subtree that contains item number `item` of the items that column `column` counts: the
+ * last subtree with at most `item` of these items before it. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
@@ -37,8 +39,8 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
 bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
 void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 
-/* Returns the number of groups of a level before the row's subtree. If `after` is true, the groups
- * of the subtree are included. */
+/* Returns the number of groups of a level before the row's subtree; if `after` is true, before the
+ * next subtree. */
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after);
 
@@ -49,14 +51,15 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
                                 ebpo_chunk_keys *keys, uint64_t *first);
 
-/* Send prefetch hints for rows of the table: for subtrees in any order, or for
+/* Send prefetch hints for the table's rows of `count` subtrees: a list in any order, or
  * [first, first + count). */
 void ebpo_subtree_table_hint(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count);
 void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t count);
 
-/* --- ranks, counted from the preceding row of an index array or of the table --- */
+/* --- ranks: sums from the preceding row of an index array or of the table, plus a count of the
+ * items since this row --- */
 
-/* Sums rows of an unsigned array; EBPO_E_FORMAT when the sum exceeds 2^62. */
+/* Sums rows of an unsigned array. Returns EBPO_E_FORMAT when the sum exceeds 2^62. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                           uint64_t row, uint64_t rows, uint64_t *sum,
                                           ebpo_error *error);
@@ -68,7 +71,7 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, 
 /* Counts the nodes of each type of a level before a group. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group,
                                             uint64_t ranks[4], ebpo_error *error);
-/* Checks that [rank, rank + count) is within the level for each type. */
+/* Checks that, for each type of node, the ranks [rank, rank + count) are within the level. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level,
                                            const uint64_t ranks[4], const uint64_t counts[4],
                                            ebpo_error *error);
@@ -86,11 +89,12 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level,
 
 /* --- prefetch hints --- */
 
-/* Collects the chunks of the subtrees [first, first + count) that are not in memory, for remote
- * files only. Includes nodes below the subtrees' roots, in the arrays that `needs` requires. With
- * EBPO_NEEDS_MESH, includes the faces that the leaves list, and with EBPO_NEEDS_MAPS the source
- * indices of these faces. Without `faces`, includes only nodes down to `last_level`. Reads the
- * table's rows. Chunks without hints are read normally. */
+/* For remote files: adds to `hints` the chunks of the subtrees [first, first + count) that are not
+ * in memory. These are the chunks with nodes below the subtrees' roots, of the arrays that `needs`
+ * requires. With EBPO_NEEDS_MESH, also the chunks of the faces that the leaves list, and with
+ * EBPO_NEEDS_MAPS the chunks of the source indices of these faces. `faces` is false: no faces, and
+ * nodes only down to `last_level`. Reads the table's rows. May omit chunks, which are then read
+ * without a hint. */
 void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, uint64_t count,
                         uint32_t needs, int last_level, bool faces);
 

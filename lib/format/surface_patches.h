@@ -1,25 +1,27 @@
-/* The part `surface` of a file: patches, and their coding (format-spec/surface.md). */
+/* Encodes, decodes and checks the patches of the part `surface` of a file. A patch is the
+ * simplified faces of a node. Source: format-spec/surface.md. */
 #ifndef EBPO_FORMAT_SURFACE_PATCHES_H
 #define EBPO_FORMAT_SURFACE_PATCHES_H
 
 #include "format/file_in.h"
 #include "geometry/cells.h"
 
-/* The grid of a patch has 2^EBPO_PATCH_GRID steps along a cell of the node. Each cell
- * EBPO_PATCH_CELLS levels below the node has at most one vertex on the border of the patch. Nodes
- * with patches are at most at level EBPO_PATCH_LEVEL. */
+/* The vertices of a patch are on a grid of 2^EBPO_PATCH_GRID steps along each axis of the node's
+ * cell. Each cell EBPO_PATCH_CELLS levels below the node has at most one vertex on the border of
+ * the patch. EBPO_PATCH_LEVEL: deepest level of nodes with patches. */
 enum { EBPO_PATCH_GRID = 10, EBPO_PATCH_CELLS = 5, EBPO_PATCH_LEVEL = 14 };
 
 /* A patch to encode. */
 typedef struct ebpo_patch_source {
     uint64_t vertex_count, triangle_count;
     const uint32_t *triangle;  /* [triangle_count][3] */
-    const int16_t *point;      /* [vertex_count][3] steps of the grid from the node's low corner */
+    const int16_t *point;      /* [vertex_count][3] steps of the grid from the lowest corner of the
+                                  node's cell */
     const double (*normal)[3]; /* [vertex_count] of any length */
     const uint8_t *colour;     /* [vertex_count][3], or NULL */
 } ebpo_patch_source;
 
-/* The rows of one patch; ebpo_patch_rows_free frees the arrays. */
+/* An encoded patch: its rows in the file's arrays. ebpo_patch_rows_free frees the arrays. */
 typedef struct ebpo_patch_rows {
     uint64_t code_bytes, code_capacity;
     uint8_t *code;
@@ -27,7 +29,7 @@ typedef struct ebpo_patch_rows {
     uint8_t *normal, *colour;
 } ebpo_patch_rows;
 
-/* Encodes a patch; gives its vertices new numbers. Returns EBPO_E_MEMORY. */
+/* Encodes a patch, with its vertices in another order. Returns EBPO_E_MEMORY if memory is short. */
 EBPO_MUST_USE ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *out,
                                             ebpo_error *error);
 void ebpo_patch_rows_free(ebpo_patch_rows *rows);
@@ -48,13 +50,13 @@ EBPO_MUST_USE bool ebpo_patch_mark_border(const uint32_t *triangle, uint64_t tri
 EBPO_MUST_USE ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
                                              const ebpo_surface *surface, ebpo_error *error);
 
-/* Returns what is wrong with the table of patches or its sums, or NULL. */
+/* Checks the table of patches against the header's counts. Returns the error's text or NULL. */
 const char *ebpo_surface_fault(const ebpo_info *info, const ebpo_surface *surface);
 
-/* Returns EBPO_E_ABSENT, with a message that the file does not have the part. */
+/* Returns EBPO_E_ABSENT, with a message that the file lacks the part `surface`. */
 ebpo_status ebpo_surface_absent(const ebpo_file *file, ebpo_error *error);
 
-/* Sets the counts of the header. */
+/* Sets the header's counts of the simplified surface. */
 void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info);
 
 #endif

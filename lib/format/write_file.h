@@ -1,4 +1,4 @@
-/* Writes a file into an existing file, and repacks files. */
+/* Writes a model (ebpo_tree) into an existing or a temporary file, and repacks files. */
 #ifndef EBPO_FORMAT_WRITE_FILE_H
 #define EBPO_FORMAT_WRITE_FILE_H
 
@@ -11,14 +11,14 @@ EBPO_MUST_USE ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char
                                                const char *shown, const ebpo_write_options *options,
                                                ebpo_error *error);
 
-/* Writes a tree to a temporary file in `folder`, opens it, and then removes its name, which libhdf5
- * needs. The name begins with `name`. */
+/* Writes a tree to a temporary file in `folder`, and opens the file. The file has a name, which
+ * begins with `name`, only until it is open, because libhdf5 needs a name for writing. */
 EBPO_MUST_USE ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *folder,
                                           const char *name, const ebpo_write_options *options,
                                           ebpo_file **out, ebpo_error *error);
 
-/* Adds parts to the tree of ebpo_repack_with. The parts must have separate checksums (colours,
- * surface). */
+/* Callback of ebpo_repack_with: adds parts to the tree. These parts must be parts with a separate
+ * checksum (colours, surface), because the content checksum must not change. */
 typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, unsigned threads, ebpo_error *error);
 /* Same as ebpo_file_repack, but calls `change` after reading the tree and before writing it.
  * `change` may be NULL. */

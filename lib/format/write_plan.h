@@ -1,4 +1,5 @@
-/* Plans a file to write: lists its arrays, and encodes their rows. */
+/* Plans a file to write: lists the file's arrays with their shapes, and encodes the rows of these
+ * arrays. */
 #ifndef EBPO_FORMAT_WRITE_PLAN_H
 #define EBPO_FORMAT_WRITE_PLAN_H
 
@@ -19,9 +20,9 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
                       uint64_t rows, uint8_t *encoded);
 
 /* Return the rows of an index array: sums of counts before each EBPO_INDEX_ROWS-th item. With these
- * sums, a reader can start in the middle of a level. Readers compare the computed sums with the
- * sums in the file. The result has at least one row, and the caller frees it. Return NULL when out
- * of memory. */
+ * sums, a reader can start in the middle of a level. A reader of a whole level also computes these
+ * sums and compares them with the sums in the file. The result has at least one row, and the caller
+ * frees it. Return NULL when out of memory. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);
