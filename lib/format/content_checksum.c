@@ -16,13 +16,16 @@
 #include "format/schema.h"
 #include "hdf5_read/coding.h"
 
-/* Number of faces in a chunk of a file without subtrees (PLAIN_FACE_ROWS), and number of chunks
- * with together as many faces in a file with subtrees (SKIPPED). */
-enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
+enum {
+    PLAIN_FACE_ROWS = 4096, /* faces in a chunk of a file without subtrees */
+    /* chunks with as many faces in a file with subtrees; of as many rows of its array
+     * /mesh/faces_index, a file without subtrees has only the first */
+    SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK
+};
 
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
 {
-    if (id == EBPO_A_FACES_INDEX && info->subtree_level)
+    if (id == EBPO_A_FACES_INDEX && info->subtree_level) /* as in a file without subtrees */
         return info->face_count > PLAIN_FACE_ROWS;
     return !ebpo_schema_is_list(id) &&
            !(ebpo_schema[id].needs & (EBPO_NEEDS_SUBTREES | EBPO_NEEDS_ATTRIBUTES));
@@ -40,7 +43,8 @@ static uint64_t load_integer(const uint8_t *at, unsigned size)
     return size == 4 ? ebpo_load32(at) : ebpo_load64(at);
 }
 
-/* Convert a zigzag code to a difference and back, modulo 2^(8 * size). */
+/* Convert a zigzag code to a difference and back, modulo 2^(8 * size). The codes 0, 1, 2, 3, 4
+ * stand for the differences 0, -1, 1, -2, 2. */
 static uint64_t decode_zigzag(uint64_t code) { return (code >> 1) ^ (0 - (code & 1)); }
 
 static uint64_t encode_zigzag(uint64_t value, unsigned size)
@@ -49,16 +53,17 @@ static uint64_t encode_zigzag(uint64_t value, unsigned size)
                      : value << 1 ^ (0 - (value >> 63));
 }
 
-/* Writes the chunk's first row to `joined`, recoded as a difference from the last row of the
- * previous chunk if `goes_on` is true (the previous chunk is part of the same larger chunk). Stores
- * the values of the chunk's last row. */
-static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool goes_on,
+/* Recodes the first row of a chunk of differences, so that it continues the previous chunk. Writes
+ * this row to `joined`: if `continues` is true (both chunks are parts of the same larger chunk in a
+ * file without subtrees), as the difference from the last row of the previous chunk. Keeps the
+ * values of the chunk's last row in digest->last. */
+static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool continues,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {
     unsigned size = shape->element_size, cols = shape->cols ? shape->cols : 1;
     for (unsigned k = 0; k < cols; k++) {
         const uint8_t *column = bytes + k * size;
-        uint64_t sum = 0, from = goes_on ? digest->last[k] : 0,
+        uint64_t sum = 0, from = continues ? digest->last[k] : 0,
                  code = encode_zigzag(decode_zigzag(load_integer(column, size)) - from, size);
         for (uint64_t i = 0; i < rows; i++)
             sum += decode_zigzag(load_integer(column + i * cols * size, size));
@@ -70,7 +75,7 @@ static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool
     }
 }
 
-/* Adds only the rows of the index that a file without subtrees has. */
+/* Adds only the rows of /mesh/faces_index that a file without subtrees has. */
 static void add_faces_index(ebpo_array_digest *digest, uint64_t row, uint64_t rows,
                             size_t row_bytes, const uint8_t *bytes)
 {
@@ -86,6 +91,7 @@ void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebp
     size_t row_bytes = ebpo_shape_row_bytes(shape);
     uint32_t full = ebpo_full_chunk_rows(shape->rows, shape->cols, shape->element_size);
     uint8_t joined[3 * sizeof(uint64_t)];
+    /* arrays of differences, which restart at each chunk */
     bool deltas = id == EBPO_A_VERTICES || id == EBPO_A_BORDER_POINTS ||
                   id == EBPO_A_VERTEX_SOURCE || id == EBPO_A_FACE_SOURCE;
     if (info->subtree_level && id == EBPO_A_FACES_INDEX) {
@@ -140,8 +146,9 @@ void ebpo_content_free(ebpo_content *content)
 
 /* --- the checksum of the part `attributes`: over values, independent of their storage --- */
 
-enum { PIECE = 1 << 16 };
+enum { PIECE = 1 << 16 }; /* bytes that are encoded at a time */
 
+/* Adds the entry of array `number` of /attributes, which has `count` values of `size` bytes. */
 static void digest_values(ebpo_content *content, int number, ebpo_workspace *workspace,
                           const uint8_t *values, uint64_t count, size_t size)
 {

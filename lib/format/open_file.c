@@ -1,9 +1,9 @@
 /* Opens a file: reads the header, and checks that every array is present in the shape that the
- * counts in the header require. No memory is allocated by a count before head_facts.c has checked
- * it. The decoded size is limited relative to the file size. The second part opens files that other
- * programs have rewritten with another HDF5 layout. libhdf5 copies such a file in a separate
- * process with limits of memory, time and bytes written. The copy is opened like any other file.
- * Source: format-spec/README.md, sections 4 and 5; docs/develop/threats.md. */
+ * counts in the header require. head_facts.c checks each count before memory is allocated by it.
+ * The decoded size of the arrays is limited relative to the file size. The second part opens files
+ * that other programs have rewritten with another HDF5 layout. libhdf5 copies such a file in a
+ * separate process with limits of memory, time and bytes written. The copy is opened like any other
+ * file. Source: format-spec/README.md, sections 4 and 5; docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -28,8 +28,8 @@
 #include "mesh/import.h"
 
 /* Returns true if the format allows this coding for the array. Values of another coding would be
- * decoded wrongly. Files of version 1.0 and the first files of 1.1 also have `delta` at leaf_skip.
- */
+ * decoded wrongly. In files of version 1.0 and the first files of 1.1, the coding of leaf_skip is
+ * called `delta` instead of `skips`. */
 static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gates)
 {
     if (gates)
@@ -38,8 +38,9 @@ static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gat
            (spec == &ebpo_schema[EBPO_A_LEAF_SKIP] && strcmp(word, "delta") == 0);
 }
 
-/* Returns true if the array's type and columns are those of the schema. Sets a->shape to the shape
- * of the decoded values, and a->gates (true: faces stored as gates, face_gates.h). */
+/* Returns true if the array's type and columns are those of the schema. a->shape: shape in the
+ * file, which is replaced by the shape of the decoded values. Sets a->gates (true: faces stored as
+ * gates, face_gates.h). */
 static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -55,8 +56,8 @@ static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
     return fits;
 }
 
-/* Returns the rows of a full chunk of the arrays with subtrees whose chunks have a fixed number of
- * rows. Returns 0 for other arrays. */
+/* Returns the number of rows of a full chunk, if the format fixes this number: in files with
+ * subtrees, for some arrays. Otherwise returns 0. */
 static uint32_t block_rows(const ebpo_info *info, ebpo_array_id id)
 {
     if (!info->subtree_level)
@@ -84,7 +85,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
         snprintf(a->path, sizeof a->path, "%s", ebpo_schema_former(id));
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
-    /* offsets of several chunks are read later from the index of remote files, or from the list */
+    /* for remote files and files with a chunk directory, locates only a single chunk now */
     uint64_t most = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
@@ -122,6 +123,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     return EBPO_OK;
 }
 
+/* Reads the HDF5 attributes of the levels' groups. */
 static ebpo_status open_levels(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_head_object id;
@@ -136,12 +138,14 @@ static ebpo_status open_levels(ebpo_file *file, ebpo_head *head, ebpo_error *err
     return status;
 }
 
-static ebpo_status open_group(ebpo_head *head, const char *path, bool wanted, ebpo_error *error)
+/* Checks that a group exists, if `required` is true. */
+static ebpo_status check_group(ebpo_head *head, const char *path, bool required, ebpo_error *error)
 {
     ebpo_head_object id;
-    return wanted ? ebpo_head_open_group(head, path, &id, error) : EBPO_OK;
+    return required ? ebpo_head_open_group(head, path, &id, error) : EBPO_OK;
 }
 
+/* Checks that an array has the same HDF5 filters as the first array. */
 static ebpo_status check_pipeline(const ebpo_file *file, const ebpo_array_in *a, ebpo_error *error)
 {
     return !a->present || a->shape.pipeline == file->level_array[0][EBPO_A_TYPES].shape.pipeline
@@ -165,8 +169,8 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* Returns true if a list of all chunks has an attribute with the size of this file. A program that
- * rewrites the file keeps the attribute, so that the size is wrong, or drops the attribute. */
+/* Returns true if a list of all chunks has an attribute with the correct size of the file. If
+ * another program has rewritten the file, the attribute is wrong or missing. */
 static bool states_size(const ebpo_file *file, ebpo_head *head, const char *path)
 {
     ebpo_head_object id;
@@ -176,8 +180,8 @@ static bool states_size(const ebpo_file *file, ebpo_head *head, const char *path
            bytes == file->info.file_bytes;
 }
 
-/* Opens a list of all chunks. *valid is false if another program has rewritten the file: then the
- * list describes other chunks. */
+/* Opens a list of all chunks. *valid: false if the list does not state the file's size and its own
+ * offset. Another program has then rewritten the file, and the list describes other chunks. */
 static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *valid,
                              ebpo_error *error)
 {
@@ -198,9 +202,9 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
     return EBPO_OK;
 }
 
-/* Opens the chunk checksums. Ignores them, even if they are damaged, if they do not state the size
- * of the file (another program has rewritten the file). Ignores them also in files without filters,
- * because the last bytes of such chunks are no checksum. */
+/* Opens the list of chunk checksums. Ignores the list in files without HDF5 filters, because the
+ * last bytes of their chunks are not a checksum. Also ignores a list that does not state the size
+ * of the file, even if the list is damaged, because another program has then rewritten the file. */
 static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
@@ -219,19 +223,19 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     ebpo_info *info = &file->info;
     info->index_level = info->level_count;
     info->file_bytes = file->in.source.size;
-    ebpo_status status = open_group(head, "/subtrees", info->subtree_level != 0, error);
+    ebpo_status status = check_group(head, "/subtrees", info->subtree_level != 0, error);
     if (status == EBPO_OK && info->subtree_level)
         status = open_list(file, head, EBPO_A_CHUNK_DIRECTORY, &file->has_directory, error);
     if (status == EBPO_OK)
         status = open_checksums(file, head, error);
     if (status == EBPO_OK)
-        status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
+        status = check_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
-        status = open_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
+        status = check_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
     if (status == EBPO_OK)
-        status = open_group(head, "/border", info->parts & EBPO_PART_BORDER, error);
+        status = check_group(head, "/border", info->parts & EBPO_PART_BORDER, error);
     if (status == EBPO_OK)
-        status = open_group(head, "/surface", info->parts & EBPO_PART_SURFACE, error);
+        status = check_group(head, "/surface", info->parts & EBPO_PART_SURFACE, error);
     for (int level = 0; level < info->level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
             const ebpo_array_in *a = &file->level_array[level][id];
@@ -250,17 +254,18 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* Discards the location of the chunk index if it is impossible, as in files that other programs
- * have rewritten. */
+/* Discards the stated location of HDF5's chunk indexes if it is impossible, as in files that other
+ * programs have rewritten. The location is only used for prefetching. */
 static void discard_bad_index(ebpo_info *info, uint64_t size)
 {
-    enum { INDEX_BYTES_MAX = 64 << 20 };
+    enum { INDEX_BYTES_MAX = 64 << 20 }; /* so that a false value does not cause long requests */
     if (info->chunk_index_offset > size ||
         info->chunk_index_bytes > size - info->chunk_index_offset ||
         info->chunk_index_bytes > INDEX_BYTES_MAX)
         info->chunk_index_offset = info->chunk_index_bytes = 0;
 }
 
+/* Reads and checks the header: HDF5 attributes and the shapes of all arrays. */
 static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_head_object root;
@@ -283,8 +288,9 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
     return status == EBPO_OK ? open_arrays(file, head, error) : status;
 }
 
-/* Compares the content checksum of a file without chunk checksums, such as `h5repack -f NONE`
- * writes. Called before any data are returned, because nothing else detects a changed chunk. */
+/* Compares the content checksum of a file whose chunks have no checksum, such as `h5repack -f NONE`
+ * writes; does nothing for other files. Called before any data are returned, because nothing else
+ * detects a changed chunk of such a file. */
 static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
 {
     return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE
@@ -292,8 +298,8 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns true if the file begins like HDF5 or another known type: the error that occurred already
- * names this type. */
+/* Returns true if the file begins like HDF5 (byte 0x89) or another known type. The error that
+ * opening has reported then already names this type. */
 static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
     return (size && begin[0] == 0x89) || ebpo_wrong_kind_of_file(begin, size);
@@ -316,14 +322,14 @@ static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size
  */
 static const char *other_kind(const uint8_t *begin, uint64_t size)
 {
-    return size == 0                      ? "an empty file; get a fresh copy of it"
+    return size == 0                      ? "an empty file; get a fresh copy of the file"
            : head_names_kind(begin, size) ? NULL
-           : begin[0] == '{'
+           : begin[0] == '{' /* JSON */
                ? "JSON; use 'ebpo scene' for a scene, or a command that reads a catalogue"
                : NULL;
 }
 
-/* Replaces the error if the file has another known type. */
+/* If the file is of another known type, replaces the error by one that names this type. */
 static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
 {
     enum { BEGIN = 4096 };
@@ -334,7 +340,7 @@ static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *er
     const ebpo_import_format *mesh = mesh_format(begin, size, file->in.source.size);
     if (mesh)
         return ebpo_fail_file(error, status, file->in.shown,
-                              "is not an .ebpo.h5 file, but %s; make one of it with 'ebpo convert'",
+                              "is not an .ebpo.h5 file, but %s; convert it with 'ebpo convert'",
                               mesh->called);
     const char *kind = other_kind(begin, size);
     return kind ? ebpo_fail_file(error, status, file->in.shown, "is not an .ebpo.h5 file, but %s",
@@ -342,7 +348,7 @@ static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *er
                 : status;
 }
 
-/* Opens a source and takes ownership of it, also on failure. */
+/* Opens a file from a source. Takes ownership of the source, also on failure. */
 static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
                                uint64_t max_expansion, ebpo_error *error)
 {
@@ -377,12 +383,13 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     return status;
 }
 
+/* Checks a caller's source and opens it. */
 static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint64_t max_expansion,
                               ebpo_file **out, ebpo_error *error)
 {
     ebpo_source own = EBPO_SOURCE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
-    /* a newer caller's struct has unknown members: use only known members */
+    /* a source with unknown members (of a newer ebpo_source) is refused, but must be closed */
     if (status == EBPO_E_UNSUPPORTED && source->close)
         source->close(source->user);
     if (status != EBPO_OK)
@@ -421,9 +428,9 @@ ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
 
 ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error)
 {
-    ebpo_open_options any = EBPO_OPEN_OPTIONS_INIT;
-    any.max_expansion = UINT64_MAX;
-    return ebpo_open_with(path, &any, out, error);
+    ebpo_open_options no_limit = EBPO_OPEN_OPTIONS_INIT;
+    no_limit.max_expansion = UINT64_MAX;
+    return ebpo_open_with(path, &no_limit, out, error);
 }
 
 ebpo_status ebpo_open_url(const char *url, const ebpo_http_options *http, ebpo_file **out,
@@ -446,7 +453,8 @@ ebpo_status ebpo_open_memory(const void *data, uint64_t size, const char *name, 
     *out = NULL;
     if (!data && size)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "memory",
-                              "no bytes; pass the file's bytes and their number");
+                              "the pointer to the data is NULL; pass the file's bytes and their "
+                              "number");
     ebpo_source source = ebpo_source_of_memory(data, size);
     return open_source(out, &source, name ? name : "memory", 0, error);
 }
@@ -497,14 +505,18 @@ ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(e
 
 /* --- files that other programs have rewritten --- */
 
-enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
+enum {
+    PIECE = 4 << 20,         /* bytes of one read of a download */
+    BYTES_A_SECOND = 4 << 20 /* of the file: least speed of copying, for the limit of time */
+};
 
-/* A temporary file that libhdf5 opens by its name. The name is removed when the file is open. */
+/* A temporary file that libhdf5 opens by its name. fd: -1 if there is no file. */
 typedef struct temporary {
     int fd;
     char name[PATH_MAX];
 } temporary;
 
+/* Creates an empty temporary file in TMPDIR. */
 static ebpo_status make_temporary(temporary *t, const char *shown, ebpo_error *error)
 {
     const char *folder = getenv("TMPDIR");
@@ -587,7 +599,7 @@ static ebpo_status find_from(const char *path, const ebpo_http_options *http, co
     return status;
 }
 
-/* Opens the copy by its descriptor, which the caller keeps, and checks its content checksum. */
+/* Opens the copy by its descriptor `to`, which stays open, and checks its content checksum. */
 static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_options *o,
                              ebpo_file **out, ebpo_error *error)
 {
@@ -611,7 +623,7 @@ static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_option
     return status;
 }
 
-/* Returns true if the copy does not have `object`, the HDF5 object that an error names. */
+/* Returns true if the copy does not have the HDF5 object `object`, which an error names. */
 static bool copy_lacks(int copy, const char *shown, const char *object)
 {
     char name[32];
@@ -634,10 +646,10 @@ static bool copy_lacks(int copy, const char *shown, const char *object)
 static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, ebpo_file **out,
                                 ebpo_error *error)
 {
-    enum { HEAD_MORE = 64 << 20 }; /* bytes that the copy may have beyond twice the file's size */
+    enum { EXTRA_BYTES = 64 << 20 }; /* the copy has at most twice the file's size plus this */
     char redacted[EBPO_SHOWN_BYTES];
     const char *shown = ebpo_is_url(path) ? ebpo_url_redact(path, redacted, sizeof redacted) : path;
-    ebpo_process_limits limits = { o->memory_bytes, HEAD_MORE, o->seconds };
+    ebpo_process_limits limits = { o->memory_bytes, EXTRA_BYTES, o->seconds };
     temporary fetched = { .fd = -1 }, copy = { .fd = -1 };
     const char *from = NULL;
     uint64_t bytes = 0;
@@ -645,7 +657,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     if (status == EBPO_OK)
         status = make_temporary(&copy, shown, error);
     limits.file_bytes += 2 * bytes;
-    if (!limits.seconds) /* decoding and encoding take about 1/20 second for a MiB */
+    if (!limits.seconds) /* ample: decoding and encoding a MiB take about 1/20 second */
         limits.seconds = 60 + (unsigned)(bytes / BYTES_A_SECOND);
     ebpo_error copy_error = EBPO_ERROR_INIT, open_error = EBPO_ERROR_INIT;
     if (status == EBPO_OK)

@@ -1,8 +1,8 @@
-/* Reads whole parts of a file into memory: a level, the mesh, source indices, the mesh
- * in the source's order, and the whole tree. Levels and meshes are checked during reading, so that
- * every index in the result is valid. Threads decode chunks directly into the result, which may be
- * in a workspace on disk. The last functions of this file recompute a file's checksums and compare
- * them with the stated ones. */
+/* Reads whole parts of a file into memory: a level, the mesh, source indices (positions in the mesh
+ * that was converted), the mesh in the source's order, and the whole tree. Levels and meshes are
+ * checked during reading, so that every index in the result is valid. Threads decode chunks
+ * directly into the result, which may be in a workspace on disk. The last functions of this file
+ * recompute a file's checksums and compare them with the stated checksums. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,9 +20,10 @@
 #include "format/write_plan.h"
 #include "hdf5_read/coding.h"
 
-/* Converts the skips in leaf_first to first faces. A new face of a leaf is a face that no earlier
- * leaf lists. A skip is the number of faces between the last new face of the previous leaf of the
- * level and the first new face of this leaf. */
+/* Converts leaf_first from skips, as in the file, to the first new face of each leaf. A new face of
+ * a leaf is a face that no earlier leaf lists. A skip is the number of faces between the last new
+ * face of the previous leaf of the level and the first new face of this leaf. `number`: number of
+ * the level, also in the functions below. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -39,11 +40,13 @@ static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *l
     return EBPO_OK;
 }
 
+/* References of a level's leaves that several threads decode. */
 typedef struct refs_job {
     const ebpo_file *file;
     int number; /* number of the level */
     ebpo_level *level;
-    const uint64_t *index; /* sums of leaf_index, three for each EBPO_INDEX_ROWS leaves */
+    /* [blocks][3] sums before each EBPO_INDEX_ROWS-th leaf; column 1 counts the references */
+    const uint64_t *index;
 } refs_job;
 
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
@@ -63,12 +66,13 @@ bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
     return true;
 }
 
+/* Decodes the references of the leaves in blocks [begin, end) of EBPO_INDEX_ROWS leaves. */
 static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
     refs_job *j = context;
     (void)worker;
-    uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
+    uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1]; /* next reference */
     uint64_t leaf_end =
         end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
     for (; leaf < leaf_end; at += j->level->leaf_ref_count[leaf++])
@@ -82,8 +86,8 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Compares an index array of the file with the sums `computed`. Does nothing if the array is absent
- * or needs one of the parts `without`. */
+/* Compares an index array of the file with the sums `computed`. Does nothing if the file lacks the
+ * array, or if the array belongs to one of the parts `without`, which are not read. */
 static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
                                int number, uint64_t without, const uint64_t *computed,
                                ebpo_error *error)
@@ -105,7 +109,7 @@ static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const eb
     return status;
 }
 
-/* Checks that the counts of references add up, and converts the skips. */
+/* Checks that the counts of references add up, and converts the skips in leaf_first. */
 static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -121,8 +125,8 @@ static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *l
     return add_up_skips(file, number, level, error);
 }
 
-/* Decodes references. The sums of leaf_index locate the references of each EBPO_INDEX_ROWS leaves,
- * so several threads can decode them. */
+/* Decodes references, with several threads: the sums of leaf_index locate the references of each
+ * block of EBPO_INDEX_ROWS leaves. */
 static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *level,
                                  const ebpo_read_options *options, ebpo_error *error)
 {
@@ -142,6 +146,7 @@ static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *
     return status;
 }
 
+/* Checks the index arrays of types and of gray nodes. */
 static ebpo_status check_indexes(const ebpo_file *file, int number, const ebpo_level *level,
                                  uint64_t without, ebpo_error *error)
 {
@@ -158,6 +163,7 @@ static ebpo_status check_indexes(const ebpo_file *file, int number, const ebpo_l
     return status;
 }
 
+/* Reads the level's arrays that are in ebpo_level. */
 static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *level,
                                const ebpo_read_options *options, ebpo_error *error)
 {
@@ -233,15 +239,17 @@ void ebpo_tree_free(ebpo_tree *tree)
 
 static ebpo_status part_absent(const ebpo_file *file, const char *part, ebpo_error *error)
 {
-    return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                          "the file was written without its %s; build it again with that part",
-                          part);
+    return ebpo_fail_file(
+        error, EBPO_E_ABSENT, file->in.shown,
+        "the file was written without its %s; build the file again with this part", part);
 }
 
+/* A mesh that several threads decode. */
 typedef struct mesh_job {
     const ebpo_file *file;
     ebpo_mesh *mesh;
-    uint64_t *faces_index; /* NULL: a single chunk */
+    uint64_t *faces_index; /* [chunks of faces] number of vertices that the faces before the chunk
+                              use; NULL: a single chunk */
 } mesh_job;
 
 static ebpo_status decode_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,
@@ -339,7 +347,8 @@ static ebpo_status copy_options(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Sends prefetch hints for the root's arrays that these needs require, and for the attributes. */
+/* Sends prefetch hints for the root's arrays that `needs` requires and, if `attributes` is true,
+ * for the attributes. */
 static void hint_root(const ebpo_file *file, uint32_t needs, bool attributes)
 {
     ebpo_hints hints = EBPO_HINTS_INIT(file);
@@ -393,8 +402,8 @@ static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t li
                : status;
 }
 
-/* Returns a limit that all source indices of faces are below: faces that a repair added have
- * indices after those of the source. */
+/* Returns one past the largest possible source index of a face. Faces that a repair added have
+ * indices from source_face_count on. */
 static uint64_t face_limit(const ebpo_info *info)
 {
     return info->source_face_count + info->repair_record.added_faces;
@@ -431,6 +440,7 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
+/* Reads all parts of the file into the tree. */
 static ebpo_status read_parts(const ebpo_file *file, ebpo_tree *out, const ebpo_read_options *read,
                               ebpo_error *error)
 {
@@ -477,14 +487,17 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Computes the position of each item in the order of source indices (positions in the source mesh).
- * The indices are distinct and below `limit`. The caller frees *position. Uses one bit for each
- * possible index, because a header may state a limit far above the number of items; the system
- * allocates no memory for pages of zeros. */
+/* Computes the position of each item in the order of source indices. The indices are distinct and
+ * below `limit`. The caller frees *position. Uses one bit for each possible index, and not more,
+ * because a header may state a limit far above the number of items; the system allocates no memory
+ * for pages of zeros. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **position, ebpo_error *error)
 {
-    enum { WORDS = 8 /* words of 64 bits for each entry of `before` */ };
+    enum {
+        WORDS = 8
+    }; /* words of `bits` for each entry of `before`, the number of set bits before
+          these words */
     uint64_t words = (limit <= UINT32_MAX ? limit : UINT64_C(1) << 32) / 64 + 1;
     uint64_t *bits = ebpo_alloc_zero(words, sizeof *bits);
     uint32_t *before = ebpo_alloc(words / WORDS + 1, sizeof *before),
@@ -618,14 +631,16 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     return status;
 }
 
-/* --- recomputing checksums: a thread takes a whole array, as its chunks must come in order --- */
+/* --- recomputing checksums: each array is read by one thread, as its chunks must come in order ---
+ */
 
-/* Digest of one array whose chunks are read. */
+/* Digest of an array that is being read. */
 typedef struct array_job {
     const ebpo_info *info;
     ebpo_array_digest digest;
 } array_job;
 
+/* Digests of all arrays, which several threads compute. */
 typedef struct content_job {
     const ebpo_file *file;
     const ebpo_array_in *array[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS];
@@ -659,8 +674,8 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-/* Computes checksum `which` (EBPO_DIGEST_...) from the digests of the arrays, and compares it with
- * the stated checksum, the attribute `name`. */
+/* Computes checksum `which` (EBPO_DIGEST_...) from the digests of its arrays. Compares the result
+ * with `stated`, the value of the attribute `name`. */
 static ebpo_status compare_digest(content_job *j, int which, const uint8_t stated[32],
                                   const char *name, ebpo_error *error)
 {
@@ -688,7 +703,8 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         return status;
     content_job j = { .file = file, .one_thread = read };
     j.one_thread.threads = 1;
-    /* arrays of a remote file in file order; otherwise the largest arrays first */
+    /* order of reading: a remote file from its begin to its end; a local file backwards, because
+     * threads should begin with the largest arrays, which are at the end */
     bool remote = ebpo_input_prefetches(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present && ebpo_content_has(&file->info, (ebpo_array_id)id))

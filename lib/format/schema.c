@@ -1,9 +1,9 @@
 /* Defines the arrays of a file as a table in memory, and the constraints on these arrays.
  * array_table.inc lists each array and each count once. This file derives tables of paths, shapes,
- * codings and needs from the list, for the writer, the reader and subsets. The second part checks
- * the arrays of a tree from a file (EBPO_E_FORMAT), or from a caller who writes the tree
- * (EBPO_E_ARGUMENT). Each error names the level, the array and the constraint. Source:
- * format-spec/README.md, sections 6 and 9. */
+ * codings and needs (conditions for the presence of an array) from the list, for the writer, the
+ * reader and subsets. The second part checks the arrays of a tree from a file (EBPO_E_FORMAT), or
+ * from a caller who writes the tree (EBPO_E_ARGUMENT). Each error names the level, the array and
+ * the constraint. Source: format-spec/README.md, sections 6 and 9. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -88,10 +88,11 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                            .about = "" },
 };
 
+/* A count of a level: a row LEVEL_COUNT of array_table.inc. */
 typedef struct count_spec {
-    const char *name; /* attribute name */
-    uint32_t needs;
-    uint16_t in_level, in_summary; /* offsets */
+    const char *name;              /* HDF5 attribute of the level's group */
+    uint32_t needs;                /* EBPO_NEEDS_... */
+    uint16_t in_level, in_summary; /* offset in ebpo_level and in ebpo_level_summary */
 } count_spec;
 
 static const count_spec level_counts[EBPO_COUNTS] = {
@@ -107,8 +108,9 @@ static const count_spec level_counts[EBPO_COUNTS] = {
                    "ebpo_level." #field ": another type than in its row of array_table.inc");
 #include "format/array_table.inc"
 
-/* Checks the sizes in the file. Either values are narrowed from 32 bits, or they have one size.
- * leaf_skip is an exception, as it contains differences. */
+/* Checks the element sizes in the file. If several sizes are allowed, the type in memory has 32
+ * bits. If one size is allowed, it is that of the type in memory, except for leaf_skip, which
+ * contains differences. */
 #define LEVEL_ARRAY(ID, name, field, type, stored, ...)                               \
     _Static_assert((stored) & ((stored)-1)                                            \
                        ? sizeof(type) == 4                                            \
@@ -116,8 +118,8 @@ static const count_spec level_counts[EBPO_COUNTS] = {
                    #name ": its sizes in the file do not match its type in memory");
 #include "format/array_table.inc"
 
-/* All members of ebpo_level: the pointers and counts of array_table.inc, and the members listed
- * here. Compared with ebpo_level by size. */
+/* The pointers and counts of array_table.inc, and all other members of ebpo_level. The size of this
+ * struct shows whether ebpo_level has a member that is missing here. */
 struct all_of_level {
 #define LEVEL_ARRAY(ID, name, field, type, ...) type *field;
 #define LEVEL_COUNT(ID, attribute, field, ...)  uint64_t field;
@@ -145,7 +147,7 @@ const char *ebpo_schema_former(ebpo_array_id id)
                                           : NULL;
 }
 
-/* Appends the names of the columns of /subtrees/counts. */
+/* Writes the names of the columns of /subtrees/counts, in the order of EBPO_S_... (schema.h). */
 static void subtree_columns(const ebpo_info *info, char names[EBPO_COLUMNS_BYTES])
 {
     static const char *const of_level[EBPO_SUBTREE_LEVEL_COLS] = {
@@ -211,7 +213,7 @@ static uint64_t subtree_count(const ebpo_info *info)
     return info->level[info->subtree_level].gray_count;
 }
 
-/* Returns the number of chunks of the array of subtree counts. */
+/* Returns the number of chunks of /subtrees/counts. */
 static uint64_t subtree_chunks(const ebpo_info *info)
 {
     uint64_t rows = ebpo_subtree_rows(info);
@@ -308,6 +310,7 @@ void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count)
         level->group_count = count;
 }
 
+/* Returns true if an element of `size` bytes has this value. */
 static bool is_value(const void *element, size_t size, int8_t value)
 {
     switch (size) {
@@ -369,6 +372,7 @@ ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level)
     return out;
 }
 
+/* Returns the advice at the end of an error message. */
 static const char *next_step(const ebpo_check *check)
 {
     return check->as == EBPO_E_FORMAT ? "get a fresh copy of the file" : "the tree was not written";
@@ -385,6 +389,8 @@ ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *arra
     return ebpo_fail_at(error, check->as, check->shown, path, -1, "%s; %s", what, next_step(check));
 }
 
+/* Checks the types of a level's groups against the counts in the header. A group with types 0 is
+ * that of a pruned node (whose children are not in the file). */
 static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, int level,
                                const ebpo_level *arrays, ebpo_error *error)
 {
@@ -442,6 +448,7 @@ static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info
     return EBPO_OK;
 }
 
+/* Checks the numbers of planes, and the plane codes, of the gray nodes or of the leaves. */
 static ebpo_status check_planes(const ebpo_check *check, int level, const char *counts_name,
                                 const uint8_t *counts, uint64_t nodes, const char *planes_name,
                                 const uint32_t *planes, uint64_t plane_count, ebpo_error *error)
@@ -486,18 +493,22 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
     return EBPO_OK;
 }
 
+/* Checks a leaf's references: faces that an earlier leaf lists first, in ascending order. `first`:
+ * the leaf's first new face (no earlier leaf lists it). */
 static ebpo_status check_refs(const ebpo_check *check, int level, const uint32_t *refs,
                               uint64_t count, uint64_t first, ebpo_error *error)
 {
     for (uint64_t k = 0; k < count; k++)
         if (refs[k] >= first || (k && refs[k] <= refs[k - 1]))
-            return ebpo_check_fail(check, level, "leaf_refs",
-                                   "a leaf's references are not ascending, or one is not to a face "
-                                   "before its new faces",
-                                   error);
+            return ebpo_check_fail(
+                check, level, "leaf_refs",
+                "a leaf's references are not ascending, or a reference is not to "
+                "a face before the leaf's new faces",
+                error);
     return EBPO_OK;
 }
 
+/* Checks the new faces and the references of a level's leaves. */
 static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, int level,
                                 const ebpo_level *arrays, ebpo_error *error)
 {
@@ -552,6 +563,7 @@ ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int
     return status;
 }
 
+/* State of a visit of all leaves of a tree in depth-first order. */
 typedef struct walk {
     const ebpo_check *check;
     const ebpo_tree *tree;
@@ -597,6 +609,7 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
                            uint64_t count, uint64_t limit, ebpo_error *error)
 {
     limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* source indices have 32 bits */
+    /* a bit for each index below the limit */
     uint64_t *used = ebpo_alloc_zero(limit / 64 + 1, sizeof *used);
     if (!used)
         return ebpo_fail_memory(error, limit / 8);
