@@ -1,11 +1,11 @@
 /* Computes the layout of a file's chunks, for the writer: the number of rows in the chunks of each
  * array, the order of chunks, and the chunks that each subtree needs. A subtree begins at a gray
  * node (a node with children) of a fixed level. Levels near the root are stored whole. Deep levels
- * are stored subtree by subtree. One subtree is one range of bytes, except for the chunks of faces
- * and vertices that it shares with earlier subtrees. These shared chunks are listed in
- * /subtrees/shared_chunks. /subtrees/counts contains the numbers of items of each subtree. All
- * computations use integers, because the bytes of a file depend on them. Source:
- * format-spec/subtrees.md. */
+ * are stored subtree by subtree, so that a reader finds the data of a subtree in few ranges of the
+ * file. A subtree also uses chunks of faces and vertices that belong to earlier subtrees; these
+ * shared chunks are listed in /subtrees/shared_chunks. /subtrees/counts contains the numbers of
+ * items of each subtree. All computations use integers, so that the bytes of a file are the same on
+ * every machine. Source: format-spec/subtrees.md. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,12 +22,13 @@
 
 /* --- chunks of the mesh that a subtree shares with earlier subtrees --- */
 
-/* A subtree's owned items: faces [face, face_end), and vertices from `vertex` on. */
+/* A subtree's owned items: the faces [face, face_end), which no leaf before the subtree lists, and
+ * the vertices from `vertex` on, which these faces use first. */
 typedef struct owned_range {
     uint64_t face, face_end, vertex;
 } owned_range;
 
-/* Lists the shared chunks of each subtree in turn. A block is a chunk of /mesh/faces or
+/* State of listing the shared chunks of each subtree in turn. A block is a chunk of /mesh/faces or
  * /mesh/vertices. A round is the work on one subtree. */
 typedef struct shared_blocks {
     uint32_t *face_round, *vertex_round; /* [blocks] last round in which a block was listed */
@@ -37,15 +38,16 @@ typedef struct shared_blocks {
 } shared_blocks;
 
 enum {
-    FIRST_LEVELS = 5,    /* levels 0 to 5 are stored whole, at any level of the subtrees' roots */
-    LEAVES_OF_DEEP = 64, /* deep: at least one leaf for each 64 faces of the mesh */
-    CHUNK_FACES = 16384, /* a chunk of a level corresponds to about this number of faces */
-    CHUNK_LEAST = 256,   /* bytes of a chunk of a level */
-    CHUNK_MAX = 32768,
-    MAP_ROWS = 2048, /* rows of a chunk of these arrays */
-    FACES_INDEX_ROWS = 512,
-    SHARED_ROWS = 4096,
-    ATTRIBUTE_ROWS = 2048
+    FIRST_LEVELS = 5,    /* levels 0 to 5 are always stored whole */
+    LEAVES_OF_DEEP = 64, /* a deep level has at least one leaf for each 64 faces of the mesh */
+    CHUNK_FACES = 16384, /* a chunk of a level has the nodes for about this number of faces */
+    CHUNK_LEAST = 256,   /* least bytes of a chunk of a level */
+    CHUNK_MAX = 32768,   /* most bytes of a chunk of a level */
+    /* rows of a chunk of other arrays */
+    MAP_ROWS = 2048,        /* /maps/vertex_source */
+    FACES_INDEX_ROWS = 512, /* /mesh/faces_index */
+    SHARED_ROWS = 4096,     /* /subtrees/shared_chunks */
+    ATTRIBUTE_ROWS = 2048   /* arrays of /attributes */
 };
 
 /* Returns the last level that is stored whole in a file with subtrees. */
@@ -54,8 +56,9 @@ static int last_whole_level(const ebpo_info *info)
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
 }
 
-/* Returns the first deep level. The levels between the last whole level and this level have chunks
- * sorted by subtree, level by level; the chunks of all deep levels are sorted together. */
+/* Returns the first deep level. The chunks of all deep levels are sorted by subtree together. The
+ * chunks of the levels between the last whole level and the first deep level are sorted by subtree
+ * level by level. */
 static int first_deep_level(const ebpo_info *info)
 {
     int level = last_whole_level(info) + 1;
@@ -65,10 +68,10 @@ static int first_deep_level(const ebpo_info *info)
     return level;
 }
 
-/* Returns the power of two with the smallest ratio to the number of rows for CHUNK_FACES faces: the
- * first power that is not less than that number of rows divided by the square root of 2. Compares
- * squares of integers, because the bytes of a file depend on the result. There are at most 2^40
- * rows, and both sides are below 2^64 before squaring. */
+/* Returns the power of two that is nearest, in ratio, to the average number x of rows for
+ * CHUNK_FACES faces: the least power of two that is at least x / sqrt(2). Compares squares of
+ * integers instead of roots, because the bytes of a file depend on the result. There are at most
+ * 2^40 rows, so both sides are below 2^64 before squaring. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
     uint64_t wanted = rows * CHUNK_FACES, found = 1;
@@ -80,7 +83,8 @@ static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
     }
 }
 
-/* Returns the number of rows in a chunk in a file with subtrees; UINT64_MAX: all rows. */
+/* Returns the number of rows in a chunk in a file with subtrees, or UINT64_MAX for as many rows as
+ * a chunk can have. */
 static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t row_bytes)
 {
@@ -108,7 +112,7 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size)
 {
-    uint32_t most = ebpo_full_chunk_rows(rows, cols, element_size);
+    uint32_t most = ebpo_full_chunk_rows(rows, cols, element_size); /* in a chunk */
     if (!info->subtree_level)
         return most;
     uint64_t wanted = wanted_rows(info, id, level, rows, element_size * (cols ? cols : 1));
@@ -119,9 +123,9 @@ uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, 
                                     bool kept)
 {
     static const struct {
-        const char *path;
+        const char *path; /* of an array, or of a group (ends with "/") */
         uint32_t rows;
-        bool fixed;
+        bool fixed; /* the format fixes the number of rows */
     } known[] = {
         { "/mesh/faces", EBPO_FACE_BLOCK, true },
         { "/mesh/vertices", EBPO_VERTEX_BLOCK, true },
@@ -165,7 +169,7 @@ static void shared_blocks_free(shared_blocks *blocks)
     free(blocks->vertex_block);
 }
 
-/* Lists a block in `blocks`, once in each round. */
+/* Lists a block in `blocks`, unless it is already listed in this round. */
 static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
                        uint64_t *count)
 {
@@ -175,7 +179,7 @@ static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_
     blocks[(*count)++] = (uint32_t)block;
 }
 
-/* Lists the blocks of the shared vertices of a face. */
+/* Lists the blocks of the shared vertices (those that earlier faces use first) of a face. */
 static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own, uint64_t face)
 {
     for (int k = 0; k < 3; k++) {
@@ -212,8 +216,9 @@ static int compare_descending(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-/* Sorts the blocks in descending order and writes the distance of each block from `from` to `out`,
- * except for blocks behind `from`, which the subtree owns. Returns the number of distances. */
+/* Sorts the blocks in descending order. Writes to `out` the number of blocks from each of these
+ * blocks to block `from`. Omits blocks after `from`, which the subtree owns. Returns the number of
+ * values in `out`. */
 static uint64_t sort_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
 {
     uint64_t written = 0;
@@ -225,9 +230,10 @@ static uint64_t sort_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
     return written;
 }
 
-/* Writes the listed blocks to `out`, blocks of faces first: each as the distance from the block of
- * the subtree's first owned face or vertex. Adds the numbers of blocks to the sums `before` the
- * subtree, which gives the sums `after` it. Clears the lists. */
+/* Writes the listed blocks to `out`, blocks of faces first. A block is written as the number of
+ * blocks from it to the block of the subtree's first owned face or vertex. Sets the sums `after`
+ * the subtree: the sums `before` the subtree plus the numbers of written blocks. Clears the lists.
+ */
 static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_t *out,
                                const uint64_t *before, uint64_t *after)
 {
@@ -240,12 +246,14 @@ static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_
     b->round++;
 }
 
-/* Default number of faces in a subtree; minimum number of faces of a mesh for subtrees by default.
- */
-enum { DEFAULT_FACES = 1024, LEAST_FACES = 131072 };
-/* Pages of the workspace are released after this number of subtrees. A subtree's rows in all arrays
- * take tens of kilobytes. */
-enum { SUBTREES_A_TIME = 128 };
+enum {
+    DEFAULT_FACES = 1024, /* default number of faces in a subtree */
+    LEAST_FACES =
+        131072, /* a file has subtrees by default if its mesh has at least as many faces */
+    /* subtrees after which pages of the workspace are released; the rows of a subtree in all arrays
+     * take tens of kilobytes */
+    SUBTREES_A_TIME = 128
+};
 
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
 {
@@ -278,13 +286,14 @@ typedef struct counting {
     const ebpo_info *info;
 } counting;
 
-/* Returns the sums of all columns before a subtree. */
+/* Returns the sums of all columns over the subtrees before a subtree. */
 static uint64_t *row_of(const counting *c, uint64_t subtree)
 {
     return c->sums->before + subtree * c->sums->cols;
 }
 
-/* Returns the sum of one column of a level before a subtree. `what`: EBPO_S_... */
+/* Returns the sum of one column of a level over the subtrees before a subtree. `what`: EBPO_S_GRAY
+ * and so on. */
 static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned what)
 {
     return row_of(c, subtree)[ebpo_subtree_column(c->info, level, what)];
@@ -297,7 +306,8 @@ static uint64_t first_group(const counting *c, uint64_t subtree, int level)
                                                : level_sum(c, subtree, level - 1, EBPO_S_GRAY);
 }
 
-/* Counts the items of a subtree's leaves of one level, which have the ranks [leaf, end). */
+/* Adds to the columns of a level, `sum`, the items of a subtree's leaves, which have the ranks
+ * [leaf, end). */
 static void count_leaves(const counting *c, const ebpo_level *level, uint64_t leaf, uint64_t end,
                          uint64_t *sum)
 {
@@ -311,7 +321,8 @@ static void count_leaves(const counting *c, const ebpo_level *level, uint64_t le
     sum[EBPO_S_ENDS] = level->leaf_first[end - 1] + level->leaf_new[end - 1];
 }
 
-/* Computes the columns of one level from the columns of the previous level. */
+/* Computes the columns of level `number` for all subtrees, from the columns of the previous level.
+ */
 static void count_level(const counting *c, int number)
 {
     const ebpo_level *level = &c->tree->level[number];
@@ -356,7 +367,7 @@ static void count_faces(const counting *c)
     for (uint64_t i = 0; i < c->sums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         owned_faces(c, i, &first, &end);
-        first = end < at || first == UINT64_MAX ? at : first; /* the subtree has no leaves */
+        first = end < at || first == UINT64_MAX ? at : first; /* if the subtree has no leaves */
         end = end < first ? first : end;
         to[EBPO_S_FACES_BEFORE] = from[EBPO_S_FACES_BEFORE] + first - at;
         to[EBPO_S_FACES] = from[EBPO_S_FACES] + end - first;
@@ -364,8 +375,8 @@ static void count_faces(const counting *c)
     }
 }
 
-/* Adds the number of vertices that faces [*face, end) use first to *used, the number of vertices
- * that earlier faces use. */
+/* Adds to *used, the number of vertices that faces before *face use, the number of vertices that
+ * the faces [*face, end) use first. Moves *face to `end`. */
 static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *used)
 {
     EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)
@@ -373,6 +384,7 @@ static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end
     *face = end;
 }
 
+/* Counts the vertices that the faces of count_faces use first. */
 static void count_vertices(const counting *c)
 {
     uint64_t face = 0, used = 0;
@@ -411,7 +423,7 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
         shared_blocks_use(&blocks, &c->tree->mesh, &own);
         if (!ebpo_grow(&c->sums->shared, &c->sums->shared_capacity,
                        c->sums->shared_count + blocks.face_blocks + blocks.vertex_blocks +
-                           1, /* never NULL */
+                           1, /* so that `shared` is not NULL without blocks */
                        sizeof *c->sums->shared))
             status = ebpo_fail_memory(error, c->sums->shared_count * sizeof *c->sums->shared);
         else
@@ -463,8 +475,8 @@ ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree
     }
     if (status == EBPO_OK && !split_sums(&c))
         status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "a subtree has more than 4,294,967,295 items of a kind; write the file "
-                           "without subtrees");
+                           "a subtree has more than 4,294,967,295 nodes, planes or references in a "
+                           "level; write the file without subtrees");
     return status;
 }
 
@@ -507,11 +519,13 @@ static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *i
     return low;
 }
 
+/* State of ordering the chunks. */
 typedef struct ordering {
     const ebpo_plan *plan;
     ebpo_chunk_order *out;
 } ordering;
 
+/* Appends all chunks of an array to the order. */
 static void add_array(ordering *o, unsigned array)
 {
     const ebpo_array_out *a = &o->plan->array[array];
@@ -532,7 +546,7 @@ static int by_subtree(const void *a, const void *b)
 
 /* Selects the arrays whose chunks come next in the file. */
 typedef struct choice {
-    int first_level, last_level; /* for arrays of levels */
+    int first_level, last_level; /* range of levels, for arrays of levels */
     enum {
         WHOLE,           /* all arrays of the levels */
         TOP_INDEXES,     /* index arrays of the levels, and other arrays that locate subtrees */
@@ -605,6 +619,8 @@ static void add_by_subtree(ordering *o, const choice *c)
         qsort(o->out->chunk + begin, o->out->count - begin, sizeof *o->out->chunk, by_subtree);
 }
 
+/* Orders the chunks of a file with subtrees: first the chunks that locate subtrees, then nodes from
+ * coarse to deep levels, and the mesh, source indices and attributes. */
 static void order_subtrees(ordering *o)
 {
     const ebpo_info *info = &o->plan->info;

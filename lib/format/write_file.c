@@ -1,14 +1,14 @@
-/* Writes a file: ebpo_tree_write. ebpo_file_repack reads a file and writes it again with other
- * options. Specification: format-spec/hdf5-messages.md and subtrees.md.
+/* Writes a model to a file (ebpo_tree_write). Also reads a file and writes it again with other
+ * options (ebpo_file_repack). Source: format-spec/hdf5-messages.md and subtrees.md.
  *
  * The headers (groups, array headers, attributes) come first in the file. To determine their size,
  * the same file is first written in memory, with tiny chunks. Then several threads encode and
- * compress WINDOW_CHUNKS chunks, a window, at a time. The chunks are appended in the order of
- * chunk_layout.c: first the chunks with which a reader locates a subtree, then all others.
+ * compress chunks, WINDOW_CHUNKS at a time (a window). The chunks are appended in the order of
+ * chunk_layout.c: first the chunks with which a reader locates a subtree, then all other chunks.
  *
- * All chunk indexes of HDF5 form one metadata block. It is stored immediately before the first
- * chunk that belongs to an array with several chunks. The list of chunk checksums and the list of
- * chunk sizes are the last chunks. Content checksums are computed while chunks are compressed. */
+ * All chunk indexes of HDF5 form one metadata block, immediately before the first chunk that
+ * belongs to an array with several chunks. The list of chunk checksums and the list of chunk sizes
+ * are the last chunks. Content checksums are computed while chunks are compressed. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,8 +41,10 @@ typedef enum chunk_list {
     CHUNK_LIST_COUNT
 } chunk_list;
 
+/* The headers of a file, while the file is written. */
 typedef struct file_headers {
-    ebpo_plan *plan; /* write_headers and headers_begin_index set the handles of its arrays */
+    ebpo_plan
+        *plan; /* write_headers and headers_begin_index set the handles of the plan's arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
     ebpo_array_out list[CHUNK_LIST_COUNT]; /* a list without rows is not written */
@@ -72,7 +74,7 @@ static bool has_index(const ebpo_plan *plan)
     return false;
 }
 
-/* Describes the array of a list with this number of rows; 0: the list is not written. */
+/* Describes the array of a list with `rows` rows; 0: the list is not written. */
 static void plan_list(file_headers *h, chunk_list list, ebpo_array_id id, uint64_t rows)
 {
     ebpo_array_out *a = &h->list[list];
@@ -96,6 +98,7 @@ static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     plan_list(h, CHUNK_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
+    /* other rows of the list of sizes: HDF5's chunk indexes, the list of checksums */
     plan_list(h, CHUNK_SIZES, EBPO_A_CHUNK_DIRECTORY,
               plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0);
 }
@@ -129,8 +132,8 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
 }
 
 /* Creates a group in the root group, with space for links to all arrays that the group may have.
- * Does nothing if the file does not have the arrays of this group (`need`: EBPO_NEEDS_MESH and so
- * on). */
+ * `need`: condition for the arrays of this group (EBPO_NEEDS_MESH and so on). Does nothing if the
+ * file does not meet this condition. */
 static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
                                    const char *about, ebpo_error *error)
 {
@@ -157,7 +160,8 @@ static ebpo_status headers_put_validity(file_headers *h, chunk_list list, uint64
     return status == EBPO_OK ? ebpo_h5_put_count(&h->out, id, "offset", offset, error) : status;
 }
 
-/* Creates an array with its attributes. Writes its first chunk if `first` is not NULL. */
+/* Creates an array with its HDF5 attributes. Writes the array's first chunk if `first` is not NULL.
+ */
 static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_chunk *first,
                               ebpo_error *error)
 {
@@ -181,15 +185,17 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
     return status;
 }
 
-/* Writes all headers and the first chunk. If a metadata block is the last block of the file, HDF5
- * enlarges the block instead of using its free space. So the first chunk is written early, before
- * the attributes of the first array. The chunk is then stored after the block. The block cannot
- * grow any more, so all later headers use its free space. */
+/* Writes all headers and the first chunk. The headers are one metadata block of `head_bytes` bytes.
+ * While this block is the last block of the file, HDF5 enlarges the block instead of using its free
+ * space. So the first chunk is written early, before the attributes of the first array: it is
+ * stored after the block, which then cannot grow, and all later headers use the block's free space.
+ */
 static ebpo_status write_headers(file_headers *h, const char *path, const char *shown,
                                  uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
     h->out.codec_level = h->codec_level;
+    /* the number of links of the root group: /levels, /mesh, /maps, and what the file has */
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
                        3 + (h->list[CHUNK_CHECKSUMS].shape.rows != 0) +
@@ -256,10 +262,12 @@ static ebpo_status headers_lay_out(file_headers *h, const char *path, const char
 }
 
 /* Measures headers and HDF5's chunk indexes by writing the same file in memory, with chunks of one
- * byte. */
+ * byte. Sets h->head_bytes and h->index_bytes. */
 static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
+    /* capacity: more than headers and indexes take; headers, all: measured bytes without and with
+     * the indexes */
     uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
              headers = 0, all = 0;
     ebpo_status status = write_headers(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
@@ -274,8 +282,8 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &all, error);
     ebpo_h5_discard(&h->out);
-    /* 8 more bytes: the last checksum of the headers may end in zero bytes, which
-     * ebpo_h5_head_used does not count */
+    /* 8 bytes more, because the last checksum of the headers may end in zero bytes, which
+     * ebpo_h5_head_used does not count; then the next multiple of 8 */
     h->head_bytes = (headers + 8 + 7) / 8 * 8;
     if (plan->count == 1)
         h->head_bytes += ALONE_BYTES;
@@ -284,9 +292,9 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     return status;
 }
 
-/* Opens the file again with metadata blocks of index_bytes, so that all chunk indexes of HDF5 are
- * in one block. HDF5 allocates the block when the first chunk of an array with several chunks is
- * written. */
+/* Opens the file again with metadata blocks of h->index_bytes bytes, so that all chunk indexes of
+ * HDF5 are in one block. HDF5 allocates this block when the first chunk of an array with several
+ * chunks is written. */
 static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 {
     headers_close(h);
@@ -304,15 +312,15 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Maximum number of chunks of a window. A window is the chunks that are in memory together: all
- * together at most 8 MiB before compression, and at most 8 MiB compressed. */
+/* Maximum number of chunks of a window. A window is the chunks that are in memory together. They
+ * take at most 8 MiB before compression, and about 8 MiB compressed. */
 enum { WINDOW_CHUNKS = 128 };
 
 /* A chunk of the window: its position, and its bytes before and after compression. */
 typedef struct window_chunk {
     const ebpo_array_out *array;
-    uint64_t chunk;
-    uint8_t *raw, *stored;
+    uint64_t chunk;        /* number of the chunk in the array */
+    uint8_t *raw, *stored; /* before and after compression */
     size_t raw_bytes, stored_bytes;
 } window_chunk;
 
@@ -329,16 +337,19 @@ typedef struct writer {
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
-    uint64_t *checksum_row; /* [chunks] rows of the list of chunk checksums, if it is written */
+    uint64_t
+        *checksum_row; /* [chunks] rows of the list of chunk checksums, if the list is written */
     /* [arrays of the plan] index of the array's first row in checksum_row */
     uint64_t *first_checksum;
-    uint64_t *size_row; /* rows of the list of chunk sizes, if it is written */
-    uint64_t size_rows; /* number of these rows so far */
+    uint64_t
+        *size_row; /* [size_rows] rows so far of the list of chunk sizes, if the list is written
+                    */
+    uint64_t size_rows;
     uint64_t top_bytes; /* end of the chunks with which a reader locates a subtree */
     uint64_t index_at;  /* offset of HDF5's chunk indexes; 0: none, or not yet written */
 } writer;
 
-/* Encodes the rows of chunks begin .. end - 1 of the window. Pads the last chunk of an array with
+/* Encodes the rows of the chunks [begin, end) of the window. Pads the last chunk of an array with
  * zeros. */
 static ebpo_status encode_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
@@ -360,8 +371,8 @@ static ebpo_status encode_chunks(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* Adds the chunks of the window to the digests of their arrays. Adds the digest of each array whose
- * last chunk is in the window to the content checksums. */
+/* Adds the chunks of the window to the digests of their arrays. If an array's last chunk is in the
+ * window, the array's digest is complete: adds it to the array's content checksum. */
 static void digest_window(writer *w)
 {
     for (unsigned i = 0; i < w->used; i++) {
@@ -385,7 +396,8 @@ static void digest_window(writer *w)
     }
 }
 
-/* Compresses faces as gates. The last chunk's padding is zeros, not gates. */
+/* Compresses a chunk of faces that are stored as gates (face_gates.h). Pads the last chunk with
+ * zeros after the rows of gates. */
 static ebpo_status compress_gates(window_chunk *s, ebpo_chunk_coder *coder, int level)
 {
     ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
@@ -445,7 +457,7 @@ static void add_size_row(writer *w, uint32_t number, uint64_t bytes)
     w->size_row[w->size_rows++] = ebpo_list_row(number, bytes);
 }
 
-/* Adds a chunk to the lists, and its size to the total (chunk_bytes). Called in file order, before
+/* Adds a chunk to the lists, and the chunk's size to w->chunk_bytes. Called in file order, before
  * the chunk is written. */
 static void list_chunk(writer *w, const window_chunk *s)
 {
@@ -568,7 +580,7 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Encodes the first chunk, which is written with the headers. */
+/* Encodes the file's first chunk, which is written with the headers. */
 static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
 {
     window_chunk *s = &w->window[0];
@@ -581,7 +593,7 @@ static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_
     return status;
 }
 
-/* Writes the content checksums of the parts. */
+/* Writes the content checksum, and those of the parts with a separate checksum. */
 static ebpo_status put_digests(writer *w, ebpo_error *error)
 {
     uint8_t digest[32];
@@ -606,13 +618,11 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
     return status;
 }
 
-/* Writes the whole file. Another version of libhdf5 may place its metadata elsewhere in the file.
- * Then this function does not fail, and readers accept the file, but tests that compare bytes fail.
- */
+/* Writes the whole file. If another version of libhdf5 places its metadata elsewhere in the file,
+ * this function does not fail and readers accept the file, but tests that compare bytes fail. */
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    /* large enough, because the first chunk has two bytes before it is encoded */
-    uint8_t first[256];
+    uint8_t first[256]; /* the first chunk is small: the root's type, two bytes before encoding */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
@@ -645,15 +655,16 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
         options->codec_level > ebpo_pipeline_facts_of((ebpo_pipeline)options->codec)->level_max)
         return ebpo_fail_file(
             error, EBPO_E_ARGUMENT, path,
-            "no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0");
+            "unknown codec, or invalid codec level; levels are 1 to 22 for zstd, 1 to 9 for "
+            "deflate, and 0 for none");
     if ((unsigned)options->chunk_checksums > EBPO_CHECKSUMS_NONE)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, path, "chunk_checksums: invalid value %u",
                               (unsigned)options->chunk_checksums);
     return EBPO_OK;
 }
 
-/* Writes a file under a temporary name and renames it to `path`. If `publish` is NULL, writes
- * directly to `path`. `shown`: name for messages. */
+/* Writes a file. If `publish` is NULL, writes directly to `path`, else to a temporary name, which
+ * is renamed to `path` at the end. `shown`: name for messages. */
 static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
                               ebpo_publish *publish, const ebpo_write_options *options,
                               ebpo_error *error)
@@ -733,9 +744,9 @@ ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *folder, const cha
 
 /* --- repacking --- */
 
-/* Checks that the written file has the content checksums of `from`, the file that was read. If they
- * are equal, also checks the content of the written file. If they differ, returns an error, after
- * checking the content of `from` to find the reason. */
+/* Checks that the written file states the same content checksums as `from`, the file that was read.
+ * If the checksums are equal, also checks the content of the written file. If they differ, checks
+ * the content of `from` to find the reason, and returns an error. */
 static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                  const ebpo_read_options *read, ebpo_error *error)
 {
@@ -757,8 +768,8 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                ? status
                : ebpo_fail_file(error, EBPO_E_UNSUPPORTED, from->in.shown,
                                 "repacking would change the content checksum, although the "
-                                "stored checksum is correct; another program has stored the "
-                                "arrays in ways that ebpo does not write. Nothing was written");
+                                "stored checksum is correct, because another program has stored "
+                                "arrays in a way that ebpo does not write; nothing was written");
 }
 
 ebpo_status ebpo_repack_with(const ebpo_file *file, const char *path, const ebpo_read_options *read,

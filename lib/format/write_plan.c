@@ -1,8 +1,8 @@
 /* Plans a file to write: lists its arrays with shapes and codings, and encodes rows of an array to
  * bytes. The plan refers to the caller's checked tree. The plan owns only derived arrays: index
- * arrays, counts and sums of subtrees, and codings of attributes. In index arrays, counts of an
- * absent part are zeros. Encoding depends only on the plan and the rows, so threads encode chunks
- * independently. */
+ * arrays, counts and sums of subtrees, and codings of attributes. In an index array, the sums that
+ * belong to an absent part are 0. Encoding a chunk depends only on the plan and the chunk's rows,
+ * so threads encode chunks independently. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@
 #include "geometry/level_nodes.h"
 #include "hdf5_read/coding.h"
 
-/* Allocates an index array for `count` items. */
+/* Allocates an index array over `count` items. */
 static uint64_t *make_index(uint64_t count, unsigned cols)
 {
     return ebpo_alloc_zero((count / EBPO_INDEX_ROWS + 1) * cols, sizeof(uint64_t));
@@ -60,7 +60,7 @@ uint64_t *ebpo_index_gray(const ebpo_level *level)
 uint64_t *ebpo_index_leaves(const ebpo_level *level)
 {
     uint64_t *index = make_index(level->leaf_count, 3);
-    uint64_t end = 0, refs = 0, planes = 0;
+    uint64_t end = 0, refs = 0, planes = 0; /* end: one past the last new face so far */
     EBPO_FOR_ITEMS(level->workspace, i, 0, index ? level->leaf_count : 0) {
         if (i % EBPO_INDEX_ROWS == 0) {
             index[i / EBPO_INDEX_ROWS * 3] = end;
@@ -78,15 +78,16 @@ uint64_t *ebpo_index_leaves(const ebpo_level *level)
 
 /* --- attributes: checks --- */
 
-/* Checks the rows of attribute array i. Returns the error's text or NULL; check_names returns the
- * same. */
+/* Checks the rows of attribute array i. Returns the error's text or NULL. */
 static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all, uint64_t i)
 {
     const ebpo_attribute *a = &all->array[i];
     bool vertex = ebpo_attribute_is_of(a, "vertex"), face = ebpo_attribute_is_of(a, "face");
     if (a->rows == 0 ||
         ((vertex || face) && a->rows != (vertex ? info->vertex_count : info->face_count)))
-        return "an attribute array and the mesh have different numbers of rows";
+        return "an attribute array of vertices or faces does not have a row for each of them, or "
+               "an "
+               "attribute array has no rows";
     for (uint64_t k = 0; k < i; k++)
         if (strcmp(all->array[k].element, a->element) == 0 && all->array[k].rows != a->rows)
             return "two attribute arrays of one element have different numbers of rows";
@@ -95,6 +96,7 @@ static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all,
     return NULL;
 }
 
+/* Checks the names of an attribute array. Returns the error's text or NULL. */
 static const char *check_names(const ebpo_attribute *a)
 {
     uint32_t words = 1;
@@ -109,10 +111,10 @@ static const char *check_names(const ebpo_attribute *a)
 
 /* --- attributes: codings, chosen by the compressed size of a few samples --- */
 
-enum { SAMPLES = 8, SAMPLE_BYTES = 16384 };
+enum { SAMPLES = 8, SAMPLE_BYTES = 16384 /* of each sample, at most */ };
 
-/* Returns the compressed size of a sample. `columns`: the values are encoded as differences within
- * columns. */
+/* Returns the compressed size of a sample; 0 on failure. `columns`: true: encodes the values as
+ * differences within columns; false: as plain values. */
 static uint64_t sample_bytes(ebpo_chunk_coder *coder, const uint8_t *values, size_t size,
                              bool floats, uint64_t rows, uint32_t cols, bool columns)
 {
@@ -144,7 +146,8 @@ static bool columns_are_less(ebpo_chunk_coder *coder, const uint8_t *values, siz
     return columns < plain;
 }
 
-/* Chooses the codings of the values and of the lists' items. */
+/* Chooses the codings of an attribute array: of the values, and of the items of lists. The ends of
+ * lists ascend, so they are always stored as differences. */
 static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
                            ebpo_chunk_coder *coder)
 {
@@ -156,7 +159,8 @@ static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
         a->ends && count && columns_are_less(coder, a->values, bytes, floats, count, 1);
 }
 
-/* Checks attributes to write (EBPO_E_ARGUMENT). Determines their codings, ranges and checksum. */
+/* Checks the attributes to write (EBPO_E_ARGUMENT). Sets their codings, ranges and checksum in the
+ * plan. */
 static ebpo_status attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error *error)
 {
     const ebpo_attributes *all = plan->attributes;
@@ -196,6 +200,7 @@ static uint64_t attributes_planned(const ebpo_plan *plan)
     return plan->attributes ? 1 + 2 * plan->attributes->count : 0;
 }
 
+/* Adds array `number` of /attributes to the plan. `size`: bytes of an element. */
 static void add_attribute_array(ebpo_plan *plan, int number, const void *values, uint64_t rows,
                                 uint32_t cols, unsigned size, ebpo_pipeline pipeline)
 {
@@ -213,11 +218,13 @@ static void add_attribute_array(ebpo_plan *plan, int number, const void *values,
     a->shape.chunk_rows = ebpo_rows_of_chunk(&plan->info, EBPO_A_ATTRIBUTE, 0, rows, cols, size);
 }
 
+/* Adds the one or two arrays of attribute array n to the plan. */
 static void add_one(ebpo_plan *plan, uint64_t n, ebpo_pipeline pipeline)
 {
     const ebpo_attribute *a = &plan->attributes->array[n];
     unsigned bytes = ebpo_attribute_bytes(a->type);
     uint64_t items = a->ends ? ebpo_attribute_value_count(a) : 0;
+    /* flat: the array has one dimension */
     bool flat = a->ends || (a->columns == 1 && a->list == EBPO_ATTRIBUTE_NO_LIST);
     if (a->ends)
         add_attribute_array(plan, ebpo_values_number(n), a->ends, a->rows, 0, sizeof *a->ends,
@@ -246,7 +253,7 @@ static void attributes_add_arrays(ebpo_plan *plan, ebpo_pipeline pipeline)
         add_one(plan, i, pipeline);
 }
 
-/* Returns true if the array contains floating-point numbers. */
+/* Returns true if an array of /attributes, not the header, contains floating-point numbers. */
 static bool floats_in(const ebpo_plan *plan, const ebpo_array_out *array)
 {
     const ebpo_attribute *a = &plan->attributes->array[(array->level - 1) / 2];
@@ -336,6 +343,8 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
 
 /* --- encoding rows --- */
 
+/* Encodes rows of leaf_skip: the number of faces between the new faces of the previous leaf of the
+ * level and those of each leaf. */
 static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint64_t row,
                          uint64_t rows, uint8_t *encoded)
 {
@@ -347,8 +356,8 @@ static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint6
     }
 }
 
-/* Returns the last row of leaf_index for which the references of the next leaf begin at or before
- * `ref`. */
+/* Returns the block of EBPO_INDEX_ROWS leaves that contains reference number `ref`: the last row of
+ * leaf_index that counts at most `ref` references before its first leaf. */
 static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t ref)
 {
     uint64_t low = 0, high = (leaves - 1) / EBPO_INDEX_ROWS;
@@ -362,6 +371,8 @@ static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t r
     return low;
 }
 
+/* Encodes rows of leaf_refs. Each reference is stored as its distance below the previous one, minus
+ * 1; the first of a leaf, below the leaf's first new face. */
 static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uint64_t row,
                         uint64_t rows, uint8_t *encoded)
 {
@@ -369,7 +380,7 @@ static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uin
     uint64_t leaf = block * EBPO_INDEX_ROWS, before = leaf_index[block * 3 + 1], end = row + rows;
     for (; before < end; before += level->leaf_ref_count[leaf++]) {
         uint64_t count = level->leaf_ref_count[leaf];
-        /* `refs` are ascending, and are stored from the last to the first */
+        /* `refs` ascend, but are stored from the last to the first */
         const uint32_t *refs = level->leaf_refs + before;
         for (uint64_t k = row > before ? row - before : 0; k < count && before + k < end; k++) {
             uint64_t above = k ? refs[count - k] : level->leaf_first[leaf];
@@ -398,7 +409,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         break;
     case EBPO_A_FACES:
         used = plan->faces_index[row / array->shape.chunk_rows];
-        /* cannot fail, as index_faces has checked the faces */
+        /* does not fail, as index_faces has checked the faces */
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, encoded);
         break;
     case EBPO_A_BORDER_POINTS:
@@ -497,7 +508,8 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
             tree->mesh.face_count != info->face_count)
             return ebpo_check_fail(
                 check, -1, "/mesh",
-                "the mesh is missing or its counts differ from those in the tree's info", error);
+                "the mesh is missing, or its counts differ from the counts in the tree's info",
+                error);
         info->double_coordinates = tree->mesh.xyz64 != NULL;
     }
     if (info->parts & EBPO_PART_MAPS && (!tree->vertex_source || !tree->face_source))
@@ -506,8 +518,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     if (info->level_count < 1 || info->level_count > EBPO_LEVELS_MAX || info->grid_level < 0 ||
         info->max_level < 0 || (unsigned)info->rule > EBPO_RULE_POSITIVE)
         return ebpo_check_fail(check, -1, "/levels",
-                               "there are no levels, too many levels, or inconsistent facts",
-                               error);
+                               "level_count, grid_level, max_level or rule is out of range", error);
     if (!texts_ok(info))
         return ebpo_check_fail(check, -1, "/",
                                "a name, unit, CRS or date is not UTF-8 without control characters",
@@ -563,7 +574,8 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Computes faces_index, and checks that the vertices are in the order of their first use. */
+/* Computes plan->faces_index, the number of vertices that the faces before each chunk use. Checks
+ * that the vertices are in the order of their first use. */
 static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = &plan->tree->mesh;
@@ -605,8 +617,9 @@ static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uin
     return low >= INT8_MIN && high <= INT8_MAX ? 1 : low >= INT16_MIN && high <= INT16_MAX ? 2 : 4;
 }
 
-/* Returns the size of an element in the file. Values of arrays with several allowed sizes have 32
- * bits in memory (schema.c). */
+/* Returns the size of an element in the file: the only allowed size, or the smallest allowed size
+ * that is sufficient for all values. In the second case, values have 32 bits in memory (schema.c).
+ */
 static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const void *values)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -620,7 +633,7 @@ static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const
                            : narrow_unsigned(level, values, count);
 }
 
-/* Sets the array's values and the size of an element in memory and in the file. */
+/* Sets the array's values, and the size of an element in memory and in the file. */
 static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -652,6 +665,7 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
     a->shape.element_size = stored_size(plan, a, a->values);
 }
 
+/* Returns the HDF5 filters of a codec. */
 static ebpo_pipeline pipeline_of(ebpo_codec codec)
 {
     _Static_assert((int)EBPO_CODEC_ZSTD == (int)EBPO_PIPELINE_ZSTD &&
