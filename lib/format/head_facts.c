@@ -267,7 +267,7 @@ static const char *check_border(const ebpo_info *info)
 
 static const char *check_surface(const ebpo_info *info)
 {
-    const uint64_t most = UINT64_C(1) << 40; /* so that sums of sizes do not overflow */
+    const uint64_t most = UINT64_C(1) << 40; /* format-spec/surface.md, RL.1 */
     if (!(info->parts & EBPO_PART_SURFACE))
         return NULL;
     bool possible = info->surface_patches > 0 && info->surface_patches <= info->surface_triangles &&

@@ -255,10 +255,10 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
 }
 
 /* Discards the stated location of HDF5's chunk indexes if it is impossible, as in files that other
- * programs have rewritten. The location is only used for prefetching. */
+ * programs have rewritten. The location only makes reading faster. */
 static void discard_bad_index(ebpo_info *info, uint64_t size)
 {
-    enum { INDEX_BYTES_MAX = 64 << 20 }; /* so that a false value does not cause long requests */
+    enum { INDEX_BYTES_MAX = 64 << 20 }; /* limited, because the whole range is read at once */
     if (info->chunk_index_offset > size ||
         info->chunk_index_bytes > size - info->chunk_index_offset ||
         info->chunk_index_bytes > INDEX_BYTES_MAX)

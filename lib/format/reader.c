@@ -112,8 +112,8 @@ void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
 {
     if (!ebpo_hints_wanted(e) || !array->present || e->failed)
         return;
-    /* not tried again after a failure, because each attempt may make several requests; the later
-     * read reports the error */
+    /* not tried again after a failure, because each attempt makes all retries of a failed request;
+     * the later read reports the error */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
@@ -175,7 +175,7 @@ static void join_ranges(ebpo_hints *e, uint64_t gap)
  * system call. */
 static void hint_system(ebpo_hints *e)
 {
-    enum { BETWEEN = 16 << 10 }; /* bytes; not longer to read than a system call takes */
+    enum { BETWEEN = 16 << 10 }; /* bytes between ranges that are joined */
     join_ranges(e, BETWEEN);
     ebpo_input_advise(&ebpo_reader_own(e->file)->in, e->range, e->count);
 }

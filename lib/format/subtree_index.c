@@ -1,14 +1,14 @@
-/* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees. For
- * a subtree, it computes the sums of all counts before the subtree: from the sums that the file
- * stores for some rows, and the counts of the rows in between. It caches recently used rows.
+/* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees,
+ * /subtrees/counts, which has a row of counts for each subtree. It computes the sums of all counts
+ * before a subtree: from the sums in /subtrees/index, which has a row for each chunk of the table,
+ * and from the rows since this chunk's first row. It caches recently used rows.
  *
  * The second part computes ranks: the numbers of planes, faces and nodes of each type before a
  * node. In levels below the subtrees' roots, counting begins at the row of the node's subtree. In
  * other levels, counting begins at a row of an index array, which has a row for every 4,096 items.
  * Results are checked against the counts in the header.
  *
- * The last part sends prefetch hints for subtrees. Source: format-spec/subtrees.md.
- */
+ * The last part sends prefetch hints for subtrees. Source: format-spec/subtrees.md. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -54,8 +54,8 @@ static uint64_t column_maximum(const ebpo_file *file, unsigned column, bool *exa
     }
 }
 
-/* Reads the sums before a chunk of rows. If `chunk` is one past the last chunk, sets the sums to
- * the upper bounds (column_maximum). */
+/* Reads the sums before a chunk of the table. If `chunk` is one past the last chunk, sets the sums
+ * to the upper bounds (column_maximum). */
 static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols, uint64_t *sums,
                                ebpo_error *error)
 {
@@ -79,13 +79,14 @@ static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t col
     return status;
 }
 
-/* A chunk of rows of the table. */
+/* A chunk of the table. */
 typedef struct subtree_counts {
     ebpo_held_chunk view;
     uint32_t cols;
     uint64_t begin[EBPO_SUBTREE_COLS], end[EBPO_SUBTREE_COLS]; /* sums before and after the chunk */
 } subtree_counts;
 
+/* Returns one count of a subtree in the chunk. */
 static uint32_t count_at(const subtree_counts *c, uint64_t subtree, uint32_t column)
 {
     return ebpo_load32(c->view.rows + ((subtree - c->view.begin) * c->cols + column) * 4);
@@ -98,9 +99,9 @@ static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
         sums[k] += count_at(c, subtree, k);
 }
 
-/* Opens the chunk of rows that contains a subtree. Checks that the sums before the chunk, plus the
- * counts in the chunk, are the sums after the chunk. After the last chunk, some sums have only an
- * upper bound (column_maximum). */
+/* Opens the chunk of the table that contains a subtree's row. Checks that the sums before the
+ * chunk, plus the counts in the chunk, are the sums after the chunk. After the last chunk, some
+ * sums have only an upper bound (column_maximum). */
 static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c,
                                ebpo_error *error)
 {
@@ -120,8 +121,8 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
         add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
     /* The sums of the columns EBPO_S_SHARED_FACES and EBPO_S_SHARED_VERTICES must add up to the
-     * number of rows of /subtrees/shared_chunks. For the last chunk, c->end of each of these
-     * columns is this number. */
+     * number of rows of /subtrees/shared_chunks. For the last chunk, sums_before sets c->end of
+     * both columns to this number. */
     if (last &&
         sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] != c->end[EBPO_S_SHARED_FACES])
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
@@ -137,7 +138,7 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     return status;
 }
 
-/* Computes the row of a subtree in the chunk. */
+/* Computes the row of a subtree whose counts are in the chunk. */
 static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row *out)
 {
     out->subtree = subtree;
@@ -146,9 +147,10 @@ static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row 
         add_row(c, i, out->before);
     memcpy(out->after, out->before, sizeof out->after);
     add_row(c, subtree, out->after);
-    /* The index of the subtree's first owned face. This row's EBPO_S_FACES_BEFORE counts the new
-     * faces between the previous subtree and this one. These faces precede the owned faces, so the
-     * sum includes this row's count. The same is true for vertices. */
+    /* The subtree's first owned face comes after the owned faces of all previous subtrees, and
+     * after all faces that EBPO_S_FACES_BEFORE counts up to this row, because this row's count is
+     * that of faces between the previous subtree and this subtree. The same is true for vertices.
+     */
     out->face = out->after[EBPO_S_FACES_BEFORE] + out->before[EBPO_S_FACES];
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
@@ -172,7 +174,8 @@ static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *
                     sums[column + EBPO_S_BLACK] >
                 8 * ebpo_subtree_groups(info, row, level, end))
                 return table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
-                                   "a subtree has more nodes than its groups hold", error);
+                                   "a subtree has more than eight nodes for each of its groups",
+                                   error);
         }
     return EBPO_OK;
 }
@@ -189,27 +192,28 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 /* --- cache of rows --- */
 
 /* The row of a subtree is needed repeatedly while the subtree is read. Computing a row takes long,
- * because a chunk of rows is added up. Typically two threads read at once. */
+ * because all rows of a chunk are added up. Typically two threads read at once, so a few rows are
+ * sufficient. */
 enum {
     KEPT = 4,                     /* number of rows in the cache */
-    FACES_KNOWN_MAX = 1 << 20,    /* subtrees from this number on are not remembered */
+    FACES_KNOWN_MAX = 1 << 20,    /* subtrees from this index on are not in faces_known */
     BY_NUMBER = EBPO_SUBTREE_COLS /* in place of a column: find a row by the subtree's index */
 };
 
 struct ebpo_kept_rows {
     ebpo_subtree_row row[KEPT];
-    unsigned count, next;
+    unsigned count, next;  /* number of rows; index of the row that is replaced next */
     uint8_t faces_known[]; /* a bit for each subtree: its faces were checked */
 };
 
-/* Returns the number of subtrees for which it is remembered that their faces were checked. */
+/* Returns the number of subtrees that faces_known has a bit for. */
 static uint64_t remembered_subtrees(const ebpo_info *info)
 {
     uint64_t subtrees = info->level[info->subtree_level].gray_count;
     return subtrees < FACES_KNOWN_MAX ? subtrees : FACES_KNOWN_MAX;
 }
 
-/* Returns true if the row is the one that find_kept searches for. */
+/* Returns true if find_kept searches for this row. */
 static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
 {
     return column == BY_NUMBER ? row->subtree == item
@@ -282,8 +286,8 @@ ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_s
     return keep_row(chunks, out, error);
 }
 
-/* Finds the chunk of rows that contains item `item` of the column. This is the last chunk before
- * which the sum of the column is at most `item`. */
+/* Finds the chunk of the table with the subtree that contains item `item` of the column: the last
+ * chunk before which the sum of the column is at most `item`. */
 static ebpo_status find_chunk(ebpo_chunks *chunks, unsigned column, uint64_t item, uint64_t *out,
                               ebpo_error *error)
 {
@@ -325,14 +329,15 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
     return keep_row(chunks, out, error);
 }
 
-/* Returns true for groups of the first level below the subtrees' roots. There, group i belongs to
- * subtree i. */
+/* Returns true for groups of the first level below the subtrees' roots. Group i of this level
+ * belongs to subtree i, so the table is not searched. */
 static bool is_direct(const ebpo_info *info, int level, ebpo_per per)
 {
     return per == EBPO_PER_GROUP && level == info->subtree_level + 1;
 }
 
-/* Returns the column that counts the items of a level. */
+/* Returns the column that counts the items of kind `per` of a level. The groups of a level are
+ * counted by the gray nodes of the level above. */
 static unsigned column_of(const ebpo_info *info, int level, ebpo_per per)
 {
     return per == EBPO_PER_GROUP  ? ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)
@@ -423,7 +428,8 @@ ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group
     return status;
 }
 
-/* Adds values to *sum. Returns false on overflow, which is only possible for values of 64 bits. */
+/* Adds values to *sum. Returns false if a value is 2^40 or more, or if the sum is 2^62 or more.
+ * Only values of 64 bits can be so large. */
 static bool sum_rows(const uint8_t *rows, unsigned element_size, uint64_t count, uint64_t *sum)
 {
     uint64_t total = 0, all = 0;
@@ -470,7 +476,8 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
     return status;
 }
 
-/* Reads the row of an index array for an item. Row 0 is all zeros and is not read from the file. */
+/* Reads the row of an index array that precedes an item. Row 0 is all zeros and is not read from
+ * the file. */
 static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t item,
                              unsigned cols, uint64_t *row, ebpo_error *error)
 {
@@ -480,7 +487,8 @@ static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                                                          1, row, sizeof *row, error);
 }
 
-/* Finds the subtree that contains an item of a level. The table must cover this level. */
+/* Finds the subtree that contains an item of a level below the subtrees' roots. `what`: EBPO_S_GRAY
+ * and so on, the kind of the item (also in the functions below). */
 static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned what, uint64_t item,
                                 ebpo_subtree_row *row, ebpo_error *error)
 {
@@ -505,15 +513,15 @@ static uint64_t items_in(const ebpo_chunks *chunks, const ebpo_subtree_row *row,
 
 static const char *const contradicts = "the index contradicts the counts in the header";
 
-/* Reports a row that assigns nodes to the wrong subtree. The sums of the table do not show this
- * error, so the check_ functions below count the nodes. */
+/* Reports a row of the table that assigns nodes to the wrong subtree. The sums of the table do not
+ * show this error, so the functions check_types, check_list and check_ends count the nodes. */
 static ebpo_status row_contradicts(const ebpo_chunks *chunks, ebpo_error *error)
 {
     return ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
                             "a row contradicts the nodes of its subtree", error);
 }
 
-/* Checks the row's numbers of nodes by counting the nodes of its subtree in the level. */
+/* Checks the row's numbers of nodes of a level by counting the nodes of the row's subtree. */
 static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                                ebpo_error *error)
 {
@@ -547,8 +555,8 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
  * the leaves of the level so far. The column has the end after the subtree's leaves, minus the end
  * before these leaves. The column must be the sum of leaf_new and leaf_skip over these leaves.
  * leaf_new is the number of new faces of a leaf. leaf_skip is the number of new faces of other
- * levels between the previous leaf of the level and the leaf. Also checks that the new faces of
- * these leaves are owned faces of the subtree. */
+ * levels' leaves between the previous leaf of the level and the leaf. Also checks that the new
+ * faces of these leaves are owned faces of the subtree. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
@@ -657,8 +665,8 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
 /* Reads the row of leaf_index, or of the table, that precedes a leaf. For the leaves of the level
  * before the row, sets row[0] to the end of the new faces (one past the last), row[1] to the number
  * of references, and row[2] to the number of leaf planes. If the row is of the table, sets *from to
- * the subtree's first leaf of the level. `faces`: checks the table's sums of faces; otherwise the
- * table's sums of planes. */
+ * the subtree's first leaf of the level, and checks the row's sums: of faces if `faces` is true, of
+ * planes if it is false. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
@@ -733,8 +741,8 @@ typedef struct hinting {
     ebpo_chunks *chunks;
     ebpo_hints *hints;
     const ebpo_subtree_row *first, *last; /* rows of the first and the last subtree */
-    uint32_t needs;                       /* EBPO_NEEDS_ bits: arrays that will be read */
-    int last_level;
+    uint32_t needs;                       /* EBPO_NEEDS_... (schema.h): arrays that will be read */
+    int last_level;                       /* the deepest level that will be read */
 } hinting;
 
 static void hint_rows(const hinting *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
@@ -743,16 +751,16 @@ static void hint_rows(const hinting *t, ebpo_array_id id, int level, uint64_t be
         ebpo_chunks_hint(t->chunks, t->hints, id, level, begin, end - begin);
 }
 
-/* Returns the number of items of a level before the subtrees. If `after` is true, the items of the
- * subtrees are included. */
+/* Returns the number of items of a level before the first subtree; if `after` is true, up to the
+ * end of the last subtree. */
 static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool after)
 {
     unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
     return after ? t->last->after[column] : t->first->before[column];
 }
 
-/* Returns the number of rows of an array before the subtrees. If `after` is true, the rows of the
- * subtrees are included. `per`: the array has one row for each item of this kind. */
+/* Returns the number of rows of an array before the first subtree; if `after` is true, up to the
+ * end of the last subtree. `per`: the array has one row for each item of this kind. */
 static uint64_t rows_before(const hinting *t, ebpo_per per, int level, bool after)
 {
     const ebpo_info *info = &t->chunks->file->info;
@@ -773,7 +781,7 @@ static uint64_t rows_before(const hinting *t, ebpo_per per, int level, bool afte
     }
 }
 
-/* Adds the arrays of levels to the hints. */
+/* Adds to the hints the subtrees' rows of the arrays of levels. */
 static void hint_nodes(const hinting *t)
 {
     const ebpo_info *info = &t->chunks->file->info;
@@ -816,7 +824,7 @@ static void hint_owned_faces(const hinting *t)
  * them. */
 static void hint_shared(const hinting *t, const ebpo_subtree_row *row)
 {
-    enum { SHARED_MAX = 1 << 16 };
+    enum { SHARED_MAX = 1 << 16 }; /* maximum number of chunks for which hints are sent */
     uint64_t first = row->before[EBPO_S_SHARED_FACES] + row->before[EBPO_S_SHARED_VERTICES],
              faces = row->after[EBPO_S_SHARED_FACES] - row->before[EBPO_S_SHARED_FACES],
              vertices = row->after[EBPO_S_SHARED_VERTICES] - row->before[EBPO_S_SHARED_VERTICES],

@@ -1,10 +1,11 @@
-/* Encodes, decodes, reads and checks patches of the simplified surface.
+/* Encodes, decodes, reads and checks patches of the simplified surface. A patch is a list of
+ * triangles, which replaces the faces of one node.
  *
- * A patch is a list of triangles, most of which share an edge with a recent triangle. The coder and
- * the decoder keep the last edges and the last vertices; a byte names an edge and the third vertex.
- * New vertices are numbered in the order of the triangles. A vertex is stored as the difference
- * from the fourth corner of a parallelogram over the triangle beyond the edge. Source:
- * format-spec/surface.md. */
+ * Most triangles share an edge with a recent triangle. The coder and the decoder keep the last
+ * edges and the last vertices; a byte of the code names an edge and the third vertex of a triangle.
+ * Vertices are numbered in the order in which the triangles use them first. The position of a
+ * vertex is stored as the difference from a prediction: the fourth corner of the parallelogram that
+ * the triangle on the other side of the edge begins. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,17 +22,25 @@
 
 #define NONE UINT32_MAX
 
-/* Numbers of recent edges and vertices, and the values of the two halves of a byte. */
-enum { EDGES = 15, VERTICES = 14, FREE_TRIANGLE = 15, NEW_VERTEX = 0, FAR_VERTEX = 15 };
+/* A byte of code has a recent edge in its higher half, and a vertex in its lower half. */
+enum {
+    EDGES = 15,         /* maximum number of recent edges */
+    VERTICES = 14,      /* maximum number of recent vertices; the lower half k + 1 names vertex k */
+    FREE_TRIANGLE = 15, /* higher half: a triangle without a recent edge; three numbers follow */
+    NEW_VERTEX = 0,     /* lower half: a vertex that no triangle has used */
+    FAR_VERTEX = 15     /* lower half: a vertex that is not recent; its number follows */
+};
 
 /* --- state of coder and decoder --- */
 
+/* A directed edge, as the next triangle at this edge has it. */
 typedef struct recent_edge {
     uint32_t from, to, beyond; /* beyond: third vertex of the triangle that has the edge */
 } recent_edge;
 
+/* Recent edges and vertices; the encoder and the decoder have the same after each triangle. */
 typedef struct recent {
-    recent_edge edge[EDGES];
+    recent_edge edge[EDGES];   /* the last edge first */
     uint32_t vertex[VERTICES]; /* the last vertex first */
     unsigned edges, vertices;
 } recent;
@@ -56,21 +65,24 @@ static void add_vertex(recent *r, uint32_t v)
     r->vertex[0] = v;
 }
 
-/* Adds the edges of a triangle in the direction that they have in the neighbouring triangles. */
-static void add_edges(recent *r, const uint32_t t[3], bool first_too)
+/* Adds the edges of a triangle in the direction that they have in the neighbouring triangles.
+ * `with_first`: false: not the edge from t[0] to t[1], over which the triangle was reached. */
+static void add_edges(recent *r, const uint32_t t[3], bool with_first)
 {
-    if (first_too)
+    if (with_first)
         add_edge(r, t[1], t[0], t[2]);
     add_edge(r, t[0], t[2], t[1]);
     add_edge(r, t[2], t[1], t[0]);
 }
 
-/* Vertices from which the position of a vertex is predicted: a + b - beyond. If beyond is NONE, the
- * prediction is the position of the vertex with the number before. */
+/* Vertices from which the position of a vertex is predicted: a + b - beyond. If `beyond` is NONE,
+ * the prediction is the position of the vertex with the previous number. */
 typedef struct prediction {
     uint32_t a, b, beyond;
 } prediction;
 
+/* Predicts the position of vertex v from the positions `point` of the vertices with lower numbers.
+ */
 static void predict_point(const int16_t *point, const prediction *p, uint32_t v, int32_t out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -89,17 +101,20 @@ static uint32_t vertex_before(const prediction *p, uint32_t v)
 
 /* --- encoding --- */
 
+/* State of encoding a patch. */
 typedef struct coder {
     const ebpo_patch_source *in;
     ebpo_patch_rows *out;
     recent recent;
-    uint32_t *corner; /* hash table of directed edges: corners where edges begin */
+    /* [slots] hash table of directed edges: an edge's corner in in->triangle where it begins; NONE:
+     * free */
+    uint32_t *corner;
     uint64_t slots;
-    bool *done;       /* [triangles] */
-    uint32_t *number; /* [vertices] new numbers, or NONE */
-    uint32_t *vertex; /* [vertices] by new number: number in `in` */
-    prediction *from; /* [vertices] by new number */
-    uint32_t next;
+    bool *done;       /* [triangles] true: the triangle is encoded */
+    uint32_t *number; /* [vertices] new number of each vertex of `in`; NONE: not used yet */
+    uint32_t *vertex; /* [vertices] for each new number: the vertex of `in` */
+    prediction *from; /* [vertices] for each new number: how its position is predicted */
+    uint32_t next;    /* next new number */
     bool short_of_memory;
 } coder;
 
@@ -125,6 +140,7 @@ static uint64_t edge_hash(uint32_t from, uint32_t to)
     return ebpo_hash_number((uint64_t)from << 32 | to);
 }
 
+/* Enters the edges of all triangles into the hash table. */
 static void enter_edges(coder *c)
 {
     for (uint32_t i = 0; i < 3 * c->in->triangle_count; i++) {
@@ -149,6 +165,7 @@ static uint32_t find_corner(const coder *c, uint32_t from, uint32_t to)
     return NONE;
 }
 
+/* Gives the vertex `former` of `in` the next new number, which is returned. */
 static uint32_t new_number(coder *c, uint32_t former, prediction from)
 {
     c->vertex[c->next] = former;
@@ -156,6 +173,9 @@ static uint32_t new_number(coder *c, uint32_t former, prediction from)
     return c->number[former] = c->next++;
 }
 
+/* Encodes a triangle at recent edge number `edge`. i: corner of the triangle where this edge
+ * begins.
+ */
 static void put_attached(coder *c, unsigned edge, uint32_t i)
 {
     recent_edge e = c->recent.edge[edge];
@@ -178,6 +198,7 @@ static void put_attached(coder *c, unsigned edge, uint32_t i)
     add_edges(&c->recent, (uint32_t[3]){ e.from, e.to, v }, false);
 }
 
+/* Encodes a triangle that has no recent edge. */
 static void put_free(coder *c, uint64_t triangle)
 {
     uint32_t t[3];
@@ -191,6 +212,8 @@ static void put_free(coder *c, uint64_t triangle)
     add_edges(&c->recent, t, true);
 }
 
+/* Encodes all triangles: the next at the most recent edge that has one, or the first that is not
+ * encoded. Vertices without triangles get the last numbers. */
 static void put_triangles(coder *c)
 {
     uint64_t first = 0;
@@ -217,7 +240,8 @@ static void put_triangles(coder *c)
 
 static double sign_of(double v) { return v < 0 ? -1 : 1; }
 
-/* Projects a direction on an octahedron: two numbers of 0 to 254, 127 in the middle. */
+/* Projects a direction on an octahedron, which is unfolded to a square: returns two coordinates
+ * from 0 to 254, 127 in the middle. */
 static void encode_normal(const double n[3], uint8_t out[2])
 {
     double sum = fabs(n[0]) + fabs(n[1]) + fabs(n[2]), x = 0, y = 0;
@@ -256,7 +280,8 @@ static uint16_t encode_zigzag(int32_t value)
 
 static int32_t decode_zigzag(uint16_t code) { return code >> 1 ^ -(code & 1); }
 
-/* Writes the rows of vertices, as differences. `point`, `normal`: scratch, by new number. */
+/* Writes the rows of vertices, as differences. `point`, `normal`: temporary memory for the vertices
+ * in the order of their new numbers. */
 static void put_vertices(const coder *c, int16_t *point, uint8_t *normal)
 {
     for (uint32_t v = 0; v < c->in->vertex_count; v++) {
@@ -323,11 +348,12 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
 
 /* --- decoding --- */
 
+/* State of decoding a patch. The functions below return false for a wrong code. */
 typedef struct decoder {
-    const uint8_t *code, *end;
+    const uint8_t *code, *end; /* the next byte, and the end of the code */
     recent recent;
-    uint32_t next, vertices;
-    prediction *from; /* [vertices] */
+    uint32_t next, vertices; /* number of vertices so far, and of the patch */
+    prediction *from;        /* [vertices] how the position of each vertex is predicted */
 } decoder;
 
 static bool get_number(decoder *d, uint32_t *out)
@@ -342,6 +368,7 @@ static bool get_number(decoder *d, uint32_t *out)
     return false;
 }
 
+/* Begins a new vertex, whose number is returned in *out. */
 static bool take_new(decoder *d, prediction from, uint32_t *out)
 {
     if (d->next >= d->vertices)
@@ -412,7 +439,7 @@ void ebpo_patch_position(const ebpo_box *box, ebpo_cell cell, const int16_t poin
                  ((double)cell.at[k] * (1 << EBPO_PATCH_GRID) + point[k]) * (box->size[k] * step);
 }
 
-/* Rows of a patch within a surface. */
+/* Rows of a patch in the arrays of a surface. */
 typedef struct patch_rows {
     const uint8_t *code, *normal, *colour;
     const uint16_t *point;
@@ -579,7 +606,8 @@ void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info)
     info->surface_colours = surface->colour_count;
 }
 
-/* Returns what is wrong with a row of the table, or NULL. */
+/* Checks a row of the table of patches. `before`: octcode of the previous row. Returns the error's
+ * text or NULL. */
 static const char *find_row_fault(const ebpo_info *info, const uint64_t *row, uint64_t before)
 {
     uint64_t code = row[EBPO_PATCH_OCTCODE], triangles = row[EBPO_PATCH_TRIANGLES];
@@ -587,7 +615,7 @@ static const char *find_row_fault(const ebpo_info *info, const uint64_t *row, ui
     uint64_t most_faces = info->pruned ? UINT32_MAX : info->face_count;
     if (!ebpo_octcode_valid(code) || ebpo_octcode_level(code) > EBPO_PATCH_LEVEL ||
         ebpo_octcode_level(code) >= info->level_count)
-        return "an octcode is that of no node that can have a patch";
+        return "an octcode is invalid, or its level cannot have patches";
     if (code <= before)
         return "the octcodes are not ascending";
     if (row[EBPO_PATCH_FACES] == 0 || row[EBPO_PATCH_FIRST_FACE] > most_faces ||
@@ -626,6 +654,7 @@ const char *ebpo_surface_fault(const ebpo_info *info, const ebpo_surface *surfac
                : "the patches do not add up to the counts in the header";
 }
 
+/* Checks the triangle codes of all patches by decoding them. */
 static ebpo_status check_codes(const ebpo_check *check, const ebpo_surface *surface,
                                ebpo_error *error)
 {
@@ -670,12 +699,16 @@ ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
 
 /* --- files --- */
 
+/* Rows that are copied from the chunks of an array. */
 typedef struct taking {
-    void *to;
-    unsigned size;       /* of an element in memory */
-    uint64_t first, end; /* rows to take */
+    void *to;            /* receives the rows [first, end) */
+    unsigned size;       /* of an element, in the file and in memory */
+    uint64_t first, end; /* rows to copy */
 } taking;
 
+/* Copies the wanted rows of a chunk, in native byte order. The chunk has the rows [row, row +
+ * rows).
+ */
 static void take_rows(const taking *t, const ebpo_array_in *array, uint64_t row, uint64_t rows,
                       const uint8_t *bytes)
 {
@@ -719,8 +752,8 @@ static ebpo_status read_rows(const ebpo_file *file, ebpo_array_id id, uint64_t f
     return status;
 }
 
-/* Keeps only the patches from first_level to last_level in the table. Sets *vertex and *code to the
- * first vertex and the first byte of code of these patches. */
+/* Keeps only the patches of levels first_level to last_level in the table. Sets *vertex and *code
+ * to the first vertex and the first byte of code of these patches. */
 static void select_levels(ebpo_surface *s, int first_level, int last_level, uint64_t *vertex,
                           uint64_t *code)
 {
@@ -754,6 +787,7 @@ static void hint_rows(ebpo_hints *hints, const ebpo_file *file, ebpo_array_id id
         ebpo_hint_chunks(hints, array, first / rows, (end - 1) / rows + 1);
 }
 
+/* Reads and checks the table of patches. */
 static ebpo_status read_table(const ebpo_file *file, ebpo_surface *out, ebpo_error *error)
 {
     const ebpo_info *info = &file->info;

@@ -1,10 +1,11 @@
-/* Encodes and decodes chunks as HDF5 stores them. A pipeline is a row of the table below: its HDF5
- * filters, and the functions that encode and decode. The row also says whether values are shuffled
- * before compression, and whether a fletcher32 checksum follows. A writer gives a new array the
- * filters of the row; a reader recognises the pipeline by these filters. A new codec needs a number
- * in chunk.h, a row, and its functions in a separate file, such as zstd_codec.c. Deflate needs only
- * two calls of zlib, which are in this file. The output is bit for bit the output of libhdf5's own
- * filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
+/* Encodes and decodes chunks as HDF5 stores them. The table `codecs` has a row for each pipeline
+ * (the HDF5 filters of an array): the filters, and the functions that encode and decode. The row
+ * also says whether values are shuffled before compression, and whether a fletcher32 checksum
+ * follows. A writer gives a new array the filters of the row; a reader recognises the pipeline by
+ * these filters. A new codec needs a number in chunk.h, a row, and its functions in a separate
+ * file, such as zstd_codec.c. Deflate needs only two calls of zlib, which are in this file. The
+ * output is bit for bit the output of libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"),
+ * format-spec/README.md, section 4. */
 #include <string.h>
 #include <zlib.h>
 
@@ -22,8 +23,8 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
             out[k * count + i] = in[i * element_size + k];
 }
 
-/* Restores elements of two bytes. Each common size has a separate function, whose loop over
- * elements compilers vectorise. */
+/* Restores elements of two bytes. The common sizes two and four have separate functions, because
+ * compilers vectorise their loops over elements. */
 static void unshuffle_two(const uint8_t *in, size_t count, uint8_t *out)
 {
     for (size_t i = 0; i < count; i++) {
@@ -84,6 +85,7 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
 
 /* --- codecs --- */
 
+/* Returns EBPO_E_FORMAT, with the reason in *why. */
 static ebpo_status chunk_is_broken(const char **why, const char *what)
 {
     *why = what;
@@ -116,6 +118,7 @@ static ebpo_status deflate_decode(ebpo_chunk_coder *coder, const uint8_t *stored
     return EBPO_OK;
 }
 
+/* Encode and decode without compression. */
 static ebpo_status copy_out(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
                             size_t raw_bytes, const ebpo_chunk_blocks *b, uint8_t *out,
                             size_t *out_bytes)
@@ -136,7 +139,7 @@ static ebpo_status copy_in(ebpo_chunk_coder *coder, const uint8_t *stored, size_
     return EBPO_OK;
 }
 
-/* A row of the table. */
+/* A row of the table: a pipeline. */
 typedef struct codec {
     ebpo_pipeline_facts facts;
     ebpo_status (*encode)(ebpo_chunk_coder *coder, int level, const uint8_t *raw, size_t raw_bytes,
@@ -199,8 +202,8 @@ void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder) { ebpo_zstd_coder_clear(cod
 static ebpo_chunk_blocks blocks_of_byte_planes(size_t raw_bytes, size_t element_size)
 {
     enum {
-        /* Minimum bytes of a byte plane for a separate block. Each block has a table of codes of
-         * some 100 bytes. */
+        /* Minimum bytes of a byte plane for a separate block, because each block has a table of
+         * codes of some 100 bytes. */
         BYTE_PLANE_LEAST = 1024
     };
     ebpo_chunk_blocks b = { .count = 0 };

@@ -1,8 +1,8 @@
-/* Implements the number codings of format-spec/README.md, section 9: differences to the previous
- * value (modulo the integer's size, in zigzag code), corners of faces relative to the number of
- * vertices seen, and integers of fewer bytes. Encoding and decoding are exact inverses for every
- * bit pattern; floats are coded as integers of the same order. Files are little-endian. Pure
- * functions. */
+/* Encodes and decodes numbers by the codings of format-spec/README.md, section 9: differences to
+ * the previous value (modulo 2^32 or 2^64, in zigzag code), corners of faces relative to the number
+ * of vertices that were used so far, and integers of fewer bytes. Encoding and decoding are exact
+ * inverses for every bit pattern; floats are coded as integers of the same order. Files are
+ * little-endian. */
 #include "hdf5_read/coding.h"
 
 #include <string.h>
@@ -163,7 +163,9 @@ static void store_integer(uint8_t *file, size_t size, uint64_t value)
     }
 }
 
-/* Converts the bits of a float or double to an integer of the same order, or back. */
+/* Converts the bits of a float (size 4) or double (size 8) to an integer of the same order, or
+ * back.
+ */
 static uint64_t sortable_bits(uint64_t bits, size_t size)
 {
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);

@@ -1,7 +1,7 @@
-/* Number codings of format-spec/README.md, section 9, which turn arrays into small numbers before
- * compression. Encoding and decoding are exact inverses for every bit pattern. Arrays in files are
- * little-endian; pointers named `file` (encoded bytes) need no alignment. Pure functions, any
- * thread. */
+/* Encodes and decodes numbers by the codings of format-spec/README.md, section 9, which turn arrays
+ * into small numbers before compression. Encoding and decoding are exact inverses for every bit
+ * pattern. `file`: encoded bytes, little-endian, without alignment. `rows`: number of rows. Any
+ * thread may call these functions. */
 #ifndef EBPO_HDF5_READ_CODING_H
 #define EBPO_HDF5_READ_CODING_H
 
@@ -9,13 +9,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Convert a difference, modulo 2^32 or 2^64, to its zigzag code, and back. The differences 0, -1,
+ * 1, -2, 2 have the codes 0, 1, 2, 3, 4. */
 static inline uint32_t ebpo_zigzag32(uint32_t v) { return (v << 1) ^ (0u - (v >> 31)); }
 static inline uint32_t ebpo_unzigzag32(uint32_t v) { return (v >> 1) ^ (0u - (v & 1)); }
 static inline uint64_t ebpo_zigzag64(uint64_t v) { return (v << 1) ^ (UINT64_C(0) - (v >> 63)); }
 static inline uint64_t ebpo_unzigzag64(uint64_t v) { return (v >> 1) ^ (UINT64_C(0) - (v & 1)); }
 
-/* Converts the bits of a float to an integer of the same order. Applied twice, the function returns
- * the original bits. */
+/* Convert the bits of a float or double to a signed integer of the same order (greater floats have
+ * greater integers). Applied twice, the function returns the original bits. */
 static inline uint32_t ebpo_float_order32(uint32_t bits)
 {
     return bits ^ ((0u - (bits >> 31)) & UINT32_C(0x7fffffff));
@@ -38,11 +40,11 @@ void ebpo_points64_decode(const uint8_t *file, uint64_t rows, double *xyz);
 void ebpo_numbers_encode(const uint32_t *numbers, uint64_t rows, uint8_t *file);
 void ebpo_numbers_decode(const uint8_t *file, uint64_t rows, uint32_t *numbers);
 
-/* Encode and decode columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the
- * machine's byte order. `file` holds column after column; each value is coded as the difference to
- * the previous value (to 0 for the first value), modulo the integer's size, in zigzag code.
- * `floats`: the values are bits of floats (4 or 8 bytes), converted to integers of the same order.
- */
+/* Encode and decode columns: [rows][cols] of unsigned integers of `size` bytes (1, 2, 4 or 8), in
+ * the machine's byte order. `file` has column after column. Each value is coded as the difference
+ * to the previous value of its column (to 0 for the first value), modulo 2^(8 * size), in zigzag
+ * code. `floats`: true: the values are floats or doubles, which are first converted to integers of
+ * the same order. */
 void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
                          uint8_t *file);
 void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t rows,
@@ -50,14 +52,14 @@ void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t
 
 /* Encode and decode corners of faces, [rows][3], relative to *seen, the number of vertices used so
  * far. Code 0 means vertex *seen, and *seen is then incremented. Code k > 0 means vertex *seen - k.
- * Return false if a corner to encode is a vertex above *seen, or a code is above *seen; then *seen
- * is its value at this corner. */
+ * Return false at a corner that is a vertex above *seen, or at a code above *seen; *seen then keeps
+ * its value before this corner. */
 bool ebpo_corners_encode(const uint32_t *faces, uint64_t rows, uint64_t *seen, uint8_t *file);
 bool ebpo_corners_decode(const uint8_t *file, uint64_t rows, uint64_t *seen, uint32_t *faces);
 
-/* Convert between little-endian integers of `file_size` bytes in a file and integers of `size`
- * bytes (1, 2, 4, 8) in memory; file_size <= size. The integers are signed or unsigned. The caller
- * has checked that the values fit. */
+/* Convert between little-endian integers of `file_size` bytes in a file and native integers of
+ * `size` bytes (1, 2, 4, 8) in memory; file_size <= size. The integers are signed or unsigned. The
+ * caller has checked that the values fit into file_size bytes. */
 void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t file_size,
                           uint8_t *file);
 void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed, uint64_t rows,

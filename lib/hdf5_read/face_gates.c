@@ -1,8 +1,8 @@
 /* Implements the coding "gates" of format-spec/gates.md. Faces follow each other across edges: each
- * face is written as its gate and its third vertex. An edge of an earlier face is open if the face
- * on its other side has not been written yet. The gate is one of the newest open edges. Open edges
- * are kept in a short list, the newest last. Encoder and decoder keep the same list, so the coding
- * is invertible for all codes; the decoder accepts any bytes and rejects bytes that represent no
+ * face is written as its gate (an edge of an earlier face) and its third vertex. An edge of an
+ * earlier face is open if the face on its other side has not been written yet. The gate is one of
+ * the newest open edges. Open edges are kept in a short list, the newest last. Encoder and decoder
+ * keep the same list, so the decoder restores all codes; it rejects bytes that do not represent
  * faces. Time is proportional to the number of faces. */
 #include "hdf5_read/face_gates.h"
 
@@ -13,11 +13,11 @@
 
 enum {
     OPEN_MAX = 64,        /* maximum length of the list of open edges */
-    NEAR = 32,            /* number of the newest edges that pass_edge compares */
+    NEAR = 32,            /* pass_edge compares only the newest NEAR edges */
     SPACE = 4 * OPEN_MAX, /* size of the list's array */
     FACE_MAX = 3          /* maximum number of edges that a face opens */
 };
-/* Kinds of the third vertex of a face with the gate (a, b). */
+/* Kinds of the third vertex of a face with the gate from a to b. */
 enum {
     IS_NEW,    /* the next vertex that no face has used */
     IS_LEFT,   /* end of the newest open edge that starts at b */
@@ -25,17 +25,18 @@ enum {
     BY_NUMBER, /* a number follows in the stream `low` */
     AT_OPEN    /* from here on: start of an open edge; AT_OPEN means the newest edge */
 };
-/* A vertex number takes one byte if its first byte in `low` is below LOW_END, and two bytes if that
- * byte is below TWO_BYTES_END. */
+/* The first byte of a vertex number, in the stream `low`. Below LOW_END: the number. Below
+ * TWO_BYTES_END: a second byte follows in the stream `more`. TWO_BYTES_END: four bytes follow in
+ * `more`. */
 enum { LOW_END = 224, TWO_BYTES_END = 240 };
-enum { AS_CODES = 1 }; /* first byte of a chunk of shuffled codes, without gates */
+enum { AS_CODES = 1 }; /* first byte of a chunk that has the codes of corners instead of gates */
 
-/* Open edges, newest last: (a, b) means that a face on the other side of the edge would run from a
- * to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32, as in codes. */
+/* Open edges, newest last: (a, b) means that the face on the other side of the edge has a side from
+ * a to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32, as in codes. */
 typedef struct open_edges {
-    uint64_t edge[SPACE];
-    uint32_t begin, end; /* range of the open edges in `edge` */
-    uint32_t seen;       /* number of new vertices so far */
+    uint64_t edge[SPACE]; /* see edge_of */
+    uint32_t begin, end;  /* range of the open edges in `edge` */
+    uint32_t seen;        /* number of new vertices so far */
 } open_edges;
 
 static uint64_t edge_of(uint32_t from, uint32_t to) { return from | (uint64_t)to << 32; }
@@ -44,7 +45,8 @@ static uint32_t edge_to(uint64_t e) { return (uint32_t)(e >> 32); }
 
 static void start_edges(open_edges *o) { o->begin = o->end = o->seen = 0; }
 
-/* Moves the list back to the front of its array from time to time; called before each face. */
+/* Moves the list to the front of its array if the array has no space after it for the edges of a
+ * face. Called before each face. */
 static void reserve_space(open_edges *o)
 {
     if (o->end + FACE_MAX <= SPACE)
@@ -54,6 +56,7 @@ static void reserve_space(open_edges *o)
     o->begin = 0;
 }
 
+/* Adds an open edge. If the list is too long, drops the oldest edge. */
 static void push_edge(open_edges *o, uint64_t e)
 {
     o->edge[o->end++] = e;
@@ -84,7 +87,7 @@ static uint32_t find_ending(const open_edges *o, uint32_t v)
     return o->end;
 }
 
-/* Compares eight edges at a time, because usually none is equal. */
+/* Returns true if one of eight edges is the wanted edge. Compilers vectorise this loop. */
 static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
 {
     bool any = false;
@@ -116,8 +119,9 @@ static void open_all(open_edges *o, const uint32_t *face)
         push_edge(o, edge_of(face[(k + 1) % 3], face[k]));
 }
 
-/* Updates the open edges after face (a, b, c). Its gate (a, b) is already closed. `at`: position of
- * the edge that gave c, for IS_LEFT and IS_RIGHT. */
+/* Updates the open edges after face (a, b, c). Its gate (a, b) is already closed. `kind`: kind of
+ * c. `at`: for IS_LEFT and IS_RIGHT, position of the open edge that gave c, which is also closed.
+ */
 static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
                        uint32_t c)
 {
@@ -136,6 +140,9 @@ static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, ui
 
 /* ---- writing ---- */
 
+/* State of encoding. Streams: `gate`: for each face, position of the gate, counted from the end of
+ * the list, or 0 without a gate. `third`: for each face with a gate, 3 * kind of the third vertex +
+ * the corner where the gate begins. `low`, `more`: bytes of vertex numbers. */
 typedef struct writing {
     uint8_t *gate, *third, *low, *more; /* next byte of each stream */
     open_edges open;
@@ -173,7 +180,7 @@ static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
 }
 
 /* Returns the kind of c, the third vertex of a face with the gate (a, b). *at: position of the open
- * edge that gives c, if one does. */
+ * edge that gives c; undefined for IS_NEW and BY_NUMBER. */
 static uint32_t kind_of(const open_edges *o, uint32_t a, uint32_t b, uint32_t c, uint32_t *at)
 {
     if (c == o->seen)
@@ -210,7 +217,8 @@ static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
     go_through(o, kind, at, a, b, c);
 }
 
-/* Writes byte 0 of all codes, then byte 1 of all codes, and so on. */
+/* Writes the codes of corners instead of gates: AS_CODES, then byte 0 of all codes, then byte 1 of
+ * all codes, and so on. */
 static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
                         size_t ends[EBPO_GATES_ENDS])
 {
@@ -221,8 +229,9 @@ static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
         ends[i] = 1 + (i + 1) * plane;
 }
 
-/* Moves the streams together, and sets their ends. The streams were built at positions where they
- * cannot overlap. */
+/* Moves the streams together, and sets their ends. The streams were written at positions where they
+ * cannot overlap: rows times 0, 1, 2 and 5 (`third` takes at most one byte for each face, `low` at
+ * most three). */
 static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
                          size_t ends[EBPO_GATES_ENDS])
 {
@@ -238,7 +247,7 @@ static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
 void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
                        size_t ends[EBPO_GATES_ENDS])
 {
-    enum { MORE_OF_FACE = 12 };
+    enum { MORE_OF_FACE = 12 }; /* maximum bytes of a face in `more`: three numbers */
     size_t bytes = (size_t)rows * EBPO_GATES_COLS;
     writing w = { out, out + rows, out + 2 * (size_t)rows, out + 5 * (size_t)rows, { .end = 0 } };
     start_edges(&w.open);
@@ -250,7 +259,7 @@ void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
             seen += code[k] == 0;
         }
         if ((size_t)(w.more - out) + MORE_OF_FACE > bytes)
-            break;
+            break; /* no space; write_codes encodes the chunk instead */
         write_face(&w, code, face);
         w.open.seen = seen;
     }
@@ -263,14 +272,15 @@ void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
 
 /* ---- reading ---- */
 
+/* State of decoding; streams as in `writing`. */
 typedef struct reading {
     const uint8_t *gate, *third, *low, *more; /* next byte of each stream */
     const uint8_t *end;                       /* end of the stream `more` */
     open_edges open;
 } reading;
 
-/* Reads a vertex by its number. Needs no check of the stream `low`, which find_streams has made
- * long enough for all reads. */
+/* Reads a vertex by its number. Does not check the end of the stream `low`, because find_streams
+ * has counted the numbers in it. Returns false if `more` is too short. */
 static bool get_vertex(reading *r, uint32_t seen, uint32_t *vertex)
 {
     uint32_t number = *r->low++;
@@ -313,7 +323,7 @@ static bool get_third(reading *r, uint32_t kind, uint32_t a, uint32_t b, uint32_
 /* Reads a face with a gate. */
 static bool read_across(reading *r, uint32_t gate, uint32_t *face)
 {
-    static const uint8_t next[5] = { 0, 1, 2, 0, 1 };
+    static const uint8_t next[5] = { 0, 1, 2, 0, 1 }; /* remainders modulo 3 */
     open_edges *o = &r->open;
     if (gate > o->end - o->begin)
         return false;
@@ -353,8 +363,8 @@ static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
     return seen;
 }
 
-/* Finds the beginnings of the streams. The content of the previous streams determines the length of
- * each stream. */
+/* Finds the beginnings of the streams. The number of faces without a gate in `gate` determines the
+ * lengths of `third` and, with the kinds in `third`, of `low`. */
 static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
 {
     size_t without_gate = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;
@@ -380,6 +390,7 @@ static bool is_zero(const uint8_t *begin, const uint8_t *end)
     return !any;
 }
 
+/* Reads a chunk that write_codes has written. */
 static bool read_codes(const uint8_t *in, uint32_t rows, uint8_t *codes)
 {
     size_t bytes = 12 * (size_t)rows;

@@ -1,6 +1,6 @@
 /* Declares the coding `gates` of format-spec/gates.md. It represents a face of a chunk by its gate
- * (the edge that it shares with an earlier face) and its third vertex. Pure functions, any thread.
- */
+ * (the edge that the face shares with an earlier face) and its third vertex. Any thread may call
+ * these functions. */
 #ifndef EBPO_HDF5_READ_FACE_GATES_H
 #define EBPO_HDF5_READ_FACE_GATES_H
 
@@ -13,14 +13,13 @@ enum {
     EBPO_GATES_ENDS = 4   /* number of streams of a chunk; zeros follow the last stream */
 };
 
-/* Encodes `codes`: [rows][3] codes of corners (ebpo_corners_encode in coding.h), little-endian, of
- * any consecutive faces of the mesh. Fills `out` with EBPO_GATES_COLS bytes for each face, and sets
- * the end of each stream in `out`. Any codes can be written. rows > 0. Time is proportional to
- * rows. */
+/* Encodes `rows` consecutive faces of the mesh. `codes`: [rows][3] codes of their corners
+ * (ebpo_corners_encode in coding.h), little-endian; any codes are allowed. Fills `out` with
+ * EBPO_GATES_COLS bytes for each face, and sets the end of each stream in `out`. rows > 0. */
 void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
                        size_t ends[EBPO_GATES_ENDS]);
 
-/* Decodes to `codes`. Accepts any bytes, and returns false when the bytes represent no faces. A
+/* Decodes to `codes`. Safe for any bytes; returns false if they do not represent `rows` faces. A
  * vertex that does not exist becomes a code that ebpo_corners_decode rejects. */
 bool ebpo_gates_decode(const uint8_t *in, uint32_t rows, uint8_t *codes);
 

@@ -1,7 +1,8 @@
-/* Reads arrays: checks their shape against the format, and finds their chunks. Three of HDF5's
- * chunk indexes are read (a single chunk, an implicit index, a fixed array with pages); each chunk
- * must be within the file and below the size that its filters can give. Source: HDF5 File Format
- * Specification 3.0, sections IV.A.2.i and VII; format-spec/hdf5-messages.md. */
+/* Reads the descriptions of arrays: checks their shapes against the format, and finds their chunks.
+ * Three of HDF5's kinds of chunk index are read: a single chunk, an implicit index, and a fixed
+ * array with pages. Each chunk must be within the file, and not larger than its filters can make
+ * it. Source: HDF5 File Format Specification 3.0, sections IV.A.2.i and VII;
+ * format-spec/hdf5-messages.md. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,18 +16,19 @@
 
 typedef enum ebpo_head_index {
     EBPO_INDEX_SINGLE = 1, /* one chunk */
-    EBPO_INDEX_IMPLICIT,   /* consecutive, allocated at once, without filters */
+    EBPO_INDEX_IMPLICIT,   /* consecutive chunks without filters: no table is needed */
     EBPO_INDEX_FIXED       /* a table of fixed size */
 } ebpo_head_index;
 
+/* How an array is stored, from its layout message. */
 typedef struct ebpo_head_layout {
     unsigned rank;     /* number of dimensions of the chunks */
     uint64_t chunk[3]; /* size of a chunk; the last number is the size of an element */
     ebpo_head_index index;
-    unsigned page_bits; /* FIXED: a page has 2^page_bits chunks */
-    bool single_filtered;
-    uint64_t single_bytes; /* SINGLE with filters */
-    uint32_t single_mask;
+    unsigned page_bits;    /* FIXED: a page has 2^page_bits chunks */
+    bool single_filtered;  /* SINGLE: the chunk has filters, and the next two members are set */
+    uint64_t single_bytes; /* stored size of the chunk */
+    uint32_t single_mask;  /* bits of the filters that the chunk lacks */
     /* address of the chunk (SINGLE), the chunks (IMPLICIT) or the table (FIXED); EBPO_NO_ADDRESS:
      * nothing was written */
     uint64_t address;
@@ -35,7 +37,7 @@ typedef struct ebpo_head_layout {
 /* The chunks to be found. */
 typedef struct ebpo_head_chunks {
     const ebpo_head_layout *layout;
-    bool filtered;
+    bool filtered; /* the array has filters */
     /* number of chunks; bytes of a chunk before its filters; greatest size of a chunk after them */
     uint64_t count, whole, bound;
     uint64_t end;                   /* end of the file, in bytes */
@@ -44,13 +46,14 @@ typedef struct ebpo_head_chunks {
     uint64_t at; /* out: index of the invalid chunk; UINT64_MAX: no single chunk is invalid */
 } ebpo_head_chunks;
 
-static const char missing[] = "the chunk is missing", cut[] = "its description is cut short",
+static const char missing[] = "the chunk is missing",
+                  cut[] = "the object's header ends within a message",
                   contradicts[] = "the array's index contradicts its shape or its filters",
                   no_index[] = "no chunk index at the expected offset",
                   damaged[] = "the array's chunk index is damaged: the checksum differs",
                   beyond[] = "the array's chunk index is beyond the end of the file";
 
-/* Reads a layout of version 4 with chunks, from the flags on. */
+/* Reads a layout of version 4 with chunks, from the flags on. Results as read_layout. */
 static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *foreign)
 {
     enum { SINGLE_FILTERED = 2 };
@@ -79,8 +82,8 @@ static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *
     return c->cut ? cut : NULL;
 }
 
-/* Returns an error text, or NULL. Sets *foreign to true if the layout is valid, but only libhdf5
- * can read it. */
+/* Reads a layout message. Returns an error text, or NULL. On an error, *foreign is true if the
+ * layout is valid, but only libhdf5 can read it. */
 static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *foreign)
 {
     enum { CHUNKED = 2, VIRTUAL = 3 };
@@ -99,8 +102,8 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
     return "the array's chunks are listed in a tree without checksums";
 }
 
-/* Checks and stores the offset of chunk i. `mask`: bits of the filters that the chunk lacks.
- * Returns an error text, or NULL; the functions below return the same. */
+/* Checks and stores the offset and size of chunk i. `mask`: bits of the filters that the chunk
+ * lacks. Returns an error text, or NULL, as the functions read_... and check_... below. */
 static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
                                 uint32_t mask)
 {
@@ -116,7 +119,7 @@ static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t addres
     t->locations[i] = (ebpo_chunk_location){ address, (uint32_t)bytes };
     t->stored += bytes;
     t->at = UINT64_MAX;
-    return t->stored > t->end ? "the array's chunks do not fit the file" : NULL;
+    return t->stored > t->end ? "the array's chunks have more bytes than the file" : NULL;
 }
 
 static const char *read_single(ebpo_head_chunks *t)
@@ -138,7 +141,7 @@ static const char *read_implicit(ebpo_head_chunks *t)
     const ebpo_head_layout *l = t->layout;
     const char *wrong = t->filtered ? contradicts : NULL;
     for (uint64_t i = 0; i < t->count && !wrong; i++) {
-        uint64_t begin = EBPO_NO_ADDRESS; /* if the sum does not fit 64 bits, there is no address */
+        uint64_t begin = EBPO_NO_ADDRESS; /* also if the sum exceeds 64 bits */
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;
@@ -154,6 +157,7 @@ typedef struct fixed_array {
     unsigned size_bytes; /* bytes of the chunk's size in an entry; 0: entries have no size */
 } fixed_array;
 
+/* Reads the header of a fixed array. */
 static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks *t, fixed_array *f)
 {
     enum { BYTES = 28, PAGE_BITS_MAX = 16, PLAIN_ENTRY = 8, FILTERED_MORE = 12 };
@@ -181,8 +185,8 @@ static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks 
                : contradicts;
 }
 
-/* Reads the entries of `count` chunks from chunk `first` on, and the checksum after them, which
- * also includes the `before` bytes in front of the entries. */
+/* Reads the entries of `count` chunks from chunk `first` on. `at`: address of `before` bytes, which
+ * precede the entries; the checksum after the entries also covers these bytes. */
 static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                 uint64_t at, uint64_t before, uint64_t first, uint64_t count)
 {
@@ -204,7 +208,8 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
     return wrong;
 }
 
-/* Checks that the bit of each page is set, which means that the page was written. */
+/* Checks that all pages of a fixed array were written: a bit for each page is set. `prefix`: size
+ * of the block up to the end of these bits. */
 static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                uint64_t prefix, uint64_t pages)
 {
@@ -224,7 +229,7 @@ static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fi
 
 static const char *read_fixed(ebpo_head_state *s, ebpo_head_chunks *t)
 {
-    enum { PREFIX = 14 };
+    enum { PREFIX = 14 }; /* bytes of the block before the bits of the pages */
     fixed_array f = { EBPO_NO_ADDRESS, 0, 0 };
     const char *wrong = NULL;
     if (t->layout->address != EBPO_NO_ADDRESS)
@@ -255,7 +260,7 @@ static const char *read_fixed(ebpo_head_state *s, ebpo_head_chunks *t)
     return wrong;
 }
 
-/* Reads the table in one pass. Returns an error text, or NULL. */
+/* Reads the locations of all chunks in one pass. Returns an error text, or NULL. */
 static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
 {
     t->stored = 0;
@@ -270,9 +275,10 @@ static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
 
 /* --- the array --- */
 
-enum { COLS_MAX = 160 };
+enum { COLS_MAX = 160 }; /* maximum number of columns of an array */
 
-/* Finds the pipeline; shuffle must be set for elements of this size. */
+/* Finds the pipeline of these filters. The parameter of shuffle must be element_size. Returns false
+ * if the format does not allow these filters. */
 static bool find_pipeline(const ebpo_head_filters *f, unsigned element_size,
                           ebpo_pipeline *pipeline)
 {
@@ -288,7 +294,7 @@ static bool find_pipeline(const ebpo_head_filters *f, unsigned element_size,
     return ebpo_pipeline_of_filters(ids, (int)f->count, element_size, pipeline);
 }
 
-/* Checks the rows of a chunk; HDF5 has no chunks of 4 GiB and more. */
+/* Returns true if the rule allows chunks with `rows` rows. HDF5 has no chunks of 4 GiB and more. */
 static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows)
 {
     uint64_t full = ebpo_full_chunk_rows(shape->rows, shape->cols, shape->element_size);
@@ -298,8 +304,8 @@ static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows
     return rows == full || (rule == EBPO_HEAD_ROWS_POWER && power && rows < full);
 }
 
-/* Returns the only message of a type, or NULL. Sets *wrong to the reason if there is an error; a
- * missing message is no error. */
+/* Returns the only message of a type, or NULL. Sets *wrong if the message occurs twice or is
+ * shared; a missing message is no error. */
 static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type,
                                          ebpo_head_refusal *wrong)
 {
@@ -309,9 +315,10 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
         if (h->message[i].type != type)
             continue;
         if (found)
-            *wrong = (ebpo_head_refusal){ "its description has a duplicate message", false };
+            *wrong = (ebpo_head_refusal){ "the object's header has a duplicate message", false };
         if (h->message[i].flags & SHARED)
-            *wrong = (ebpo_head_refusal){ "its description is shared with another object", true };
+            *wrong = (ebpo_head_refusal){ "a message of the object's header is in another object",
+                                          true };
         found = &h->message[i];
     }
     return wrong->what ? NULL : found;
@@ -329,6 +336,7 @@ static ebpo_head_refusal fail_foreign(const char *what)
     return (ebpo_head_refusal){ what, true };
 }
 
+/* Reads the type and the dimensions of an array. The result has no reason (`what`) on success. */
 static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape)
 {
     ebpo_head_refusal wrong = { NULL, false };
@@ -355,7 +363,8 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
     return wrong;
 }
 
-/* Reads the layout and the filters; sets the rows of chunks and the pipeline of `shape`. */
+/* Reads the layout and the filters; sets the rows of chunks and the pipeline of `shape`. The result
+ * has no reason (`what`) on success. */
 static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows rule,
                                       ebpo_shape *shape, ebpo_head_layout *layout)
 {
@@ -388,7 +397,7 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
 /* Finds the chunks. A chunk takes at least CHUNK_MIN bytes, so the file's size bounds the number of
  * chunks. */
 static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_shape *shape,
-                               const ebpo_head_layout *layout, ebpo_chunk_location **places,
+                               const ebpo_head_layout *layout, ebpo_chunk_location **locations,
                                uint64_t *stored, ebpo_error *error)
 {
     enum { CHUNK_MIN = 4 };
@@ -402,9 +411,9 @@ static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_sha
     if (t.count > 1 && t.count > head->end / CHUNK_MIN)
         return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1,
                             "the array has more chunks than the file can hold");
-    t.locations = *places = ebpo_alloc(t.count, sizeof **places);
+    t.locations = *locations = ebpo_alloc(t.count, sizeof **locations);
     if (!t.locations)
-        return ebpo_fail_memory(error, t.count * sizeof **places);
+        return ebpo_fail_memory(error, t.count * sizeof **locations);
     const char *wrong = read_chunk_table(head->state, &t);
     *stored = t.stored;
     if (!wrong)
@@ -422,7 +431,7 @@ static ebpo_status read_array(ebpo_head *head, const char *path, uint64_t most, 
     ebpo_head_layout layout = { .rank = 0 };
     ebpo_head_kind kind = ebpo_head_find(head->state, path, &object);
     if (kind != EBPO_HEAD_ARRAY && head->state->refusal.what)
-        return ebpo_head_fail(head, path, "the array's description is damaged", error);
+        return ebpo_head_fail(head, path, "the array's header is damaged", error);
     if (kind != EBPO_HEAD_ARRAY)
         return ebpo_head_fail(head, path,
                               kind == EBPO_HEAD_ABSENT

@@ -1,8 +1,9 @@
-/* Reads the bytes of an open head (head.h) in few reads, and keeps the first failure. The first
- * bytes hold all headers and are fetched at once. The chunk index of arrays with more than one
- * chunk is also read at once. All other bytes are read through a window. Bytes beyond the end of
- * the file are not read. After a failure of the input, nothing is read. An error is the input's
- * error if the input failed, and otherwise the reason why the reader refuses the file. */
+/* Reads the bytes of an open head (the HDF5 headers of a file, head.h) in few reads, and keeps the
+ * first failure. The first bytes of the file have all headers and are fetched at once. HDF5's chunk
+ * indexes of arrays with more than one chunk are also read at once. All other bytes are read
+ * through a window. Bytes beyond the end of the file are not read. After a failure of the input,
+ * nothing is read. The error that is reported is the input's error if the input failed, or else the
+ * reason why the reader refuses the file. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -38,8 +39,8 @@ void ebpo_head_bytes_close(ebpo_head_bytes *b)
     *b = (ebpo_head_bytes){ .status = EBPO_OK };
 }
 
-/* Returns the bytes [at, at + size) in a buffer of the range `held`, or NULL if the range does not
- * contain them. */
+/* Returns the bytes [at, at + size) of the file. `buffer` contains the range `held` of the file.
+ * Returns NULL if this range does not contain the bytes. */
 static const uint8_t *bytes_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
                                    uint64_t size)
 {
@@ -68,7 +69,7 @@ static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 
 /* Returns the range of the window to read for an offset. Windows begin at multiples of half their
  * size, so that reading back and forth around an offset does not move the window. A window before
- * the chunk index ends there, because the index is read separately. */
+ * the chunk indexes ends where they begin, because they are read separately. */
 static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = b->input->source.size;
@@ -77,6 +78,7 @@ static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
     return (ebpo_range){ begin, end - begin < WINDOW_BYTES ? end - begin : WINDOW_BYTES };
 }
 
+/* Reads a range that is too large for the window. */
 static const uint8_t *read_large(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 {
     if (size > b->large_capacity) {
@@ -105,7 +107,7 @@ const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *b, uint64_t at, uint64_t size
     ebpo_range window = window_around(b, at);
     if (at - window.offset > window.size || size > window.size - (at - window.offset))
         return read_large(b, at, size);
-    b->window_bytes = 0; /* in case reading fails */
+    b->window_bytes = 0; /* the window is empty if reading fails */
     if (!read_into(b, &b->window, WINDOW_BYTES, window))
         return NULL;
     b->window_at = window.offset;

@@ -1,8 +1,8 @@
-/* Reads headers of HDF5 objects (groups and arrays). A header consists of blocks with checksums.
- * The blocks contain messages, which describe types, dimensions, filters and attributes. The
- * headers that were read last stay in memory. Counts and sizes are bounded before memory is
- * allocated for them, and each checksum is compared. Source: HDF5 File Format Specification 3.0,
- * section IV.A. */
+/* Reads headers of HDF5 objects (groups and arrays), and attributes. A header consists of blocks
+ * with checksums. The blocks contain messages, which describe types, dimensions, filters and
+ * attributes. The headers that were used last stay in memory. Counts and sizes are bounded before
+ * memory is allocated for them, and each checksum is compared. Functions that return false have
+ * recorded the reason (ebpo_refuse). Source: HDF5 File Format Specification 3.0, section IV.A. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -23,7 +23,7 @@ enum {
     MESSAGES_MAX = 8192
 };
 
-static const char *const damaged_block = "its header is beyond the end of the file";
+static const char *const damaged_block = "the object's header is beyond the end of the file";
 
 bool ebpo_head_sound(const uint8_t *block, uint64_t size)
 {
@@ -41,28 +41,28 @@ static bool record_memory(ebpo_head_state *s, uint64_t bytes)
     return false;
 }
 
-/* Returns true if a group's links or an array's attributes are in its header, not in B-trees and
- * heaps. */
+/* Returns true if a group's links (`links` is true) or an object's attributes are in the object's
+ * header, not in B-trees and heaps, which only libhdf5 reads. */
 static bool is_compact(ebpo_head_state *s, ebpo_head_cursor c, bool links)
 {
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
     if (version != 0)
-        return ebpo_refuse(s, "its links or attributes are stored in an unknown way");
+        return ebpo_refuse(s, "the object's links or attributes are stored in an unknown way");
     if (flags & 1)
         ebpo_cursor_take(&c, links ? 8 : 2);
     if (ebpo_cursor_u64(&c) != EBPO_NO_ADDRESS && !c.cut)
         return ebpo_refuse_foreign(s, links ? "a group's links are stored outside of its header"
                                             : "attributes are stored outside of their header");
-    return !c.cut || ebpo_refuse(s, "its description is cut short");
+    return !c.cut || ebpo_refuse(s, "the object's header ends within a message");
 }
 
 static bool add_message(ebpo_head_state *s, ebpo_head_header *h, const ebpo_head_message *m)
 {
     enum { FAILS_IF_UNKNOWN = 0x80, LAST_KNOWN = 0x18 };
     if (m->type > LAST_KNOWN && m->flags & FAILS_IF_UNKNOWN)
-        return ebpo_refuse(s, "its header has an unknown message");
+        return ebpo_refuse(s, "the object's header has an unknown message");
     if (h->count == MESSAGES_MAX)
-        return ebpo_refuse(s, "its header has too many messages");
+        return ebpo_refuse(s, "the object's header has too many messages");
     if (!ebpo_grow(&h->message, &h->capacity, h->count + 1, sizeof *h->message))
         return record_memory(s, (h->count + 1) * sizeof *h->message);
     h->message[h->count++] = *m;
@@ -81,25 +81,25 @@ static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from
         ebpo_cursor_take(&c, gap);
         m.offset = (uint32_t)(c.at - h->bytes);
         if (!ebpo_cursor_take(&c, m.size) && m.size)
-            return ebpo_refuse(s, "its description is cut short");
+            return ebpo_refuse(s, "the object's header ends within a message");
         if (!add_message(s, h, &m))
             return false;
     }
     return true;
 }
 
-/* Reads a block, which has `before` bytes in front of its messages and four bytes of checksum after
- * them. */
+/* Reads a block, which has `before` bytes, then messages of `size` bytes, and then four bytes of
+ * checksum. `gap`: as in list_messages. */
 static bool read_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uint64_t before,
                        uint64_t size, unsigned gap)
 {
     if (size > BLOCK_BYTES_MAX || h->byte_count + size > HEADER_BYTES_MAX)
-        return ebpo_refuse(s, "its header is too large");
+        return ebpo_refuse(s, "the object's header is too large");
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, before + size + 4);
     if (!block)
         return ebpo_refuse(s, damaged_block);
     if (!ebpo_head_sound(block, before + size + 4))
-        return ebpo_refuse(s, "its header's checksum differs");
+        return ebpo_refuse(s, "the checksum of the object's header differs");
     ebpo_head_note_range(s, at, before + size + 4);
     uint64_t from = h->byte_count;
     if (!ebpo_grow(&h->bytes, &h->byte_capacity, from + size + 1, 1))
@@ -109,6 +109,7 @@ static bool read_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uin
     return list_messages(s, h, from, gap);
 }
 
+/* Reads the first block of a header. *gap: as in list_messages. */
 static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *gap)
 {
     enum { PREFIX_MAX = 34 };
@@ -122,10 +123,10 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     ebpo_head_cursor c = { prefix, prefix + size, false };
     const uint8_t *name = ebpo_cursor_take(&c, 4);
     if (!name || memcmp(name, "OHDR", 4) != 0 || ebpo_cursor_u8(&c) != 2)
-        return ebpo_refuse(s, "no header at the expected offset");
+        return ebpo_refuse(s, "there is no header at the object's address");
     unsigned flags = ebpo_cursor_u8(&c);
     if (flags & 0xc0)
-        return ebpo_refuse(s, "its header has unknown flags");
+        return ebpo_refuse(s, "the object's header has unknown flags");
     ebpo_cursor_take(&c, (flags & 0x20 ? 16 : 0) + (flags & 0x10 ? 4 : 0));
     uint64_t bytes = ebpo_cursor_uint(&c, 1u << (flags & 3));
     if (c.cut)
@@ -134,18 +135,19 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     return read_block(s, h, at, (uint64_t)(c.at - prefix), bytes, *gap);
 }
 
+/* Reads the block to which a continuation message refers. `message`: index of this message. */
 static bool read_continuation(ebpo_head_state *s, ebpo_head_header *h, uint64_t message,
                               unsigned gap)
 {
     ebpo_head_cursor c = ebpo_head_message_cursor(h, &h->message[message]);
     uint64_t at = ebpo_cursor_u64(&c), size = ebpo_cursor_u64(&c);
     if (c.cut || size < 8 || size > BLOCK_BYTES_MAX)
-        return ebpo_refuse(s, "its header continues at an invalid address");
+        return ebpo_refuse(s, "the object's header continues at an invalid address");
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, size);
     if (!block)
         return ebpo_refuse(s, damaged_block);
     if (memcmp(block, "OCHK", 4) != 0)
-        return ebpo_refuse(s, "its header continues at an invalid address");
+        return ebpo_refuse(s, "the object's header continues at an invalid address");
     return read_block(s, h, at, 4, size - 8, gap);
 }
 
@@ -158,7 +160,7 @@ static bool read_blocks(ebpo_head_state *s, ebpo_head_header *h)
         if (h->message[i].type != EBPO_M_CONTINUATION)
             continue;
         if (++blocks > BLOCKS_MAX)
-            return ebpo_refuse(s, "its header has too many pieces");
+            return ebpo_refuse(s, "the object's header has too many blocks");
         if (!read_continuation(s, h, i, gap))
             return false;
     }
@@ -168,7 +170,7 @@ static bool read_blocks(ebpo_head_state *s, ebpo_head_header *h)
 /* Finds the kind of object that the messages describe. */
 static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
 {
-    unsigned array_messages = 0;
+    unsigned array_messages = 0; /* bits of the three messages that every array has */
     h->kind = EBPO_HEAD_OTHER;
     for (uint64_t i = 0; i < h->count; i++) {
         const ebpo_head_message *m = &h->message[i];
@@ -229,6 +231,8 @@ void ebpo_head_headers_free(ebpo_head_state *s)
     }
 }
 
+/* Returns true if the message describes a little-endian IEEE double. `bits`: the class's bit field.
+ */
 static bool is_double(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
     /* description of an IEEE double: bit offset, bits, position and size of the exponent, position
@@ -238,6 +242,7 @@ static bool is_double(ebpo_head_cursor *c, unsigned bits, uint32_t size)
     return at && size == 8 && bits == 0x3f20 && memcmp(at, ieee, sizeof ieee) == 0;
 }
 
+/* Returns true if the message describes a little-endian integer that uses all bits of its bytes. */
 static bool is_integer(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
     enum { SIGNED = 8 };
@@ -293,7 +298,7 @@ ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c)
 
 ebpo_head_filters ebpo_head_read_filters(ebpo_head_cursor c)
 {
-    enum { NAMED_FROM = 256 };
+    enum { NAMED_FROM = 256 }; /* filters from this number on have a name */
     ebpo_head_filters filters = { .count = EBPO_HEAD_FILTERS + 1 };
     if (ebpo_cursor_u8(&c) != 2)
         return filters;
@@ -303,10 +308,10 @@ ebpo_head_filters ebpo_head_read_filters(ebpo_head_cursor c)
         ebpo_cursor_u16(&c); /* the flag "optional" is ignored: all filters are needed */
         unsigned values = ebpo_cursor_u16(&c);
         ebpo_cursor_take(&c, name);
-        ebpo_head_cursor of = ebpo_cursor_part(&c, 4 * (size_t)values);
+        ebpo_head_cursor parameters = ebpo_cursor_part(&c, 4 * (size_t)values);
         filters.filter[i].id = id;
         filters.filter[i].values = values;
-        filters.filter[i].first = values ? ebpo_cursor_u32(&of) : 0;
+        filters.filter[i].first = values ? ebpo_cursor_u32(&parameters) : 0;
     }
     if (!c.cut)
         filters.count = count;
@@ -328,8 +333,8 @@ static ebpo_status attribute_fails(const ebpo_head *head, const char *path, cons
     return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, place, -1, "%s", what);
 }
 
-/* Returns the next part of a message; in messages of version 1 each part ends at a multiple of
- * eight bytes. */
+/* Returns the next part of a message, which has `size` bytes. In messages of version 1, padding up
+ * to a multiple of eight bytes follows. */
 static ebpo_head_cursor part_of(ebpo_head_cursor *c, unsigned version, unsigned size)
 {
     ebpo_head_cursor part = ebpo_cursor_part(c, size);
@@ -355,7 +360,7 @@ static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
                      space = part_of(&c, version, space_size);
     uint64_t bytes;
     *a = (attribute){ ebpo_head_read_type(type), ebpo_head_read_space(space), NULL };
-    if (version > 1 && flags & 1) /* the type is stored elsewhere */
+    if (version > 1 && flags & 1) /* the type is in another object, which is not supported */
         a->type = (ebpo_head_type){ EBPO_CLASS_OTHER, 0, false };
     if (!__builtin_mul_overflow(a->space.values, (uint64_t)a->type.size, &bytes) &&
         bytes <= ebpo_cursor_left(&c) && !c.cut)
@@ -363,8 +368,8 @@ static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
     return true;
 }
 
-/* Finds an attribute; EBPO_E_ABSENT when there is none of this name. `values`: its required number
- * of values. */
+/* Finds an attribute. Returns EBPO_E_ABSENT if the object has none of this name. `values`: required
+ * number of values of the attribute. */
 static ebpo_status find_attribute(ebpo_head *head, ebpo_head_object object, const char *path,
                                   const char *name, uint64_t values, attribute *out,
                                   ebpo_error *error)
@@ -373,7 +378,7 @@ static ebpo_status find_attribute(ebpo_head *head, ebpo_head_object object, cons
     head->state->refusal = (ebpo_head_refusal){ NULL, false };
     const ebpo_head_header *h = ebpo_head_header_at(head->state, object);
     if (!h)
-        return ebpo_head_fail(head, path, "its description is damaged", error);
+        return ebpo_head_fail(head, path, "the object's header is damaged", error);
     for (uint64_t i = 0; i < h->count; i++)
         if (h->message[i].type == EBPO_M_ATTRIBUTE && !(h->message[i].flags & 2))
             found += attribute_is(ebpo_head_message_cursor(h, &h->message[i]), name, out);
@@ -381,8 +386,8 @@ static ebpo_status find_attribute(ebpo_head *head, ebpo_head_object object, cons
         return EBPO_E_ABSENT;
     if (found == 1 && out->space.rank != UINT32_MAX && out->space.values == values && out->data)
         return EBPO_OK;
-    return attribute_fails(head, path, name, "it is damaged or has the wrong number of values",
-                           error);
+    return attribute_fails(head, path, name,
+                           "the attribute is damaged or has the wrong number of values", error);
 }
 
 ebpo_status ebpo_head_get_text(ebpo_head *head, ebpo_head_object object, const char *path,
@@ -401,10 +406,12 @@ ebpo_status ebpo_head_get_text(ebpo_head *head, ebpo_head_object object, const c
         return EBPO_OK;
     memset(text, 0, size);
     return attribute_fails(head, path, name,
-                           "it is not a fixed-length UTF-8 text of an allowed length", error);
+                           "the attribute is not a fixed-length UTF-8 text of an allowed length",
+                           error);
 }
 
-/* Reads an attribute's values, each of eight bytes. */
+/* Reads an attribute's values, which have `type` and eight bytes each. `count`: number of values;
+ * 0: one. `what`: message if the attribute has another type. */
 static ebpo_status get_numbers(ebpo_head *head, ebpo_head_object object, const char *path,
                                const char *name, ebpo_head_type type, uint64_t *values,
                                unsigned count, const char *what, ebpo_error *error)
@@ -428,7 +435,7 @@ ebpo_status ebpo_head_get_int(ebpo_head *head, ebpo_head_object object, const ch
     static const ebpo_head_type type = { EBPO_CLASS_INTEGER, 8, true };
     uint64_t bits = 0;
     ebpo_status status =
-        get_numbers(head, object, path, name, type, &bits, 0, "it is not an i64", error);
+        get_numbers(head, object, path, name, type, &bits, 0, "the attribute is not an i64", error);
     if (status == EBPO_OK)
         memcpy(value, &bits, sizeof bits);
     return status;
@@ -438,7 +445,8 @@ ebpo_status ebpo_head_get_count(ebpo_head *head, ebpo_head_object object, const 
                                 const char *name, uint64_t *value, ebpo_error *error)
 {
     static const ebpo_head_type type = { EBPO_CLASS_INTEGER, 8, false };
-    return get_numbers(head, object, path, name, type, value, 0, "it is not a u64", error);
+    return get_numbers(head, object, path, name, type, value, 0, "the attribute is not a u64",
+                       error);
 }
 
 ebpo_status ebpo_head_get_real(ebpo_head *head, ebpo_head_object object, const char *path,
@@ -449,8 +457,8 @@ ebpo_status ebpo_head_get_real(ebpo_head *head, ebpo_head_object object, const c
     uint64_t bits[LIMIT];
     if (count > LIMIT)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "attributes have at most %d values", LIMIT);
-    ebpo_status status =
-        get_numbers(head, object, path, name, type, bits, count, "its values are not f64", error);
+    ebpo_status status = get_numbers(head, object, path, name, type, bits, count,
+                                     "the attribute's values are not f64", error);
     if (status == EBPO_OK)
         memcpy(values, bits, (count ? count : 1) * sizeof bits[0]);
     return status;

@@ -1,8 +1,8 @@
-/* Opens the head of an untrusted file, and finds objects by their paths. The head consists of the
- * superblock and the headers of all objects, at the start of the file. Objects are found by the
- * names of links, from the root group on. HDF5 features that this format does not allow are
- * rejected with a specific message. Source: HDF5 File Format Specification 3.0, sections II.A and
- * IV.A.2.g; format-spec/hdf5-messages.md. */
+/* Opens the head of an untrusted file, and finds objects by their paths. The head is the superblock
+ * and the headers of all objects, at the start of the file. Objects are found by the names of
+ * links, from the root group on. HDF5 features that this format does not allow are rejected with a
+ * specific message. Source: HDF5 File Format Specification 3.0, sections II.A and IV.A.2.g;
+ * format-spec/hdf5-messages.md. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,7 +15,7 @@
 
 static const char signature[8] = "\211HDF\r\n\032\n";
 
-/* Returns true if other data precedes the superblock, which HDF5 allows; the superblock is then at
+/* Returns true if other data precede the superblock, which HDF5 allows. The superblock is then at
  * offset 512, 1024, 2048, and so on. */
 static bool has_user_block(ebpo_head_state *s)
 {
@@ -35,8 +35,8 @@ static bool has_signature(ebpo_head_state *s)
 }
 
 /* Reads the superblock, which locates the root group and states the end of the file. Returns false
- * if it is refused, with the reason in the refusal, or if it is damaged or not HDF5, without a
- * reason. */
+ * if the superblock is refused, with the reason in the refusal, or if it is damaged or not HDF5;
+ * then there is no refusal. */
 static bool read_superblock(ebpo_head *head)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
@@ -83,9 +83,11 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     ebpo_status status = ebpo_head_bytes_open(&s->bytes, input, error);
     if (status != EBPO_OK || read_superblock(head))
         return status;
-    static const char unknown[] =
-        "not a whole HDF5 file; was it cut off in copying, or is it something else?";
-    /* a message about a file that is not HDF5, such as a compressed file */
+    static const char unknown[] = "not a whole HDF5 file; check whether the file was truncated by "
+                                  "copying, or is another kind "
+                                  "of file";
+    /* message that names the file's type if it is a known type, such as a compressed file; or NULL
+     */
     const char *other_kind = ebpo_wrong_kind_of_file(s->bytes.first, s->bytes.first_bytes);
     if (other_kind && !s->refusal.what && !has_signature(s))
         return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", other_kind);
@@ -128,8 +130,8 @@ ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges, uint64_t
     return s->kept_no_memory ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
 }
 
-/* Returns true if a link message has this name. Sets *address to its target, or EBPO_NO_ADDRESS for
- * soft and external links, which are not followed. */
+/* Returns true if a link message has this name. Sets *address to the link's target, or to
+ * EBPO_NO_ADDRESS for soft and external links, which are not followed. */
 static bool link_is(ebpo_head_cursor c, const char *name, size_t length, uint64_t *address)
 {
     enum { HARD = 0 };
@@ -148,8 +150,8 @@ static bool link_is(ebpo_head_cursor c, const char *name, size_t length, uint64_
     return true;
 }
 
-/* Finds the links with this name in a group. Returns the number of links, and the target of the
- * last one in *address. */
+/* Finds the links with this name in a group. Returns their number, and the target of the last link
+ * in *address. */
 static unsigned follow_name(const ebpo_head_header *group, const char *name, size_t length,
                             uint64_t *address)
 {
@@ -172,7 +174,7 @@ ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_ob
             return EBPO_HEAD_OTHER;
         unsigned found = follow_name(h, path, length, object);
         path += length;
-        if (found == 0)
+        if (found == 0) /* ABSENT: only the last name of the path is missing */
             return *path ? EBPO_HEAD_OTHER : EBPO_HEAD_ABSENT;
         if (found > 1)
             ebpo_refuse(s, "the name occurs twice in its group");
@@ -196,7 +198,8 @@ ebpo_status ebpo_head_open_group(ebpo_head *head, const char *path, ebpo_head_ob
         return EBPO_OK;
     return ebpo_head_fail(head, path,
                           head->state->refusal.what ? "the group is damaged"
-                                                    : "a group is expected here and there is none",
+                                                    : "the group is missing; get a fresh copy of "
+                                                      "the file",
                           error);
 }
 

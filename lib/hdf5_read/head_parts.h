@@ -1,7 +1,7 @@
-/* Declares the parts of an open head, private to lib/hdf5_read: its bytes, a cursor in bytes,
- * headers of objects, and types, dimensions and filters. The library's writer puts headers at the
- * start of the file, and the chunk index of all arrays with more than one chunk into one range
- * after the first levels. */
+/* Declares the parts of an open head (the HDF5 headers of a file), private to lib/hdf5_read: its
+ * bytes, a cursor in bytes, headers of objects, and types, dimensions and filters. The library's
+ * writer puts headers at the start of the file, and the chunk indexes of all arrays with more than
+ * one chunk into one range after the first levels. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -20,10 +20,11 @@ typedef struct ebpo_head_bytes {
     ebpo_input *input;
     /* the file's first bytes, and a range at another offset (the window); NULL until needed */
     uint8_t *first, *window;
-    uint8_t *table; /* all of `index`, NULL until needed */
-    uint8_t *large; /* a range that fits none of the other buffers */
+    uint8_t *table; /* the bytes of `index`; NULL until needed */
+    uint8_t *large; /* a range that is too large for the window; NULL until needed */
+    /* size of `first`; offset and size of the window; size of `large` */
     uint64_t first_bytes, window_at, window_bytes, large_capacity;
-    ebpo_range index; /* range of the chunk index (ebpo_head_hint_index), or empty */
+    ebpo_range index; /* range of the chunk indexes (ebpo_head_hint_index), or empty */
     /* status of the input's first failure, after which nothing more is read */
     ebpo_status status;
     ebpo_error error;
@@ -34,14 +35,14 @@ EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_inpu
                                                ebpo_error *error);
 void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
 
-/* Returns the bytes [at, at + size), valid until the next call; the caller bounds `size`. NULL: the
- * bytes are beyond the end of the file, or could not be read (see `status`). */
+/* Returns the bytes [at, at + size) of the file, valid until the next call. The caller has checked
+ * that `size` is not too large to allocate. Returns NULL if the bytes are beyond the end of the
+ * file, or could not be read (bytes->status). */
 const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *bytes, uint64_t at, uint64_t size);
 
+#define EBPO_NO_ADDRESS UINT64_MAX /* in HDF5: an address that is not defined */
+
 /* A read position in untrusted bytes. Reads beyond the end return zeros and set `cut`. */
-
-#define EBPO_NO_ADDRESS UINT64_MAX
-
 typedef struct ebpo_head_cursor {
     const uint8_t *at, *end;
     bool cut; /* a read went beyond the end */
@@ -52,7 +53,8 @@ static inline size_t ebpo_cursor_left(const ebpo_head_cursor *c)
     return (size_t)(c->end - c->at);
 }
 
-/* Advances; returns NULL when too few bytes are left. */
+/* Returns the next `bytes` bytes, and advances. If fewer bytes are left, returns NULL and moves to
+ * the end. */
 static inline const uint8_t *ebpo_cursor_take(ebpo_head_cursor *c, size_t bytes)
 {
     const uint8_t *from = c->at;
@@ -65,7 +67,7 @@ static inline const uint8_t *ebpo_cursor_take(ebpo_head_cursor *c, size_t bytes)
     return from;
 }
 
-/* Reads an unsigned integer of at most 8 bytes. */
+/* Reads a little-endian unsigned integer of at most 8 bytes. */
 static inline uint64_t ebpo_cursor_uint(ebpo_head_cursor *c, unsigned bytes)
 {
     const uint8_t *from = ebpo_cursor_take(c, bytes);
@@ -97,7 +99,7 @@ static inline ebpo_head_cursor ebpo_cursor_part(ebpo_head_cursor *c, size_t byte
 
 /* --- an open head, and the headers of its objects --- */
 
-/* Types of messages. */
+/* Types of the messages in an object's header. */
 enum {
     EBPO_M_DATASPACE = 0x01,
     EBPO_M_LINK_INFO = 0x02,
@@ -114,39 +116,40 @@ enum {
 };
 
 typedef struct ebpo_head_message {
-    uint32_t offset, size; /* in the header's bytes */
+    uint32_t offset, size; /* of the message's data, in the header's bytes */
     uint8_t type, flags;
 } ebpo_head_message;
 
-/* An object's header: its consecutive blocks, and the messages in them. */
+/* An object's header: the bytes of its blocks, one after another, and the messages in them. */
 typedef struct ebpo_head_header {
-    uint64_t address, used; /* used: time of last use by the state's clock, 0: the slot is free */
-    uint8_t *bytes;
-    ebpo_head_message *message;
+    uint64_t address, used; /* used: time of last use by the state's clock; 0: the slot is free */
+    uint8_t *bytes;         /* [byte_count] */
+    ebpo_head_message *message; /* [count] */
     uint64_t byte_count, byte_capacity, count, capacity;
     ebpo_head_kind kind;
 } ebpo_head_header;
 
-/* The reason of a refusal. */
+/* Why the reader refuses a file or an object. */
 typedef struct ebpo_head_refusal {
-    const char *what; /* NULL: no refusal */
-    bool foreign;     /* the file is valid HDF5 by another writer, which only libhdf5 reads */
+    const char *what; /* the reason, for messages; NULL: no refusal */
+    bool foreign;     /* true: the file is valid HDF5 of another writer, which only libhdf5 reads */
 } ebpo_head_refusal;
 
 enum { EBPO_HEAD_SLOTS = 32 };
 
 typedef struct ebpo_head_state {
     ebpo_head_bytes bytes;
-    uint64_t root, clock;
+    uint64_t root;                          /* address of the root group's header */
+    uint64_t clock;                         /* number of accesses to headers so far */
     ebpo_head_header slot[EBPO_HEAD_SLOTS]; /* the last used headers */
     ebpo_head_refusal refusal;              /* the last refusal */
-    ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
+    ebpo_range *kept;                       /* recorded ranges: ebpo_head_keep_ranges */
     uint64_t kept_count, kept_capacity;
     bool keeps;          /* ranges are recorded */
     bool kept_no_memory; /* there was no memory to record a range */
 } ebpo_head_state;
 
-/* Records a range of the file that is in use, if ebpo_head_keep_ranges was called. */
+/* Records a range of the file that a header or index uses, if ebpo_head_keep_ranges was called. */
 static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_t size)
 {
     if (!s->keeps)
@@ -157,8 +160,8 @@ static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_
         s->kept_no_memory = true;
 }
 
-/* Records the reason of a refusal. Returns false, which the caller can return.
- * ebpo_refuse_foreign is for valid HDF5 of other writers. */
+/* Record the reason of a refusal. Return false, which the caller can return. ebpo_refuse_foreign is
+ * for valid HDF5 of other writers. */
 static inline bool ebpo_refuse(ebpo_head_state *s, const char *what)
 {
     s->refusal = (ebpo_head_refusal){ what, false };
@@ -170,14 +173,16 @@ static inline bool ebpo_refuse_foreign(ebpo_head_state *s, const char *what)
     return false;
 }
 
-/* Returns true if the checksum of a block is right. The checksum is the last four of its `size`
- * bytes. */
+/* Returns true if the checksum of a block is right. The last four of the block's `size` bytes are
+ * the checksum. */
 bool ebpo_head_sound(const uint8_t *block, uint64_t size);
 
-/* Returns the header at an address, valid until the next call. NULL: s->refusal has the reason. */
+/* Returns the header at an address, valid until the next call. Returns NULL if the header is
+ * refused, with the reason in s->refusal, or if reading failed. */
 const ebpo_head_header *ebpo_head_header_at(ebpo_head_state *s, uint64_t address);
 void ebpo_head_headers_free(ebpo_head_state *s);
 
+/* Returns a cursor over the data of a message. */
 static inline ebpo_head_cursor ebpo_head_message_cursor(const ebpo_head_header *h,
                                                         const ebpo_head_message *m)
 {
@@ -185,12 +190,12 @@ static inline ebpo_head_cursor ebpo_head_message_cursor(const ebpo_head_header *
     return (ebpo_head_cursor){ from, from + m->size, false };
 }
 
-/* Returns the kind of object at a path, and the address of its header. Without a refusal, ABSENT
- * and OTHER are reliable. */
+/* Returns the kind of object at a path, and the address of its header in *object. If s->refusal is
+ * set, the kinds ABSENT and OTHER are not reliable, because a header could not be read. */
 ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_object *object);
 
-/* Sets the error for a refusal: "`path`: `what`: the refusal". If the input has failed, sets the
- * input's error instead. */
+/* Sets the error for a refusal: "path: what: reason of the refusal". `what` may be "". If the input
+ * has failed, sets the input's error instead. */
 EBPO_MUST_USE ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
                                          ebpo_error *error);
 
@@ -200,24 +205,24 @@ typedef enum ebpo_head_class {
     EBPO_CLASS_INTEGER,       /* little-endian, using all bits */
     EBPO_CLASS_DOUBLE,        /* IEEE 754, little-endian, 64 bits */
     EBPO_CLASS_TEXT,          /* of fixed length, with any padding */
-    EBPO_CLASS_OTHER_INTEGER, /* big-endian, for example */
+    EBPO_CLASS_OTHER_INTEGER, /* another integer, for example big-endian */
     EBPO_CLASS_OTHER
 } ebpo_head_class;
 
 typedef struct ebpo_head_type {
     ebpo_head_class class;
-    uint32_t size;
+    uint32_t size; /* bytes of a value */
     bool is_signed;
 } ebpo_head_type;
 
 ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c);
 
-/* Dimensions. `values`: the product; 0 if there are no values or the product overflows 64 bits. */
+/* Dimensions of an array or attribute. */
 typedef struct ebpo_head_space {
     unsigned rank;    /* number of dimensions; UINT32_MAX: not readable */
     bool fixed;       /* the dimensions cannot grow */
     uint64_t size[2]; /* the first two dimensions */
-    uint64_t values;
+    uint64_t values;  /* product of the dimensions; 0: no values, or the product exceeds 64 bits */
 } ebpo_head_space;
 
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c);
@@ -225,9 +230,9 @@ ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c);
 /* Filters in the order of application. */
 enum { EBPO_HEAD_FILTERS = 3 };
 typedef struct ebpo_head_filters {
-    unsigned count; /* more than EBPO_HEAD_FILTERS: not of this format */
+    unsigned count; /* more than EBPO_HEAD_FILTERS: the format does not allow these filters */
     struct {
-        unsigned id, values, first; /* the filter, the number of its values, and the first value */
+        unsigned id, values, first; /* the filter, the number of its parameters, and the first */
     } filter[EBPO_HEAD_FILTERS];
 } ebpo_head_filters;
 

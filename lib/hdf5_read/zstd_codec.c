@@ -1,8 +1,8 @@
-/* Encodes and decodes chunks as zstd frames (RFC 8878), each with its content's size and a
- * checksum. This file also checks the parts of a frame that neither zstd's decoder nor a checksum
+/* Encodes and decodes chunks as zstd frames (RFC 8878). Each frame has its content's size and a
+ * checksum. This file also checks the parts of a frame that neither zstd's decoder nor the checksum
  * checks, so that every changed bit is detected. Each block of a frame is a byte plane of shuffled
- * elements (the k-th bytes of all elements), or a stream of a coding, because byte planes and
- * streams have different statistics. */
+ * elements (the k-th bytes of all elements), or a stream of a coding: byte planes and streams have
+ * different statistics, so each gets a separate table of codes. */
 #include <string.h>
 #include <zstd.h>
 
@@ -11,12 +11,13 @@
 
 /* --- parts that decoders do not check: RFC 8878, 3.1.1 --- */
 
+/* Types of blocks, and of literals. RLE: a byte that is repeated. */
 enum { RAW, RLE, COMPRESSED, RESERVED };
-enum { DESCRIPTOR = 4 };
+enum { DESCRIPTOR = 4 }; /* offset of the descriptor in a frame */
 static const char unused_set[] = "an unused bit of the zstd frame is set";
 
-/* Returns the bytes of the literals of a compressed block, with their header; 0: the block is cut
- * short. */
+/* Returns the size of the literals of a compressed block, including their header; 0: the block ends
+ * within this header. */
 static size_t literals_bytes(const uint8_t *block, size_t size)
 {
     unsigned kind = block[0] & 3, format = block[0] >> 2 & 3;
@@ -92,11 +93,10 @@ bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
 
 /* --- encoding --- */
 
-/* Begins a frame. A shuffled chunk consists of byte planes that have little in common: planes of
- * low bytes are noise, planes of high bytes are nearly constant. Each byte plane is a block with a
- * separate table of codes. Short matches are not used, because in such planes they take more bits
- * than single bytes. Chunks that are too small to gain by these settings are encoded as HDF5's
- * filter encodes them. */
+/* Begins a frame. If `level` is 0, chunks of at least LARGE bytes get other settings than zstd's
+ * defaults: a higher level, and no short matches, because in the byte planes of low bytes, which
+ * are noise, short matches take more bits than single bytes. Smaller chunks do not gain by these
+ * settings, and are encoded as HDF5's filter encodes them. */
 static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
 {
     enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
@@ -138,12 +138,13 @@ ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *
                            : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw,
                                             raw_bytes);
     *out_bytes = size;
-    /* `out` is large enough, so memory is the only possible cause */
+    /* `out` is large enough, so a lack of memory is the only possible cause */
     return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK;
 }
 
 /* --- decoding --- */
 
+/* Returns EBPO_E_FORMAT, with the reason in *why. */
 static ebpo_status frame_is_broken(const char **why, const char *what)
 {
     *why = what;
@@ -154,7 +155,7 @@ static ZSTD_DCtx *make_reader(void)
 {
     ZSTD_DCtx *in = ZSTD_createDCtx();
 #ifdef EBPO_FUZZING
-    if (in) /* ZSTD_d_forceIgnoreChecksum, see core/checksum.h */
+    if (in) /* ZSTD_d_forceIgnoreChecksum: a fuzzer cannot make correct checksums */
         (void)ZSTD_DCtx_setParameter(in, ZSTD_d_experimentalParam3, 1);
 #endif
     return in;

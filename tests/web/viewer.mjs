@@ -980,7 +980,7 @@ async function servesOrSays() {
   mkdirSync(empty);
   assert.match(says(process.env, '--folder', empty), /^1 serve\.sh: .*no \.ebpo\.h5 file is there;.*--folder.*quickstart\.sh[^\n]*\n$/);
   writeFileSync(join(empty, 'torn.ebpo.h5'), readFileSync(join(models, 'ring.ebpo.h5')).subarray(0, 5000));
-  assert.match(says(process.env, '--folder', empty), /^1 list\.js: omitted: torn\.ebpo\.h5: [^/\n]*cut off in copying[^/\n]*\nserve\.sh: .*none of its files can be shown\n$/);
+  assert.match(says(process.env, '--folder', empty), /^1 list\.js: omitted: torn\.ebpo\.h5: [^/\n]*truncated by copying[^/\n]*\nserve\.sh: .*none of its files can be shown\n$/);
   const list = JSON.parse(run('node', [join(root, 'tools/web/list.js'), join(empty, 'torn.ebpo.h5'), join(models, 'ring.ebpo.h5')]));
   assert.deepEqual(list.map((item) => item.file), ['ring.ebpo.h5']);
   rmSync(join(empty, 'torn.ebpo.h5'));
