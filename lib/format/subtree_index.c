@@ -126,7 +126,7 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     if (last &&
         sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] != c->end[EBPO_S_SHARED_FACES])
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
-                             "its rows do not match the table's counts", error);
+                             "the array's rows do not match the table's counts", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
         (void)column_maximum(chunks->file, k, &exact);
         if (last && !exact ? sums[k] > c->end[k] : sums[k] != c->end[k])

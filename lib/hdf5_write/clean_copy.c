@@ -1,8 +1,9 @@
-/* Rewrites a file that another program has rewritten in an HDF5 layout of its choice: makes a copy
- * in this format's layout, through libhdf5 in a separate process (separate_process.c). Chunks whose
- * filters and rows fit the format are copied as stored. For other layouts, filters and byte orders,
- * libhdf5 decodes the values. Arrays that do not fit the format are omitted, and the first one is
- * reported. Depth and number of objects are bounded, because hard links may form cycles. */
+/* Copies a file that another program has rewritten in another HDF5 layout. The copy has this
+ * format's layout; it is made through libhdf5 in a separate process (separate_process.c). Chunks
+ * whose filters and rows fit the format are copied as stored. For other layouts, filters and byte
+ * orders, libhdf5 decodes the values. Arrays that do not fit the format are omitted, and the first
+ * omitted array is reported. Depth and number of objects are bounded, because hard links may form
+ * cycles. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,26 +19,27 @@
 #include "hdf5_write/zstd_filter.h"
 
 enum {
-    HEAD_BYTES = 262144,
-    DEPTH_MAX = 2,      /* greatest depth of a group: /levels/00 */
-    OBJECTS_MAX = 8192, /* because hard links may form cycles */
-    VALUE_MAX = 65536,  /* bytes of an attribute */
-    LEVEL = 1,          /* compression level: the copy is short-lived */
-    CACHE_BYTES = 256 << 20,
-    PATH = 96
+    HEAD_BYTES = 262144,     /* bytes for the headers of the copy */
+    DEPTH_MAX = 2,           /* greatest depth of a group: /levels/00 */
+    OBJECTS_MAX = 8192,      /* greatest number of objects and attributes */
+    VALUE_MAX = 65536,       /* greatest number of bytes of an attribute */
+    LEVEL = 1,               /* compression level: the lowest, because the copy is temporary */
+    CACHE_BYTES = 256 << 20, /* of decoded chunks in libhdf5 */
+    PATH = 96                /* size of a path, including the final zero byte */
 };
 
+/* State of copying a file. The functions below set c->status and *c->error on failure. */
 typedef struct copying {
     hid_t from;
     ebpo_h5_out to;
     const char *from_path, *to_path, *shown;
     bool from_goes; /* true: the name from_path is removed after opening */
     ebpo_h5_chunk_rows_fn chunk_rows;
-    bool subtrees, kept;    /* arguments of chunk_rows (ebpo_h5_chunk_rows_fn) */
-    ebpo_pipeline pipeline; /* filters of all arrays of the copy */
-    hid_t access;           /* access list of arrays, with a cache for large chunks */
-    unsigned objects, depth;
-    ebpo_error omitted; /* reason why the first array was omitted */
+    bool subtrees, kept;     /* arguments of chunk_rows (ebpo_h5_chunk_rows_fn) */
+    ebpo_pipeline pipeline;  /* filters of all arrays of the copy */
+    hid_t access;            /* access list of arrays, with a cache for large chunks */
+    unsigned objects, depth; /* number of objects so far; depth of the current group */
+    ebpo_error omitted;      /* reason why the first omitted array was omitted */
     ebpo_status status;
     ebpo_error *error;
 } copying;
@@ -56,7 +58,8 @@ typedef struct attribute_copy {
     ebpo_h5_id to;
 } attribute_copy;
 
-/* Copies an attribute of fixed size; the format has no other attributes. */
+/* Callback of H5Aiterate2: copies an attribute of fixed size. Skips other attributes, which the
+ * format does not have. */
 static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *info, void *user)
 {
     (void)info;
@@ -95,28 +98,31 @@ static void copy_attributes(copying *c, hid_t from, ebpo_h5_id to, const char *p
     attribute_copy a = { c, to };
     hsize_t at = 0;
     if (H5Aiterate2(from, H5_INDEX_NAME, H5_ITER_NATIVE, &at, copy_attribute, &a) < 0)
-        copy_fails(c, path, "its attributes are damaged");
+        copy_fails(c, path, "the object's attributes are damaged");
 }
 
 /* --- arrays --- */
 
-/* An array of the file, and the shape that its copy has. */
+/* An array to copy. */
 typedef struct array_copy {
-    hid_t set, plist;
+    hid_t set, plist; /* the array in the file, and its creation properties */
     const char *path;
-    ebpo_shape shape;
+    ebpo_shape shape;       /* of the copy, after inspect_object */
     uint64_t stored_chunks; /* number of chunks in the file */
-    bool as_stored;         /* chunks are copied as stored */
+    bool as_stored;         /* true: chunks are copied as stored */
     hid_t type;             /* type for reading values */
 } array_copy;
 
-/* Records the reason why the first omitted array is omitted. */
+/* Records why an array is omitted, if it is the first omitted array. */
 static void omit_array(copying *c, const char *path, const char *what)
 {
     if (!*c->omitted.message)
         (void)!ebpo_fail_at(&c->omitted, EBPO_E_FORMAT, c->shown, path, -1, "%s", what);
 }
 
+/* Finds the pipeline of an array's filters. Returns false if the format does not have these
+ * filters.
+ */
 static bool find_pipeline(hid_t plist, unsigned element_size, ebpo_pipeline *pipeline)
 {
     enum { FILTERS_MAX = 3 };
@@ -159,8 +165,10 @@ static bool can_decode(copying *c, const array_copy *a)
             continue;
         snprintf(
             what, sizeof what,
-            "the array is compressed by HDF5's filter %d (%.40s), which is not built in; where "
-            "its plugin is installed, rewrite the file with `h5repack -f SHUF -f GZIP=6 -f FLET`",
+            "the array is compressed by HDF5's filter %d (%.40s), which libhdf5 does not have; on "
+            "a "
+            "machine with this filter's plugin, rewrite the file with `h5repack -f SHUF -f GZIP=6 "
+            "-f FLET`",
             id, *name && ebpo_text_ok(name) ? name : "no name");
         omit_array(c, a->path, what);
         return false;
@@ -199,7 +207,8 @@ static const char *find_values(array_copy *a)
     return NULL;
 }
 
-/* Finds the number of chunks in the file, and their rows if a chunk has all columns. */
+/* Finds the number of the array's chunks in the file. Sets shape.chunk_rows to their number of
+ * rows, if chunks have all columns. */
 static void find_chunks(array_copy *a)
 {
     int rank = a->shape.cols ? 2 : 1;
@@ -214,7 +223,7 @@ static void find_chunks(array_copy *a)
         a->shape.chunk_rows = (uint32_t)chunk[0];
 }
 
-/* Examines an array; returns false if it is omitted. */
+/* Examines an array, and finds the shape of its copy. Returns false if the array is omitted. */
 static bool inspect_object(copying *c, array_copy *a)
 {
     const char *wrong = a->plist >= 0 ? find_values(a) : "the array is damaged";
@@ -234,8 +243,8 @@ static bool inspect_object(copying *c, array_copy *a)
     return can_decode(c, a);
 }
 
-/* Returns true if all chunks are stored. HDF5 would silently return the fill value for missing
- * chunks. */
+/* Returns true if the file has all chunks of the array. For a missing chunk, HDF5 would silently
+ * return the fill value. */
 static bool has_all_chunks(const array_copy *a)
 {
     hsize_t chunks = 0;
@@ -248,7 +257,8 @@ static bool has_all_chunks(const array_copy *a)
     return exists;
 }
 
-/* Reads a chunk as stored. Returns false if it must be decoded. */
+/* Reads the chunk that begins with row `first` as stored. Returns false if the chunk must be
+ * decoded instead. */
 static bool read_stored(const array_copy *a, uint64_t first, void *data, size_t bound,
                         size_t *bytes)
 {
@@ -277,7 +287,8 @@ static bool read_values(const array_copy *a, uint64_t first, uint64_t rows, void
     return good;
 }
 
-/* Decodes a chunk of the copy, and encodes it in the format. */
+/* Reads the values of the copy's chunk that begins with row `first`, and encodes this chunk.
+ * Returns false on failure. */
 static bool make_chunk(copying *c, const array_copy *a, uint64_t first, uint8_t *data,
                        size_t *bytes)
 {
@@ -321,9 +332,9 @@ static void copy_values(copying *c, const array_copy *a)
     free(data);
 }
 
-/* Makes the chunk directory, an array that must exist in the copy. The original directory would
- * describe other chunks. So the directory gets one row, and lacks the attributes that make it
- * valid, so that it is never read. */
+/* Makes a chunk directory in the copy. The array must exist, but the original directory describes
+ * other chunks. So the new directory has one row, and lacks the attributes `file_bytes` and
+ * `offset`: readers ignore a directory without these attributes. */
 static void make_empty_directory(copying *c, const char *path)
 {
     static const uint64_t none[2];
@@ -357,8 +368,8 @@ static void copy_array(copying *c, hid_t group, const char *name, const char *pa
         H5Dclose(a.set);
 }
 
-/* Returns the number of rows in a chunk of an array of the file; 1 for an array without chunks, 0
- * if the array is missing. */
+/* Returns the number of rows in a chunk of an array of the file. Returns 1 for an array without
+ * chunks, and 0 if the array is missing. */
 static hsize_t rows_of(hid_t file, const char *path)
 {
     hid_t set = H5Dopen2(file, path, H5P_DEFAULT), plist = set >= 0 ? H5Dget_create_plist(set) : -1;
@@ -371,8 +382,9 @@ static hsize_t rows_of(hid_t file, const char *path)
     return chunk[0];
 }
 
-/* Chooses the filters of the copy: the filters of an array that every file has. Sets c->kept if the
- * chunks in the file have the rows that the format requires. */
+/* Chooses the filters of the copy: those of /levels/00/types, which every file has, if the format
+ * allows them. Sets c->kept to true if the chunks in the file have the rows that the format
+ * requires. */
 static void inspect_file(copying *c)
 {
     array_copy a = { .set = H5Dopen2(c->from, "/levels/00/types", H5P_DEFAULT) };
@@ -403,6 +415,8 @@ typedef struct group_copy {
 
 static void copy_group(copying *c, hid_t from, const char *path);
 
+/* Callback of H5Literate: copies the array or group to which a link refers. Skips objects that do
+ * not belong to this format. */
 static herr_t copy_link(hid_t group, const char *name, const H5L_info_t *info, void *user)
 {
     const group_copy *g = user;
@@ -446,6 +460,7 @@ static void copy_group(copying *c, hid_t from, const char *path)
     c->depth -= *path != 0;
 }
 
+/* Does the work of the separate process. */
 static ebpo_status copy_all(void *user, ebpo_error *error)
 {
     copying *c = user;

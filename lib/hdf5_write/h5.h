@@ -1,7 +1,7 @@
-/* Writes HDF5 files in this library's layout: groups, fixed-size attributes, chunked integer arrays
- * whose chunks are already encoded (lib/hdf5_read reads them). This is the only module that
- * includes <hdf5.h>. It serialises calls, so any thread may call it. Errors name file and object.
- */
+/* Writes HDF5 files in this library's layout: groups, fixed-size attributes, and chunked integer
+ * arrays whose chunks are already encoded (lib/hdf5_read reads these files without libhdf5). Only
+ * lib/hdf5_write includes <hdf5.h>. It serialises calls of libhdf5, so any thread may call these
+ * functions. Errors name file and object. */
 #ifndef EBPO_HDF5_WRITE_H5_H
 #define EBPO_HDF5_WRITE_H5_H
 
@@ -11,34 +11,34 @@
 
 typedef int64_t ebpo_h5_id; /* an open object; negative: none */
 
-/* Registers filter 32015 with libhdf5 in this process. */
+/* Registers filter 32015 (zstd) with libhdf5 in this process. */
 EBPO_MUST_USE ebpo_status ebpo_h5_register(ebpo_error *error);
 
-/* An output file. The call that detects the first failed write, and all later calls, return this
- * failure. */
+/* An output file. If a write fails, the call that detects this failure and all later calls return
+ * it. */
 typedef struct ebpo_h5_out {
-    const char *shown; /* for messages; owned by the caller */
-    ebpo_h5_id file;
+    const char *shown;         /* the file's name for messages; owned by the caller */
+    ebpo_h5_id file;           /* negative: not open */
     int codec_level;           /* level that the headers state with the filters; 0: the default */
-    struct ebpo_h5_sink *sink; /* through which libhdf5 writes (h5_parts.h) */
+    struct ebpo_h5_sink *sink; /* virtual file driver through which libhdf5 writes (h5_parts.h) */
 } ebpo_h5_out;
 #define EBPO_H5_OUT_INIT \
     {                    \
         "", -1, 0, NULL  \
     }
 
-/* Closes an object that was opened or created by a function below. Call it before the file is
- * closed. A negative id is allowed. If closing fails, the next call returns this failure,
- * ebpo_h5_finish at the latest. */
+/* Closes an object that a function below has opened or created. Close all objects before the file.
+ * A negative id is allowed. If closing fails, the next call, at the latest ebpo_h5_finish, returns
+ * this failure. */
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id);
 
-/* Creates a file by name, or in memory when path is NULL. The first `head_bytes` bytes are for
- * metadata. `links`: number of objects in the root group. */
+/* Creates a file by name, or in memory if `path` is NULL. The first `head_bytes` bytes are reserved
+ * for metadata (HDF5 headers). `links`: number of objects in the root group. */
 EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
                                          uint64_t head_bytes, unsigned links, ebpo_error *error);
-/* Closes the file and reopens it; none of its objects may be open. Metadata that is allocated
- * afterwards is stored in one contiguous range of `metadata_bytes` bytes, which is next in the
- * file. */
+/* Closes the file and reopens it; none of its objects may be open. Metadata that are allocated
+ * afterwards are stored in one contiguous range of `metadata_bytes` bytes, which is allocated at
+ * the end of the file with the first of these metadata. */
 EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes,
                                          ebpo_error *error);
 /* ebpo_h5_root opens the root group for its attributes. ebpo_h5_make_group creates a group with
@@ -47,8 +47,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_er
 EBPO_MUST_USE ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links,
                                              ebpo_h5_id *id, ebpo_error *error);
 
-/* Writes attributes. `count` 0: a scalar; else a one-dimensional array. Writing a name again
- * overwrites the value (same type and size). */
+/* Write an attribute. `count` 0: a scalar; else a one-dimensional array. If the attribute exists,
+ * its value is overwritten; type and size must then be the same. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const char *text, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
@@ -78,22 +78,23 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, 
                                             const ebpo_shape *shape, uint64_t chunk,
                                             const void *data, size_t bytes, ebpo_error *error);
 
-/* Sets *bytes to the number of bytes from the start of a file in memory to the end of the last
- * metadata so far. `first_raw`: offset at which raw data begins. */
+/* Sets *bytes to the number of bytes from the start of a file in memory to the end of its metadata
+ * so far. `first_raw`: offset at which raw data (chunks) begin. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                                             ebpo_error *error);
 /* Returns the current size of the file in bytes. */
 EBPO_MUST_USE ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error);
-/* Flushes and closes the file. Harmless if the file is closed already. The file is complete only
- * after EBPO_OK. */
+/* Flushes and closes the file. Does nothing if the file is closed already. The file is complete
+ * only if this function returns EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
-/* Closes the file without further writing, also after a failed call. Harmless after ebpo_h5_finish.
- */
+/* Closes the file without further writing, also after a failed call. Does nothing after
+ * ebpo_h5_finish. */
 void ebpo_h5_discard(ebpo_h5_out *out);
 
 /* HDF5 files for other programs: plain arrays of numbers that grow by rows, with filters that every
  * build of HDF5 has (shuffle, deflate). Errors name file and object. */
 
+/* Type of the numbers of an array. */
 typedef enum ebpo_h5_number {
     EBPO_H5_U8,
     EBPO_H5_I32,
@@ -107,7 +108,7 @@ static inline size_t ebpo_h5_number_bytes(ebpo_h5_number number)
     return number == EBPO_H5_U8 ? 1 : number == EBPO_H5_I32 || number == EBPO_H5_F32 ? 4 : 8;
 }
 
-/* An array that grows by rows: [rows] when cols is 0, else [rows][cols]. */
+/* An array that grows by rows: [rows] if cols is 0, else [rows][cols]. */
 typedef struct ebpo_h5_table {
     ebpo_h5_id id;
     char path[96];
@@ -131,13 +132,13 @@ EBPO_MUST_USE ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char 
 EBPO_MUST_USE ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path,
                                              ebpo_h5_number number, uint32_t cols,
                                              ebpo_h5_table *table, ebpo_error *error);
-/* Appends rows, in the machine's byte order; stored little-endian. */
+/* Appends rows. `data`: [rows][cols] in the machine's byte order. */
 EBPO_MUST_USE ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data,
                                          uint64_t rows, ebpo_error *error);
 /* Closes a table, which writes its last data. If this fails, the next call returns the failure. */
 void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table);
 
-/* Writes an array at once: make, append and close. */
+/* Creates an array, writes all its rows and closes it. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,
                                             ebpo_h5_number number, uint32_t cols, const void *data,
                                             uint64_t rows, ebpo_error *error);
@@ -147,35 +148,36 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,
 EBPO_MUST_USE ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path,
                                               const uint64_t dims[3], ebpo_h5_id *id,
                                               ebpo_error *error);
-/* Writes layers from `first` on, from data[layers][dims[1]][dims[2]]. */
+/* Writes `layers` layers from layer `first` on. `data`: [layers][dims[1]][dims[2]]. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
                                              const uint64_t dims[3], uint64_t first,
                                              uint64_t layers, const double *data,
                                              ebpo_error *error);
 
-/* Files in layouts of other programs, read through libhdf5 in a separate process. */
+/* Reading of files in layouts of other programs, through libhdf5 in a separate process. */
 
+/* Limits of a separate process. */
 typedef struct ebpo_process_limits {
-    uint64_t memory_bytes; /* address space beyond the address space of this process */
+    uint64_t memory_bytes; /* address space in addition to the address space of this process */
     uint64_t file_bytes;   /* greatest size of a file that the process writes */
     unsigned seconds;      /* processor time */
 } ebpo_process_limits;
 
-/* Returns the number of rows of a chunk of an array in this format. `stored`: the array's shape in
- * the file, with the chunk_rows that the other program has chosen, or 0 if there are no chunks.
- * `subtrees`: the file has subtrees. `kept`: in the file, arrays whose chunk size the format fixes
- * have chunks of this size. */
+/* Callback that returns the number of rows that an array's chunks have in this format. `stored`:
+ * the array's shape in the file, with the chunk_rows that the other program has chosen, or 0 if
+ * there are no chunks. `subtrees`: the file has subtrees. `kept`: the other program has kept the
+ * chunk size of arrays whose chunk size the format fixes. */
 typedef uint32_t (*ebpo_h5_chunk_rows_fn)(const char *path, const ebpo_shape *stored, bool subtrees,
                                           bool kept);
 
-/* Rewrites the parts of a file that belong to this format in this format's layout: from the file
+/* Copies the parts of a file that belong to this format, in this format's layout, from the file
  * `from` to the empty file `to`. libhdf5 opens files by name. The name `to` is removed as soon as
- * libhdf5 has opened that file, and so is `from` if `from_goes` is true. Chunks that fit the format
- * are copied as stored. For other layouts, filters and byte orders, libhdf5 decodes the values.
- * Arrays that do not fit the format are omitted; *omitted then describes the first such array and
- * the reason (EBPO_E_FORMAT). If no array is omitted, *omitted has no message; on failure, *omitted
- * is the same error as *error. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without
- * libhdf5. */
+ * libhdf5 has opened the file; the name `from` is removed in the same way if `from_goes` is true.
+ * Chunks that fit the format are copied as stored. For other layouts, filters and byte orders,
+ * libhdf5 decodes the values. Arrays that do not fit the format are omitted. *omitted describes the
+ * first omitted array and the reason (EBPO_E_FORMAT), or has no message if no array is omitted; on
+ * failure, *omitted is the same error as *error. Returns EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY;
+ * EBPO_E_UNSUPPORTED if the library was built without libhdf5. */
 EBPO_MUST_USE ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                                              const char *shown, ebpo_h5_chunk_rows_fn chunk_rows,
                                              const ebpo_process_limits *limits, ebpo_error *omitted,

@@ -1,7 +1,7 @@
 /* Declares how lib/hdf5_write uses libhdf5; private to this folder. Every call of libhdf5 is in a
- * scope, between ebpo_h5_enter and ebpo_h5_leave. A scope locks one mutex of the library, because
- * Debian's serial build of libhdf5 is not thread-safe. It also switches off HDF5's error printing,
- * and restores it at the end. */
+ * scope: between ebpo_h5_enter and ebpo_h5_leave. A scope locks a mutex that all threads share,
+ * because Debian's serial build of libhdf5 is not thread-safe. A scope also switches off HDF5's
+ * error printing; ebpo_h5_leave restores the printing. */
 #ifndef EBPO_HDF5_WRITE_H5_PARTS_H
 #define EBPO_HDF5_WRITE_H5_PARTS_H
 
@@ -12,7 +12,7 @@
 #include "hdf5_write/h5.h"
 
 typedef struct ebpo_h5_scope {
-    H5E_auto2_t printer;
+    H5E_auto2_t printer; /* the error printing to restore */
     void *printer_data;
 } ebpo_h5_scope;
 
@@ -24,16 +24,18 @@ void ebpo_h5_leave(ebpo_h5_scope *scope);
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what);
 
-/* Returns true if the last call failed for lack of memory. */
+/* Returns true if the last call of libhdf5 failed for lack of memory. */
 bool ebpo_h5_short_of_memory(void);
 
-/* Opens a file of another program to read. With `lock`, fails while another program has the file
- * open for writing, because the data may then be a mixture of two versions. If the file system has
- * no locks, the file is opened without one. On failure, *file is -1. */
+/* Opens a file of another program for reading. If `lock` is true, fails while another program has
+ * the file open for writing, because the data may then be a mixture of two versions; if the file
+ * system has no locks, opens the file without a lock. On failure, *file is -1. */
 EBPO_MUST_USE ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                                                hid_t *file, ebpo_error *error);
 
-/* Returns true if the values are stored in other files that this file names. */
+/* Returns true if a dataset's values are stored in other files or datasets, which the dataset
+ * names.
+ */
 bool ebpo_h5_is_elsewhere(hid_t set);
 
 /* Returns the stored type for little-endian integers of `size` bytes; -1 for another size. */
@@ -43,50 +45,53 @@ hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
  * write, but reports every write to libhdf5 as successful; sink.c explains why. */
 
 typedef struct ebpo_h5_sink {
-    hid_t id;        /* libhdf5's registration of the driver */
-    int fd;          /* -1: bytes are kept in memory */
-    uint8_t *memory; /* [capacity] */
-    uint64_t capacity, size;
+    hid_t id;                /* libhdf5's registration of the driver */
+    int fd;                  /* of the file; -1: the bytes are in `memory` */
+    uint8_t *memory;         /* [capacity] */
+    uint64_t capacity, size; /* size: of the file or of the used memory, in bytes */
     /* status of the first failure */
     ebpo_status status;
     ebpo_error error;
     char shown[]; /* for messages */
 } ebpo_h5_sink;
 
-/* Opens the file and empties it, or opens memory when path is NULL. May be called inside or outside
- * the scope. */
+/* Opens the file and empties it; if `path` is NULL, the sink keeps the bytes in memory. May be
+ * called inside or outside a scope. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
                                             ebpo_error *error);
-/* Makes a file access property list use the sink; returns false when libhdf5 refuses. Call this
- * function inside the scope. */
+/* Makes a file access property list use the sink; returns false if libhdf5 reports an error. Call
+ * this function inside a scope. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl);
 /* Stores a failure, if it is the first one. */
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);
 /* Returns the stored failure, or EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error);
-/* Closes the sink's file after libhdf5 has closed it, inside the scope. Returns the first failure,
- * including the failure of this close. */
+/* Closes the sink's file after libhdf5 has closed the file, and frees the sink. Call this function
+ * inside a scope. Returns the first failure, including a failure of this function. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error);
 /* Releases the file but keeps the sink: libhdf5 could not close its file, for lack of memory, and
  * may call the driver again at any time. */
 void ebpo_h5_sink_abandon(ebpo_h5_sink *sink);
 
-/* The functions below write what all layouts have in common. Call them inside the scope. They close
- * the spaces and property lists that they receive, also after an earlier failure. */
+/* The functions below write objects for h5_write.c (this library's layout) and tables.c (files for
+ * other programs). Call them inside a scope. They close the spaces and property lists that they
+ * receive, also after an earlier failure. */
 
-/* Returns properties of a file that is written through the sink; -1 when libhdf5 refuses. */
+/* Returns the access properties of a file that is written through the sink, or -1 if libhdf5
+ * reports an error. `version`: format version of HDF5 to write. */
 struct ebpo_h5_sink;
 hid_t ebpo_h5_write_access(struct ebpo_h5_sink *sink, H5F_libver_t version);
 /* Returns EBPO_OK if libhdf5 has created out->file. */
 ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error);
 
-/* Returns EBPO_OK if the call succeeded and no write has failed so far; otherwise the first failed
- * write, or libhdf5's error. Call this function right after the libhdf5 call, because further calls
- * of libhdf5 erase its reason. */
+/* Returns EBPO_OK if a call of libhdf5 succeeded (`good`) and no write has failed so far. Otherwise
+ * returns the failure of the first failed write or, if no write has failed, of the call. `what`:
+ * the object that was written, for the message. Call this function right after the call of libhdf5,
+ * because further calls erase libhdf5's reason. */
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error);
 
-/* Creates a group; closes the property list. `good`: false if setting a property failed, which
- * makes this function fail. */
+/* Creates a group; closes the property list. If `good` is false (setting a property has failed),
+ * this function fails. */
 ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gcpl, bool good,
                               ebpo_h5_id *id, ebpo_error *error);
 /* Creates a dataset; closes the space and the property list. `good`: as in ebpo_h5_put_group. */
@@ -101,18 +106,20 @@ ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const ch
 void ebpo_h5_close_list(hid_t list);
 void ebpo_h5_close_space(hid_t space);
 
-/* The work of a separate process, with limits, in which libhdf5 reads untrusted files. The process
- * has no other thread, loads no plugin, and libhdf5 prints nothing. Changes of memory are lost;
- * files that the work writes stay. */
+/* The work of a separate process in which libhdf5 reads untrusted files. The process has no other
+ * thread, loads no plugin, and libhdf5 prints nothing. Only files that the work writes, and the
+ * status and error that it returns, remain after the process has ended. */
 typedef ebpo_status (*ebpo_process_fn)(void *user, ebpo_error *error);
 
-/* Runs `work` in a separate process; a crash ends only that process. Returns the status and error
- * of the work; even if the status is EBPO_OK, *error may have a message. EBPO_E_FORMAT if the
- * process crashed or exceeded a limit. `shown`: name of the file for messages. */
+/* Runs `work` in a separate process with limits; a crash ends only that process. Returns the status
+ * and error of the work; even if the status is EBPO_OK, *error may have a message. Returns
+ * EBPO_E_FORMAT if the process crashed or exceeded a limit. `shown`: name of the file for messages.
+ */
 EBPO_MUST_USE ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *shown,
                                               const ebpo_process_limits *limits, ebpo_error *error);
 
-/* Writes all bytes, also after interruptions; returns false with errno on failure. */
+/* Writes all bytes, also if signals interrupt the writing. Returns false on failure, with the
+ * reason in errno. */
 bool ebpo_process_write(int fd, const void *data, size_t bytes);
 
 #endif

@@ -1,5 +1,6 @@
-/* Reads rows of numbers from untrusted files (ebpo/rows.h). libhdf5 reads the rows in a separate
- * process, which writes them to an unnamed file for this process. */
+/* Reads rows of numbers from untrusted HDF5 files (ebpo/rows.h). libhdf5 reads the rows in a
+ * separate process, which writes the rows to an unnamed temporary file, so that this process can
+ * read them. */
 #include <ebpo/rows.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -21,22 +22,22 @@ enum {
     COLUMNS_MAX = 64,
     ROWS_AT_ONCE = 16384,
     /* The rows may take at most EXPANSION_MAX times the bytes of the file (deflate cannot compress
-       more), but at least EXPANSION_FREE bytes are allowed. Without a limit, a file of a kilobyte
-       could state any number of rows. */
+       more), or EXPANSION_FREE bytes if that is more. Without a limit, a file of a kilobyte could
+       state any number of rows. */
     EXPANSION_MAX = 1024,
     EXPANSION_FREE = 64 << 20
 };
 
 /* A dataset to read, and the request. */
 typedef struct dataset {
-    const char *path, *name; /* of the file; of the dataset in the file */
-    int to;                  /* descriptor to write the rows to */
-    unsigned least, most;    /* allowed numbers of columns */
-    uint64_t bytes_max;      /* limit for all rows */
-    double fill;             /* value of the columns that the dataset lacks */
-    uint64_t first, end;     /* the requested rows [first, end) */
-    hid_t file, set, space, type;
-    hsize_t size[2];
+    const char *path, *name;      /* path of the file; name of the dataset in the file */
+    int to;                       /* descriptor of the temporary file for the rows */
+    unsigned least, most;         /* allowed numbers of columns */
+    uint64_t bytes_max;           /* limit for all rows */
+    double fill;                  /* value of the columns that the dataset lacks */
+    uint64_t first, end;          /* the requested rows [first, end) */
+    hid_t file, set, space, type; /* while the dataset is open */
+    hsize_t size[2];              /* rows and columns of the dataset */
 } dataset;
 
 static ebpo_status rows_fail(const dataset *d, const char *what, ebpo_error *error)
@@ -62,7 +63,9 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     d->set = H5Dopen2(d->file, d->name, access);
     H5Pclose(access);
     if (elsewhere || (d->set >= 0 && ebpo_h5_is_elsewhere(d->set)))
-        return rows_fail(d, "its values are in another file, which is not read; name that file",
+        return rows_fail(d,
+                         "the dataset's values are in another file, which is not read; name this "
+                         "other file",
                          error);
     if (d->set < 0)
         return rows_fail(d, "there is no such dataset", error);
@@ -71,7 +74,9 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     return d->space < 0 || d->type < 0 ? rows_fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
-/* Returns true if the file's root names this format, or the format of paint files. */
+/* Returns true if the file's root attribute `format` names this format or the format of paint
+ * files.
+ */
 static bool is_of_format(hid_t file)
 {
     enum { LIMIT = 64 };
@@ -115,14 +120,14 @@ static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2]
            H5Sget_simple_extent_dims(space, size, NULL) == 2 && size[1] >= least && size[1] <= most;
 }
 
-/* Writes "rows of 3 numbers", or "rows of 6 to 7 numbers". */
+/* Writes the expected shape of rows, such as "rows of 3 numbers" or "rows of 6 to 7 numbers". */
 static void describe_rows(const dataset *d, char what[64])
 {
     snprintf(what, 64, "rows of %u%s%.0u numbers", d->least, d->most > d->least ? " to " : "",
              d->most > d->least ? d->most : 0);
 }
 
-/* Writes a shape as "2 x 3"; nothing for a single value. */
+/* Writes the shape of a dataset as "2 x 3", or "" for a single value. */
 static void describe_shape(hid_t space, char *text, size_t capacity)
 {
     hsize_t size[H5S_MAX_RANK];
@@ -133,13 +138,15 @@ static void describe_shape(hid_t space, char *text, size_t capacity)
                        (uint64_t)size[i]);
 }
 
+/* Checks that the dataset has rows of an allowed number of real numbers, and not too many rows.
+ * Sets d->size. */
 static ebpo_status check_set(dataset *d, ebpo_error *error)
 {
     char what[256], wanted[64], shape[96];
     const char *others = other_values(d, d->set, d->type);
     describe_rows(d, wanted);
     if (others) {
-        snprintf(what, sizeof what, "has %s; expected %s", others, wanted);
+        snprintf(what, sizeof what, "the dataset has %s; expected %s", others, wanted);
         return rows_fail(d, what, error);
     }
     if (has_rows(d->space, d->least, d->most, d->size))
@@ -147,21 +154,22 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
                    ? EBPO_OK
                    : ebpo_h5_fail(
                          error, EBPO_E_LIMIT, d->path, d->name,
-                         "has so many more rows than its file has bytes that reading it may "
-                         "exhaust memory; give its rows as a NumPy array");
+                         "the dataset has so many more rows than the file has bytes that reading "
+                         "the dataset may exhaust memory; pass the rows as a NumPy array");
     describe_shape(d->space, shape, sizeof shape);
     snprintf(what, sizeof what, "expected %s, got %s%s", wanted,
              *shape ? "an array of " : "a single value", shape);
     return rows_fail(d, what, error);
 }
 
-/* The candidate datasets. */
+/* The datasets of the file that have the requested rows. */
 typedef struct candidates {
     const dataset *d;
-    unsigned objects, found;
-    char names[384];
+    unsigned objects, found; /* number of visited objects, and of datasets found */
+    char names[384];         /* the first names, for a message */
 } candidates;
 
+/* Callback of H5Ovisit2: adds a dataset to the candidates if it has the requested rows. */
 static herr_t inspect_object(hid_t file, const char *name, const H5O_info_t *info, void *user)
 {
     enum { OBJECTS_MAX = 65536, SHOWN = 4 };
@@ -201,14 +209,16 @@ static ebpo_status name_sets(dataset *d, ebpo_error *error)
     (void)H5Ovisit2(d->file, H5_INDEX_NAME, H5_ITER_INC, inspect_object, &c, H5O_INFO_BASIC);
     H5Eclear2(H5E_DEFAULT);
     if (!c.found)
-        return ebpo_fail_file(error, EBPO_E_ABSENT, d->path, "has no dataset of %s", wanted);
+        return ebpo_fail_file(error, EBPO_E_ABSENT, d->path, "the file has no dataset of %s",
+                              wanted);
     return ebpo_fail_file(error, EBPO_E_FORMAT, d->path,
                           "is an HDF5 file; name a dataset of %s in it: %s%s", wanted,
                           *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
 }
 
-/* Reads rows from `first` on, into the first columns of rows with `most` columns. On failure, sets
- * *short_of_memory to true if a lack of memory is the reason. */
+/* Reads `count` rows from row `first` on into `rows`, [count][most]. If the dataset has fewer than
+ * `most` columns, the last columns of `rows` do not change. On failure, sets *short_of_memory to
+ * true if a lack of memory is the reason. */
 static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *rows,
                        bool *short_of_memory)
 {
@@ -234,7 +244,7 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
     hsize_t end = d->end < d->size[0] ? d->end : d->size[0];
     uint64_t total = d->size[0];
     if (!ebpo_process_write(d->to, &total, sizeof total))
-        return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
+        return ebpo_fail_errno(error, d->path, "the rows could not be written to TMPDIR");
     for (hsize_t first = d->first; first < end; first += ROWS_AT_ONCE) {
         hsize_t count = end - first < ROWS_AT_ONCE ? end - first : ROWS_AT_ONCE;
         bool short_of_memory;
@@ -242,12 +252,12 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
             return short_of_memory ? ebpo_fail_memory(error, d->size[0] * d->size[1] * sizeof *rows)
                                    : rows_fail(d, "the dataset cannot be read", error);
         if (!ebpo_process_write(d->to, rows, (size_t)count * d->most * sizeof *rows))
-            return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
+            return ebpo_fail_errno(error, d->path, "the rows could not be written to TMPDIR");
     }
     return EBPO_OK;
 }
 
-/* The work of the separate process. */
+/* Does the work of the separate process. */
 static ebpo_status read_apart(void *user, ebpo_error *error)
 {
     dataset *d = user;
@@ -261,6 +271,7 @@ static ebpo_status read_apart(void *user, ebpo_error *error)
     return status == EBPO_OK ? copy_rows(d, error) : status;
 }
 
+/* Reads `bytes` bytes of the temporary file from offset `from` on. */
 static bool read_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes)
 {
     for (uint64_t at = 0; at < bytes;) {
@@ -280,18 +291,18 @@ static ebpo_status read_result(const dataset *d, double **rows, uint64_t *count,
 {
     struct stat facts;
     if (fstat(d->to, &facts) != 0 || !read_bytes(d, 0, total, sizeof *total))
-        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
+        return ebpo_fail_errno(error, d->path, "the temporary rows in TMPDIR cannot be read");
     uint64_t bytes = (uint64_t)facts.st_size - sizeof *total;
     *rows = ebpo_alloc(bytes, 1);
     if (!*rows)
         return ebpo_fail_memory(error, bytes);
     if (!read_bytes(d, sizeof *total, *rows, bytes))
-        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
+        return ebpo_fail_errno(error, d->path, "the temporary rows in TMPDIR cannot be read");
     *count = bytes / (d->most * sizeof **rows);
     return EBPO_OK;
 }
 
-/* Computes the limit of bytes, and opens the unnamed file for the rows. */
+/* Computes the limit of bytes, and opens the unnamed temporary file for the rows. */
 static ebpo_status prepare_reading(dataset *d, ebpo_error *error)
 {
     const char *folder = getenv("TMPDIR");
@@ -306,7 +317,9 @@ static ebpo_status prepare_reading(dataset *d, ebpo_error *error)
     d->bytes_max = d->bytes_max < EXPANSION_FREE ? EXPANSION_FREE : d->bytes_max;
     d->to = ebpo_open_unnamed(folder && *folder ? folder : "/tmp");
     return d->to >= 0 ? EBPO_OK
-                      : ebpo_fail_errno(error, d->path, "not enough space for its rows in TMPDIR");
+                      : ebpo_fail_errno(error, d->path,
+                                        "a temporary file for the rows could not be opened in "
+                                        "TMPDIR");
 }
 
 ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, unsigned most,

@@ -1,8 +1,8 @@
 /* Creates files in this library's layout: headers are one contiguous range at the start, links and
- * attributes are in the object headers, and chunks arrive already encoded. Spaces and property
- * lists are closed, also after an earlier failure. All calls after a failed write return the first
- * failure (sink.c). This file also writes the attributes of tables for other programs (tables.c).
- */
+ * attributes are in the object headers, and chunks are written as the caller has encoded them. HDF5
+ * spaces and property lists are closed, also after an earlier failure. All calls after a failed
+ * write return the first failure (sink.c). This file also writes the attributes of tables for other
+ * programs (tables.c). */
 #include <string.h>
 
 #include "core/error.h"
@@ -10,8 +10,8 @@
 #include "hdf5_write/h5_parts.h"
 #include "hdf5_write/zstd_filter.h"
 
-/* With this limit of links and attributes, HDF5 stores them in object headers. HDF5 would otherwise
- * use B-trees and heaps. */
+/* Number of links or attributes of an object up to which HDF5 stores them in the object's header.
+ * Beyond this number HDF5 would use B-trees and heaps, which readers of this format do not read. */
 enum { COMPACT = 65535 };
 
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
@@ -26,8 +26,8 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
     ebpo_h5_leave(&scope);
 }
 
-/* Makes libhdf5 keep all metadata in memory. If libhdf5 had to read metadata again and this failed,
- * libhdf5 could not close the file. */
+/* Makes libhdf5 keep all metadata in memory, so that it never reads metadata again: if such a read
+ * failed, libhdf5 could not close the file. */
 static bool keep_metadata(hid_t fapl)
 {
     H5AC_cache_config_t config = { .version = H5AC__CURR_CACHE_CONFIG_VERSION };
@@ -52,6 +52,8 @@ hid_t ebpo_h5_write_access(ebpo_h5_sink *sink, H5F_libver_t version)
     return ok ? fapl : -1;
 }
 
+/* Returns the access properties of a file in this library's layout, or -1. `head_bytes`: size of
+ * the blocks of metadata. */
 static hid_t file_access(ebpo_h5_sink *sink, uint64_t head_bytes)
 {
     hid_t fapl = ebpo_h5_write_access(sink, H5F_LIBVER_V110);
@@ -69,7 +71,7 @@ static bool set_group(hid_t plist, unsigned links)
     return plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0 &&
            H5Pset_attr_phase_change(plist, COMPACT, 0) >= 0 &&
            H5Pset_link_phase_change(plist, COMPACT, 0) >= 0 &&
-           H5Pset_est_link_info(plist, links, 12) >= 0;
+           H5Pset_est_link_info(plist, links, 12) >= 0; /* 12: typical length of a name */
 }
 
 ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
@@ -92,7 +94,7 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
 }
 
 /* Closes the file. Sets out->file to -1 even if closing fails, because libhdf5 has released the
- * file then too. */
+ * file also in this case. */
 static ebpo_status close_file(ebpo_h5_out *out, ebpo_error *error)
 {
     bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
@@ -147,7 +149,7 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
 
 /* --- attributes: stored little-endian, from values in the machine's order --- */
 
-/* Writes numbers; `count` 0: a scalar. */
+/* Writes an attribute of `count` numbers; 0: a scalar. */
 static ebpo_status put_numbers(ebpo_h5_out *out, ebpo_h5_id id, const char *name, hid_t stored,
                                hid_t memory, const void *values, unsigned count, ebpo_error *error)
 {
@@ -292,9 +294,8 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
     return status;
 }
 
-/* Returns the size of the head. Metadata blocks end with a checksum, and unused space is zero: so
- * the head ends at the last byte that is not zero, or a few bytes later if a checksum ends with
- * zeros. */
+/* Unused space is zero, and metadata blocks end with a checksum. So the metadata end at the last
+ * byte that is not zero, or a few bytes later if the checksum ends with zeros. */
 ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                               ebpo_error *error)
 {
@@ -359,8 +360,8 @@ void ebpo_h5_discard(ebpo_h5_out *out)
     ebpo_h5_leave(&scope);
 }
 
-/* Returns the sink's first failure, or the failure of the call before (if `good` is false), or
- * EBPO_OK. */
+/* Returns the sink's first failure, if any. Otherwise, if `good` is false, returns the failure of
+ * the last call of libhdf5; else EBPO_OK. */
 static ebpo_status report_outcome(const ebpo_h5_out *out, const char *object, bool good,
                                   const char *what, ebpo_error *error)
 {

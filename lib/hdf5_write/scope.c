@@ -1,7 +1,7 @@
-/* Provides the scope of each use of libhdf5 (h5_parts.h): a mutex, because Debian's serial build is
- * not thread-safe, and HDF5's error printing switched off and restored. Also provides functions
- * that are used within a scope: errors that name file, object and libhdf5's innermost reason, and
- * opening untrusted files. Registers the library's filter. */
+/* Provides the scope of each use of libhdf5 (h5_parts.h): locks a mutex, because Debian's serial
+ * build is not thread-safe, and switches off HDF5's error printing. Also provides functions that
+ * are used within a scope: they make errors that name file, object and libhdf5's innermost reason,
+ * and open untrusted files. Registers the library's filter. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -31,10 +31,14 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
     pthread_mutex_unlock(&library);
 }
 
-/* CAUSE_BYTES: libhdf5's messages have the path first and then the error number, so a path must
- * fit. CAUSE_SHOWN: greatest length in our messages. */
-enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
+enum {
+    /* size of a buffer for a message of libhdf5: in this message, a path precedes the error number,
+     * which is needed */
+    CAUSE_BYTES = 8192,
+    CAUSE_SHOWN = 160 /* greatest length of libhdf5's message in a message of this library */
+};
 
+/* Callback of H5Ewalk2: copies libhdf5's innermost message to `data`. */
 static herr_t copy_first_message(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
@@ -43,7 +47,7 @@ static herr_t copy_first_message(unsigned depth, const H5E_error2_t *entry, void
     return 1; /* stop: only the innermost message is needed */
 }
 
-/* Sets *data to true for an error that is a lack of memory. */
+/* Callback of H5Ewalk2: sets *data to true for an error that is a lack of memory. */
 static herr_t record_memory(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
@@ -81,6 +85,7 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
     return ebpo_fail_at(error, status, shown, object, -1, "%s", what);
 }
 
+/* Opens a file for reading. Returns a negative id on failure. */
 static hid_t open_with(const char *path, bool lock)
 {
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
@@ -109,22 +114,22 @@ ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                               "is marked as open for writing; close it in the program that "
                               "writes it, or, if that program has crashed, remove the mark with "
                               "`h5clear -s`");
-    if (number) {
+    if (number) { /* the file system has no locks */
         H5Eclear2(H5E_DEFAULT);
         *file = open_with(path, false);
     }
-    return *file >= 0
-               ? EBPO_OK
-               : ebpo_h5_fail(error, EBPO_E_FORMAT, shown, "", "not a whole HDF5 file, or damaged");
+    return *file >= 0 ? EBPO_OK
+                      : ebpo_h5_fail(error, EBPO_E_FORMAT, shown, "",
+                                     "not a whole HDF5 file, or the file is damaged");
 }
 
 bool ebpo_h5_is_elsewhere(hid_t set)
 {
-    hid_t made = H5Dget_create_plist(set);
+    hid_t plist = H5Dget_create_plist(set);
     bool elsewhere =
-        made >= 0 && (H5Pget_layout(made) == H5D_VIRTUAL || H5Pget_external_count(made) > 0);
-    if (made >= 0)
-        H5Pclose(made);
+        plist >= 0 && (H5Pget_layout(plist) == H5D_VIRTUAL || H5Pget_external_count(plist) > 0);
+    if (plist >= 0)
+        H5Pclose(plist);
     return elsewhere;
 }
 

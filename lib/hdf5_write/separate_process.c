@@ -1,6 +1,6 @@
 /* Runs libhdf5 on untrusted files in a separate process, so that a crash does not end this process.
- * The process is forked. It has limits of memory, time and bytes written, and loads no plugins. It
- * reports its status and error through a pipe. */
+ * The separate process is forked from this process. It has limits of memory, time and bytes
+ * written, and loads no plugins. It reports its status and error through a pipe. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 
-/* The result that the other process reports at its end. */
+/* The result that the separate process reports at its end. */
 typedef struct report {
     ebpo_status status;
     ebpo_error error;
@@ -32,6 +32,7 @@ static uint64_t address_bytes(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
+/* Lowers a limit of this process to `most`. */
 static void limit_resource(int what, uint64_t most)
 {
     struct rlimit limit;
@@ -42,8 +43,8 @@ static void limit_resource(int what, uint64_t most)
     }
 }
 
-/* Sets the limits of the separate process. `address_space`: bytes of addresses at the beginning; 0:
- * not known. */
+/* Sets the limits of the separate process. `address_space`: bytes of the address space when the
+ * process was forked; 0: not known. */
 static void set_limits(const ebpo_process_limits *limits, uint64_t address_space)
 {
     limit_resource(RLIMIT_CORE, 0);
@@ -71,8 +72,8 @@ bool ebpo_process_write(int fd, const void *data, size_t bytes)
     return true;
 }
 
-/* Returns 1 if all bytes were read, 0 if the other end was closed early, and -1 if reading failed.
- */
+/* Reads from a pipe. Returns 1 if all bytes were read, 0 if the other end was closed early, and -1
+ * if reading failed. */
 static int read_all(int fd, void *data, size_t bytes)
 {
     for (char *at = data; bytes > 0;) {
@@ -94,9 +95,9 @@ static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits
     static const int handled[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
     report r = { EBPO_OK, EBPO_ERROR_INIT };
     for (size_t i = 0; i < sizeof handled / sizeof handled[0]; i++)
-        /* signal handlers of the caller are for the caller's process */
+        /* signal handlers of the caller must not run in the separate process */
         signal(handled[i], SIG_DFL);
-    signal(SIGXFSZ, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); /* so that a write beyond the limit fails */
     signal(SIGPIPE, SIG_IGN);
     set_limits(limits, address_space);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
@@ -111,16 +112,17 @@ static ebpo_status fail_by_state(int state, const char *shown, ebpo_error *error
 {
     if (!WIFSIGNALED(state)) /* the process ended by itself, but could not report its result */
         return ebpo_fail_file(error, EBPO_E_IO, shown,
-                              "the process that read it through libhdf5 ended early");
+                              "the separate process that reads the file through libhdf5 ended "
+                              "early");
     if (WTERMSIG(state) == SIGXCPU || WTERMSIG(state) == SIGKILL)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, shown,
             "libhdf5 exceeded its limits of time or memory; the file is damaged or malicious");
-    return ebpo_fail_file(
-        error, EBPO_E_FORMAT, shown,
-        "libhdf5 crashed on it, in a separate process, by signal %d (%s); the file is damaged or "
-        "malicious: do not trust it",
-        WTERMSIG(state), strsignal(WTERMSIG(state)));
+    return ebpo_fail_file(error, EBPO_E_FORMAT, shown,
+                          "libhdf5 crashed on the file, in a separate process, by signal %d (%s); "
+                          "the file is damaged "
+                          "or malicious, so do not trust it",
+                          WTERMSIG(state), strsignal(WTERMSIG(state)));
 }
 
 static bool make_pipe(int ends[2])
@@ -140,7 +142,8 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
     ebpo_h5_scope scope;
     report r;
     if (!make_pipe(ends))
-        return ebpo_fail_errno(error, shown, "no process could be started for it");
+        return ebpo_fail_errno(error, shown,
+                               "the separate process for reading could not be started");
     uint64_t address_space = address_bytes();
     ebpo_h5_enter(&scope); /* so that no thread is in libhdf5 when the process is forked */
     pid_t child = fork();
@@ -149,7 +152,7 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
         close(ends[0]);
         run_work(work, user, limits, address_space, ends[1]);
     }
-    int fault = errno;
+    int fault = errno; /* the reason of a failure, because the calls below overwrite errno */
     ebpo_h5_leave(&scope);
     close(ends[1]);
     int reported = child > 0 ? read_all(ends[0], &r, sizeof r) : 0;
@@ -159,11 +162,13 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
         ;
     if (child < 0) {
         errno = fault;
-        return ebpo_fail_errno(error, shown, "no process could be started for it");
+        return ebpo_fail_errno(error, shown,
+                               "the separate process for reading could not be started");
     }
     errno = fault;
     if (reported < 0)
-        return ebpo_fail_errno(error, shown, "the result of the process that read it is invalid");
+        return ebpo_fail_errno(error, shown,
+                               "the result of the separate process for reading is not readable");
     if (!reported)
         return fail_by_state(state, shown, error);
     /* terminate the texts, because the process may have written any bytes */

@@ -1,4 +1,4 @@
-/* Provides the virtual file driver through which libhdf5 writes to a file or to memory.
+/* Provides the virtual file driver (sink) through which libhdf5 writes to a file or to memory.
  *
  * libhdf5 1.10 does not survive a failed write: it keeps unflushed data and an id whose file is
  * already released, and fails when it uses this id at exit. So the driver stores the first failure,
@@ -45,6 +45,7 @@ ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error)
     return sink->status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &sink->error);
 }
 
+/* Stores a failure with the system's reason (errno), if it is the first one. */
 static void fail_errno(ebpo_h5_sink *sink, const char *what)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -129,7 +130,8 @@ static herr_t sink_close(H5FD_t *file)
     return 0;
 }
 
-/* Returns the same flags as libhdf5's default driver. The offsets of metadata depend on them. */
+/* Sets the same flags as libhdf5's default driver, because the offsets of metadata depend on these
+ * flags. */
 static herr_t sink_query(const H5FD_t *file, unsigned long *flags)
 {
     (void)file;
@@ -157,20 +159,21 @@ static haddr_t sink_get_eof(const H5FD_t *file, H5FD_mem_t type)
     return ((const sink_file *)file)->sink->size;
 }
 
-/* Returns the number of bytes read, which is less than `size` at the end of the file. */
+/* Reads bytes of the file. Returns the number of bytes read, which is less than `size` at the end
+ * of the file or on failure. */
 static size_t read_file(ebpo_h5_sink *sink, uint64_t at, size_t size, uint8_t *to)
 {
     size_t done = 0;
     while (done < size) {
         size_t call_bytes = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
-        ssize_t got = pread(sink->fd, to + done, call_bytes, (off_t)(at + done));
-        if (got < 0 && errno == EINTR)
+        ssize_t received = pread(sink->fd, to + done, call_bytes, (off_t)(at + done));
+        if (received < 0 && errno == EINTR)
             continue;
-        if (got < 0)
+        if (received < 0)
             fail_errno(sink, "cannot be read back");
-        if (got <= 0)
+        if (received <= 0)
             break;
-        done += (size_t)got;
+        done += (size_t)received;
     }
     return done;
 }
@@ -182,13 +185,14 @@ static herr_t sink_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addre
     (void)dxpl;
     ebpo_h5_sink *sink = ((sink_file *)file)->sink;
     size_t available = 0;
+    /* available: bytes before the end of the file; bytes beyond the end are zeros */
     if (sink->fd >= 0)
         available = read_file(sink, address, size, buffer);
     else if (address < sink->size)
         available = sink->size - address < size ? (size_t)(sink->size - address) : size;
     if (sink->fd < 0 && available)
         memcpy(buffer, sink->memory + address, available);
-    memset((uint8_t *)buffer + available, 0, size - available); /* bytes beyond the end are zeros */
+    memset((uint8_t *)buffer + available, 0, size - available);
     return 0;
 }
 
@@ -197,16 +201,16 @@ static void write_file(ebpo_h5_sink *sink, uint64_t at, size_t size, const uint8
     size_t done = 0;
     while (done < size) {
         size_t call_bytes = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
-        ssize_t put = pwrite(sink->fd, data + done, call_bytes, (off_t)(at + done));
-        if (put < 0 && errno == EINTR)
+        ssize_t written = pwrite(sink->fd, data + done, call_bytes, (off_t)(at + done));
+        if (written < 0 && errno == EINTR)
             continue;
-        if (put == 0)
+        if (written == 0)
             errno = EIO;
-        if (put <= 0) {
+        if (written <= 0) {
             fail_errno(sink, "could not be written");
             return;
         }
-        done += (size_t)put;
+        done += (size_t)written;
     }
 }
 
@@ -280,10 +284,9 @@ static const H5FD_class_t sink_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
-/* Registers the driver again for each file, because the caller may have closed libhdf5 (H5close)
- * after the previous file. sink->id keeps the driver registered until ebpo_h5_sink_close. This is
- * necessary because libhdf5, when it closes a file, releases its own reference to the driver before
- * it calls the driver's `close`. */
+/* Registers the driver for each file, because the caller may have closed libhdf5 (H5close) since
+ * the previous file. sink->id keeps the driver registered until ebpo_h5_sink_close, because libhdf5
+ * releases its own reference to the driver before it calls the driver's function `close`. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
 {
     sink_settings settings = { sink };

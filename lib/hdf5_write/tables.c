@@ -8,8 +8,9 @@
 #include "hdf5_write/h5.h"
 #include "hdf5_write/h5_parts.h"
 
-enum { ROWS_OF_A_CHUNK = 8192, DEFLATE = 1 };
+enum { ROWS_OF_A_CHUNK = 8192, DEFLATE = 1 /* level */ };
 
+/* Returns the type of the numbers in the file. */
 static hid_t stored_type(ebpo_h5_number number)
 {
     switch (number) {
@@ -22,6 +23,7 @@ static hid_t stored_type(ebpo_h5_number number)
     return -1;
 }
 
+/* Returns the type of the numbers in memory. */
 static hid_t memory_type(ebpo_h5_number number)
 {
     switch (number) {
@@ -133,8 +135,7 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
     return status;
 }
 
-/* Size of a chunk of a volume. Neighbouring distances differ only in their last bytes, which
- * deflate compresses little. */
+/* Size of a chunk of a volume: layers, and values along the other two axes. */
 enum { LAYERS_OF_A_CHUNK = 16, SIDE_OF_A_CHUNK = 64 };
 
 static hsize_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }

@@ -1,6 +1,6 @@
-/* Replaces this module where the library is built without libhdf5 (-Dhdf5=disabled): the library
- * still reads files of this format, but the functions of this module fail. Only ebpo_h5_finish
- * succeeds, because no file is open. */
+/* Replaces all other files of lib/hdf5_write if the library is built without libhdf5
+ * (-Dhdf5=disabled). The library then still reads files of this format, but the functions in this
+ * file fail. Only ebpo_h5_finish succeeds, because no file is open. */
 #include <ebpo/rows.h>
 
 #include "core/error.h"
@@ -9,8 +9,8 @@
 static ebpo_status is_unsupported(const char *shown, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, shown,
-                          "this library was built without libhdf5, and only reads files of this "
-                          "format; use a library that was built with -Dhdf5=enabled");
+                          "this library was built without libhdf5, and can only read .ebpo.h5 "
+                          "files; use a library that was built with -Dhdf5=enabled");
 }
 
 ebpo_status ebpo_h5_register(ebpo_error *error) { return is_unsupported("HDF5", error); }
@@ -112,7 +112,6 @@ ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error)
 
 ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
 {
-    /* nothing is open */
     (void)out, (void)error;
     return EBPO_OK;
 }

@@ -1,7 +1,7 @@
 /* Provides HDF5 filter 32015, which stores a chunk as one zstd frame. The library registers the
- * filter with libhdf5 in its process. This file, compiled a second time with EBPO_FILTER_IN_PLUGIN,
- * is a plugin for h5dump, h5py and all other programs. The file uses only headers of HDF5 and does
- * not link with HDF5's library, so one plugin serves all builds of HDF5. */
+ * filter with libhdf5 in its process. This source file is compiled a second time, with
+ * EBPO_FILTER_IN_PLUGIN, as a plugin for h5dump, h5py and all other programs. The plugin uses only
+ * headers of HDF5 and does not link with libhdf5, so one plugin serves all builds of HDF5. */
 #include "hdf5_write/zstd_filter.h"
 
 #ifdef EBPO_FILTER_IN_PLUGIN
@@ -16,9 +16,9 @@ enum { DEFAULT_LEVEL = 3 };
 /* HDF5 stores chunk sizes in 32 bits. */
 static const uint64_t CHUNK_MAX = UINT32_MAX;
 
-/* Returns 0, HDF5's sign of failure, and sets the cause. The plugin sets no cause: programs with a
- * private libhdf5, such as h5py, could not load the plugin, because HDF5's error functions would be
- * missing. */
+/* Returns 0, HDF5's sign of failure, and reports the reason to libhdf5. The plugin does not report
+ * it: programs with a private libhdf5, such as h5py, could not load a plugin that calls HDF5's
+ * error functions. */
 static size_t short_of_memory(void)
 {
 #ifndef EBPO_FILTER_IN_PLUGIN
@@ -28,7 +28,8 @@ static size_t short_of_memory(void)
     return 0;
 }
 
-/* Replaces HDF5's buffer by `block`. Returns the number of bytes in use. */
+/* Replaces HDF5's buffer by `block`, which has `capacity` bytes. Returns `used`, the number of
+ * bytes in use. */
 static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, size_t capacity,
                              size_t used)
 {
@@ -38,8 +39,8 @@ static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, si
     return used;
 }
 
-/* Replaces the buffer by its compressed content. Returns the compressed size, or 0 after an error.
- */
+/* Replaces the buffer by its compressed content. `level`: [level_count] parameters of the filter.
+ * Returns the compressed size, or 0 after an error. */
 static size_t compress_chunk(size_t level_count, const unsigned level[], size_t bytes,
                              size_t *buffer_size, void **buffer)
 {
@@ -64,7 +65,7 @@ failed:
     return 0; /* HDF5's sign of failure */
 }
 
-/* Decodes a frame that states its size, in one call. */
+/* Decodes a frame that states its size. Returns the size, or 0 after an error. */
 static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, void **buffer)
 {
     void *block = NULL;
@@ -80,7 +81,8 @@ static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, voi
     return replace_buffer(buffer, buffer_size, block, (size_t)size, used);
 }
 
-/* Decodes a frame that does not state its size, as other writers make it, into a growing buffer. */
+/* Decodes a frame of another writer, which does not state its size, into a growing buffer. Returns
+ * the size, or 0 after an error. */
 static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
 {
     ZSTD_DCtx *context = ZSTD_createDCtx();
