@@ -1,13 +1,13 @@
-/* Provides sources of files whose bytes arrive asynchronously (ebpo/async.h). Supplied bytes are
- * stored in extents (ranges of the file), in order and without overlaps. A read copies from
- * extents. If bytes are missing, the read notes its range as wanted and returns EBPO_E_PENDING.
- * Prefetch hints are noted in the same way, so the caller fetches all ranges of a round trip
- * together.
+/* Provides sources of files whose bytes arrive asynchronously (ebpo/async.h). The bytes that the
+ * caller supplies are stored in extents (ranges of the file), in order and without overlaps. A read
+ * copies from extents. If bytes are missing, the read records its range as wanted and returns
+ * EBPO_E_PENDING. The ranges of prefetch hints are also recorded, so the caller fetches all ranges
+ * that are needed next together.
  *
- * An operation is one call of the caller, which is repeated until all bytes are available. A clock
- * counts reads, supplied ranges and operations. An extent that was used since the oldest running
- * operation began is never removed. So the available bytes only grow while an operation is
- * repeated, which limits the number of repetitions. */
+ * An operation is a call that the caller repeats until all bytes are available. A clock counts
+ * reads, supplied ranges and operations. An extent that was used since the oldest running operation
+ * began is never removed. So, while an operation is repeated, available bytes never become missing
+ * again, which limits the number of repetitions. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -19,15 +19,16 @@
 #include "core/error.h"
 
 enum {
-    HEAD_BYTES = 131072,   /* the first bytes, which opening reads; as for URLs (http_cache.h) */
-    RANGE_BYTES = 4 << 20, /* limit of one needed range */
+    HEAD_BYTES = 131072,   /* the first bytes, which opening reads (EBPO_HTTP_HEAD for URLs) */
+    RANGE_BYTES = 4 << 20, /* greatest size of a needed range */
     /* smaller gaps between needed ranges are also fetched, which is faster than another request */
     GAP_BYTES = 16384,
-    GAP_BYTES_OF_MANY = 32768, /* instead of GAP_BYTES, for more than MANY ranges */
+    GAP_BYTES_OF_MANY = 32768, /* used instead of GAP_BYTES for more than MANY ranges */
     MANY = 256,
-    COMPACT_COUNT = 1 << 16 /* number of wanted ranges that are merged before more are noted */
+    COMPACT_COUNT = 1 << 16 /* the wanted ranges are merged each time when so many were added */
 };
 
+/* Supplied bytes [begin, end) of the file. */
 typedef struct extent {
     uint64_t begin, end;
     uint64_t used; /* time of supply or of the last read */
@@ -36,13 +37,13 @@ typedef struct extent {
 
 struct ebpo_async {
     pthread_mutex_t lock;
-    char *name, *version;
-    uint64_t size;   /* of the file */
-    uint64_t memory; /* limit of the bytes in extents */
-    uint64_t held;   /* bytes in extents */
-    bool changed;    /* the file has changed: every call fails */
-    uint64_t clock;
-    extent *extents; /* [extent_count] by offset */
+    char *name, *version; /* name for messages; version of the file, or "" if it is not known */
+    uint64_t size;        /* bytes of the file */
+    uint64_t memory;      /* limit of the bytes in extents */
+    uint64_t held;        /* bytes in extents */
+    bool changed;         /* true: the file has changed, so that every call fails */
+    uint64_t clock;       /* see the head comment */
+    extent *extents;      /* [extent_count] by offset */
     uint64_t extent_count, extent_capacity;
     ebpo_range *wanted; /* [wanted_count] ranges of pending reads and of hints, in any order */
     uint64_t wanted_count, wanted_capacity;
@@ -81,6 +82,7 @@ static ebpo_range first_missing(const ebpo_async *a, uint64_t begin, uint64_t en
     return (ebpo_range){ begin, next - begin };
 }
 
+/* Returns true if all bytes of [begin, end) are available. */
 static bool is_available(const ebpo_async *a, uint64_t begin, uint64_t end)
 {
     return first_missing(a, begin, end).size == 0;
@@ -131,7 +133,8 @@ static bool compare_bytes(const ebpo_async *a, uint64_t begin, uint64_t end, con
 
 /* --- removing old bytes --- */
 
-/* Returns true if the extent is not part of the head, and no running operation has used it. */
+/* Returns true if the extent is not part of the head, and was not used since the oldest running
+ * operation began. */
 static bool is_removable(const ebpo_async *a, const extent *e)
 {
     return e->begin >= HEAD_BYTES && (a->running_count == 0 || e->used < a->running[0]);
@@ -143,8 +146,9 @@ static int compare_use(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Returns the time of use up to which extents are removed, so that the memory limit is met. */
-static uint64_t find_oldest_kept(const ebpo_async *a)
+/* Returns a time: if all removable extents that were last used up to this time are removed, the
+ * memory limit is met, as far as possible. Returns 0 if no extent can be removed. */
+static uint64_t find_removal_time(const ebpo_async *a)
 {
     uint64_t count = 0, last = 0, excess = a->held - a->memory;
     uint64_t(*old)[2] = ebpo_alloc(a->extent_count, sizeof *old);
@@ -166,7 +170,7 @@ static void remove_old(ebpo_async *a)
 {
     if (a->held <= a->memory || a->unlisted)
         return;
-    uint64_t last = find_oldest_kept(a), kept = 0;
+    uint64_t last = find_removal_time(a), kept = 0;
     for (uint64_t i = 0; i < a->extent_count; i++) {
         extent e = a->extents[i];
         if (is_removable(a, &e) && e.used <= last) {
@@ -214,7 +218,8 @@ static bool record_wanted(ebpo_async *a, ebpo_range range)
     return true;
 }
 
-/* Adds the missing parts of [begin, end) to the needed ranges, in pieces of about equal size. */
+/* Adds the missing parts of [begin, end) to the needed ranges, divided into ranges of about equal
+ * size and at most RANGE_BYTES. Returns false when memory is short. */
 static bool add_needed(ebpo_async *a, uint64_t begin, uint64_t end, uint64_t *count)
 {
     for (ebpo_range m = first_missing(a, begin, end); m.size;
@@ -393,14 +398,15 @@ static bool check_version(ebpo_async *a, const char *version)
     return true; /* if memory is short, the version stays unknown */
 }
 
+/* Stores the missing bytes of [begin, end). */
 static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end, const uint8_t *bytes,
                                   ebpo_error *error)
 {
     for (ebpo_range m = first_missing(a, begin, end); m.size;
          m = first_missing(a, m.offset + m.size, end)) {
         if (m.offset < HEAD_BYTES && m.offset + m.size > HEAD_BYTES)
-            m.size = HEAD_BYTES -
-                     m.offset; /* the head is a separate extent, because it is never removed */
+            /* no extent has bytes on both sides, because the head is never removed */
+            m.size = HEAD_BYTES - m.offset;
         if (!insert_extent(a, m.offset, m.offset + m.size, bytes + (m.offset - begin)))
             return ebpo_fail_memory(error, m.size);
     }
@@ -427,7 +433,7 @@ ebpo_status ebpo_async_supply(ebpo_async *a, uint64_t offset, uint64_t size, con
 
 uint64_t ebpo_async_bytes(const ebpo_async *a)
 {
-    /* The cast removes const to lock the object, which does not change. */
+    /* the cast removes const only for locking */
     ebpo_async *locked = (ebpo_async *)(uintptr_t)a;
     pthread_mutex_lock(&locked->lock);
     uint64_t bytes = a->held;

@@ -22,6 +22,7 @@
 /* Maximum number of bytes for one call of pread. Some systems read no more than about 2 GiB. */
 static const uint64_t CALL_BYTES_MAX = UINT64_C(1) << 30;
 
+/* The source of a regular file. */
 typedef struct path_source {
     int fd;
     char path[];
@@ -150,14 +151,15 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
-    /* The cast removes const because `user` is not const. The source only reads the data. */
+    /* the cast removes const, because the member `user` is not const; the source only reads */
     return (ebpo_source){
         sizeof(ebpo_source), (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0
     };
 }
 
-/* Returns the number of bytes at the beginning that the source had before the input was opened.
- * ebpo_input_open adds these bytes to input->bytes, so reads of these bytes add nothing. */
+/* Returns the number of bytes at the beginning of the file that the source already had when the
+ * input was opened. ebpo_input_open adds these bytes to input->bytes, so reads of them add nothing.
+ */
 static uint64_t bytes_prefetched(const ebpo_input *input)
 {
     return input->source.prefetched < input->source.size ? input->source.prefetched
@@ -249,8 +251,8 @@ char *ebpo_url_redact(const char *name, char *out, size_t capacity)
         const char *host = strstr(name, "//") + 2;
         used = append_text(out, 0, capacity, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            /* The last @ ends the password. A password with an @ makes the URL invalid, but such a
-             * password must not be shown either. */
+            /* A password ends at the last @. A password that contains an @ makes the URL invalid,
+             * but must not be shown either. */
             if (host[i - 1] == '@') {
                 host += i;
                 break;

@@ -1,7 +1,7 @@
-/* Locks the file at a path: a lock file beside it, locked by flock, which the system releases when
- * the process ends. If another process has removed the lock file by the time it is locked, the lock
- * file is released, and a new lock file is made. Locks affect only users of this library, and some
- * file systems have no locks, so replacing a file also compares versions (publish.c). */
+/* Locks the file at a path: makes a lock file in the same folder, and locks the lock file by flock.
+ * The system releases this lock when the process ends. If another process has removed the lock file
+ * before it is locked, a new lock file is made. Locks affect only programs that use this library,
+ * and some file systems have no locks, so replacing a file also compares versions (publish.c). */
 #include "io/file_lock.h"
 
 #include <errno.h>
@@ -22,21 +22,21 @@
 #include "io/unfinished.h"
 
 /* Opens the lock file, and makes it if necessary. Opens it for writing, because locks over NFS
- * require this; opens it for reading if it belongs to another user. errno EACCES: the lock file
- * cannot be made or read. */
+ * require this; opens it for reading if it belongs to another user. Returns -1 with errno on
+ * failure; EACCES: the lock file cannot be made or read. */
 static int open_lock_file(const char *path)
 {
-    enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
-    int fd = open(path, O_RDWR | HOW);
+    enum { FLAGS = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
+    int fd = open(path, O_RDWR | FLAGS);
     if (fd < 0 && errno == ENOENT)
-        return open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
-    if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | HOW)) < 0 && errno == ENOENT)
+        return open(path, O_RDWR | O_CREAT | O_EXCL | FLAGS, 0666);
+    if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | FLAGS)) < 0 && errno == ENOENT)
         errno = EEXIST; /* the file existed: try again */
     return fd;
 }
 
-/* Returns false for a file that has the name of a lock file but is no lock file, and therefore must
- * not be removed. */
+/* Returns true if the file is regular and empty. Another file with the name of a lock file must not
+ * be removed. */
 static bool is_lock_file(int fd)
 {
     struct stat st;
@@ -52,7 +52,7 @@ static bool has_its_name(int fd, const char *path)
            opened.st_ino == named.st_ino;
 }
 
-/* NO_LOCKS: locking is not possible here. */
+/* Result of try_lock. BUSY: another process has the lock. NO_LOCKS: locking is not possible. */
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
 /* Tries to take the lock without waiting. Tries again if another process made or removed the lock
@@ -71,7 +71,7 @@ static attempt try_lock(ebpo_file_lock *lock)
         }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
             attempt result = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
-            /* EBADF: the lock file belongs to another user */
+            /* EBADF: the lock file belongs to another user, and must stay */
             if (result == NO_LOCKS && errno != EBADF)
                 unlink(lock->path);
             close(fd);
@@ -86,13 +86,14 @@ static attempt try_lock(ebpo_file_lock *lock)
     return BUSY;
 }
 
+/* Waits before the next attempt, longer after the first 20 attempts. */
 static void pause_between(unsigned attempts)
 {
     long ms = attempts < 20 ? 5 : 50;
     nanosleep(&(struct timespec){ 0, ms * 1000000 }, NULL);
 }
 
-/* Names the lock file of the file at `path`, in its folder. */
+/* Sets *out to the path of the lock file of the file at `path`. */
 static ebpo_status name_lock_file(const char *path, char **out)
 {
     char *target;
@@ -113,12 +114,12 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
                                 const ebpo_progress *progress, ebpo_error *error)
 {
     double begun = ebpo_seconds();
-    attempt got;
+    attempt result;
     *lock = (ebpo_file_lock)EBPO_FILE_LOCK_INIT;
     ebpo_status status = name_lock_file(path, &lock->path);
     if (status != EBPO_OK)
         return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, strlen(path)) : EBPO_OK;
-    for (unsigned i = 0; (got = try_lock(lock)) == BUSY; i++) {
+    for (unsigned i = 0; (result = try_lock(lock)) == BUSY; i++) {
         if (!ebpo_progress_stage(progress, "waiting", error)) {
             ebpo_file_lock_release(lock);
             return EBPO_E_CANCELLED;
@@ -132,7 +133,7 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
         }
         pause_between(i);
     }
-    if (got == TAKEN) {
+    if (result == TAKEN) {
         lock->process = (long)getpid();
         lock->slot = strlen(lock->path) < PATH_MAX ? ebpo_unfinished_reserve() : -1;
         if (lock->slot >= 0)
@@ -146,7 +147,7 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
 void ebpo_file_lock_release(ebpo_file_lock *lock)
 {
     if (lock->fd >= 0 && lock->process == (long)getpid()) {
-        /* remove the name before the release, so that the next holder sees that it is gone */
+        /* removed before the release, so that the next holder sees that the name is gone */
         unlink(lock->path);
         flock(lock->fd, LOCK_UN);
     }

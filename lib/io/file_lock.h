@@ -1,10 +1,10 @@
-/* Locks for programs that read, change and replace the file at a path. Locks affect only programs
- * that use this library.
+/* Provides locks for programs that read, change and replace the file at a path. Locks affect only
+ * programs that use this library.
  *
- * The lock of NAME is the empty file ".NAME.lock" beside it, which is locked by flock, and removed
- * when the lock is released. NAME itself is not locked, because it is replaced, and because libhdf5
- * locks it for all readers. A killed process leaves the lock file behind, unlocked; the next
- * process uses and removes it. */
+ * The lock of a file NAME is the empty file ".NAME.lock" in the same folder. The lock file is
+ * locked by flock, and removed when the lock is released. NAME itself is not locked, because it is
+ * replaced, and because libhdf5 locks files that it reads. If a process is killed, its lock file
+ * remains, unlocked; the next process uses and removes this file. */
 #ifndef EBPO_IO_FILE_LOCK_H
 #define EBPO_IO_FILE_LOCK_H
 
@@ -34,7 +34,7 @@ EBPO_MUST_USE ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *
                                               double seconds, const ebpo_progress *progress,
                                               ebpo_error *error);
 
-/* Releases the lock. Harmless on EBPO_FILE_LOCK_INIT. */
+/* Releases the lock. Does nothing if no lock is held. */
 void ebpo_file_lock_release(ebpo_file_lock *lock);
 
 #endif

@@ -24,7 +24,10 @@
 #include "core/workspace.h"
 #include "io/file_source.h"
 
-enum { READ_BYTES = 1 << 22, FRESH_NS = 100000000 };
+enum {
+    READ_BYTES = 1 << 22, /* greatest number of bytes of one read */
+    FRESH_NS = 100000000  /* see is_fresh */
+};
 
 /* Returns true if the last change was less than 0.1 s ago, or is in the future. A later change
  * may then have the same file time, because file times have steps of some milliseconds. */
@@ -94,6 +97,7 @@ ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void 
     return EBPO_OK;
 }
 
+/* A file that several threads read. */
 typedef struct loading {
     const ebpo_whole_file *file;
     uint8_t *to;
@@ -116,8 +120,8 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
         return EBPO_OK;
     if (file->size > PTRDIFF_MAX)
         return ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                              "has %" PRIu64 " bytes, more than a %d-bit program can hold in "
-                              "memory; read it with a 64-bit program",
+                              "the file has %" PRIu64 " bytes, more than a %d-bit program can hold "
+                              "in memory; use a 64-bit program",
                               file->size, (int)sizeof(size_t) * CHAR_BIT);
     file->workspace = workspace;
     file->buffer = ebpo_array_alloc(workspace, file->size, 1);
@@ -129,7 +133,7 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
                              "reading", error);
 }
 
-/* Compares the file's current content with the loaded bytes. Sets *same. */
+/* Compares the file's current content with the loaded bytes. *same: true if they are equal. */
 static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *same,
                                  ebpo_error *error)
 {
@@ -159,7 +163,7 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
         return ebpo_fail_errno(error, path, "cannot be examined");
     bool same = (uint64_t)st.st_size == file->size && st.st_mtim.tv_sec == file->mtime_s &&
                 st.st_mtim.tv_nsec == file->mtime_ns;
-    /* the file may have changed although the modification time is equal */
+    /* true: the file may have changed although the modification time is equal */
     bool doubtful =
         file->fresh || st.st_ctim.tv_sec != file->ctime_s || st.st_ctim.tv_nsec != file->ctime_ns;
     ebpo_status status =
@@ -189,7 +193,8 @@ ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)
     const char *name = ebpo_path_name(path);
     *out = NULL;
     if (!*name)
-        return ebpo_fail_file(error, EBPO_E_IO, path, "names no file; give the output a file name");
+        return ebpo_fail_file(error, EBPO_E_IO, path,
+                              "the path ends with '/'; name a file for the output");
     char *folder = strndup(path, (size_t)(name - path));
     if (!folder)
         return ebpo_fail_memory(error, strlen(path));
@@ -212,7 +217,8 @@ ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)
 
 enum { FLAGS = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY };
 
-/* Opens with openat2; returns false if the system has no such call, or a filter forbids it. */
+/* Opens a file with openat2. *fd: descriptor, or -1 with errno. Returns false if the system does
+ * not have this call, or a filter of system calls forbids it. */
 static bool open_at_once(int top, const char *name, int *fd)
 {
 #ifdef EBPO_HAVE_OPENAT2
@@ -226,7 +232,7 @@ static bool open_at_once(int top, const char *name, int *fd)
 }
 
 /* Opens the folders of the path one after the other, then the file, without following links.
- * Changes `name`. */
+ * Returns a descriptor, or -1 with errno. Changes `name`. */
 static int open_folder_by_folder(int top, char *name)
 {
     char *remaining = NULL, *word = strtok_r(name, "/", &remaining), *next;
@@ -272,13 +278,14 @@ int ebpo_open_below(const char *folder, const char *name)
     return fd;
 }
 
-/* ebpo_bytes_are_text checks this number of bytes */
+/* number of bytes that ebpo_bytes_are_text checks */
 enum { CHECKED_BYTES = 512 };
 
+/* Kinds of files by their first bytes. */
 static const struct {
     const char *bytes;
-    size_t count;
-    const char *what;
+    size_t count;     /* number of these bytes */
+    const char *what; /* text of a message */
 } kinds[] = {
     { "version https://git-lfs.github.com/spec/", 40,
       "is a Git LFS pointer, not the file itself; fetch the file: git lfs pull" },

@@ -1,10 +1,11 @@
-/* Caches fetched parts of a file on a server, in memory and in a folder. The ranges in memory are
- * in order and without overlaps. One request fetches a range, which stays in memory while the limit
- * allows. Ranges that have a prefetch hint and are not read yet stay longest; then ranges that were
- * read last. The cache folder, if there is one, contains blocks as files with a SHA-256. Their
- * names contain a digest of URL and version. Blocks are written under temporary names, so any
- * number of processes may share the folder. When its limit is reached, the oldest blocks are
- * removed. The cache works without the folder: missing or damaged blocks are fetched. */
+/* Caches fetched parts of a file on a server, in memory and in a folder on disk. The ranges in
+ * memory are in order and without overlaps. One request fetches a range, which stays in memory
+ * while the limit allows. Ranges that were read least recently are dropped first, ranges with a
+ * prefetch hint that are not read yet last. The cache folder, if the caller has named one, contains
+ * blocks (parts of equal size) as files with a SHA-256, whose names contain a digest of URL and
+ * version. Blocks are written under temporary names, so any number of processes may share the
+ * folder. When the folder's limit is reached, the blocks that were used least recently are removed.
+ * Missing or damaged blocks are fetched from the server. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -27,22 +28,28 @@
 
 /* The file of a block consists of a magic number, the block's index, its size, a digest, and the
  * block's bytes. The digest is the SHA-256 of all other bytes of the file. */
-enum { MAGIC_BYTES = 8, DIGEST_AT = 24, HEAD_BYTES = 56, NAME_BYTES = 128 };
+enum {
+    MAGIC_BYTES = 8,
+    DIGEST_AT = 24,  /* offset of the digest */
+    HEAD_BYTES = 56, /* bytes before the block's bytes */
+    NAME_BYTES = 128 /* size of a file name */
+};
 static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block",
                                       TEMPORARY[] = ".ebpo-part-";
-/* a temporary file that is older was left by a process that has ended */
+/* an older temporary file was left by a process that has ended */
 static const double STALE_SECONDS = 3600;
 
 struct ebpo_disk {
-    int folder;     /* descriptor */
-    uint64_t limit; /* bytes of all blocks */
-    char key[65];   /* digest of URL and version: beginning of the blocks' names */
-    pthread_mutex_t lock;
-    uint64_t written;      /* bytes since the folder was last scanned */
-    uint64_t number;       /* for temporary names */
-    uint64_t held, others; /* see ebpo_disk_held */
+    int folder;            /* descriptor of the folder */
+    uint64_t limit;        /* greatest number of bytes of all blocks */
+    char key[65];          /* digest of URL and version: beginning of the blocks' names */
+    pthread_mutex_t lock;  /* protects `written` and `number` */
+    uint64_t written;      /* bytes that were written since the last trim_folder */
+    uint64_t number;       /* number of the next temporary file */
+    uint64_t held, others; /* results of ebpo_disk_held */
 };
 
+/* Computes the digest of a block's file. */
 static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t size,
                          uint8_t out[32])
 {
@@ -74,6 +81,7 @@ static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_htt
 
 /* --- removing old blocks --- */
 
+/* A block in the folder. */
 typedef struct entry {
     struct timespec used; /* time of the last use */
     uint64_t bytes;
@@ -131,6 +139,7 @@ static entry *list_entries(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
     return entries;
 }
 
+/* Counts the bytes of the blocks in the folder. */
 static void count_held(ebpo_disk *d)
 {
     uint64_t count, bytes;
@@ -149,8 +158,9 @@ void ebpo_disk_held(const ebpo_disk *d, uint64_t *held, uint64_t *others)
     *others = d->others;
 }
 
-/* Removes the oldest blocks; called after each eighth of the limit is written, so that a single
- * process stays below the limit. */
+/* If the blocks take more than 7/8 of the limit, removes the least recently used blocks until they
+ * take at most 3/4. Called whenever an eighth of the limit has been written, so that the blocks of
+ * a single process stay below the limit. */
 static void trim_folder(ebpo_disk *d)
 {
     uint64_t count, bytes;
@@ -202,11 +212,12 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     *out = NULL;
     int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !is_writable(fd)) {
-        /* if too many files are open or memory is short, another folder does not help */
-        bool folders = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
-        ebpo_status status = ebpo_fail_file(error, folders ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
-                                            "cannot be used as a cache folder: %s%s",
-                                            strerror(errno), folders ? "; give another one" : "");
+        /* false if too many files are open or memory is short: another folder does not help */
+        bool by_folder = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
+        ebpo_status status =
+            ebpo_fail_file(error, by_folder ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
+                           "cannot be used as a cache folder: %s%s", strerror(errno),
+                           by_folder ? "; name another folder" : "");
         if (fd >= 0)
             close(fd);
         return status;
@@ -334,34 +345,36 @@ static void put_block(ebpo_disk *d, uint64_t block, const void *data, size_t siz
         trim_folder(d);
 }
 
+/* --- ranges in memory --- */
+
 enum {
-    /* smaller gaps between prefetched ranges are fetched too, because that takes less time than
+    /* smaller gaps between hinted ranges are also fetched, because this takes less time than
      * another request */
     GAP_BYTES = 16384,
+    MANY = 256, /* if a hint has more ranges, GAP_BYTES_OF_MANY is used instead */
     GAP_BYTES_OF_MANY = 32768,
-    MANY = 256, /* for more ranges, GAP_BYTES_OF_MANY is used */
     STALE_AFTER =
         64 /* after this number of later hints, a hinted range will probably not be read */
 };
 
 typedef enum range_state {
-    RANGE_NOTED,   /* nothing fetched */
-    RANGE_LOADING, /* a thread reads the range from disk */
-    RANGE_COMING,  /* requested */
-    RANGE_IN_MEMORY
+    RANGE_NOTED,    /* nothing is fetched or requested */
+    RANGE_LOADING,  /* a thread reads the range from disk */
+    RANGE_COMING,   /* `request` is sent or done */
+    RANGE_IN_MEMORY /* `data` has all bytes */
 } range_state;
 
 struct ebpo_cached_range {
-    uint64_t begin, end;
-    uint64_t wanted;    /* hinted bytes that are not read yet */
-    uint64_t last_hint; /* number of the last prefetch hint that included the range */
-    uint64_t used;      /* time of the last read, by p->clock */
-    bool fresh;         /* made for the current prefetch hint */
+    uint64_t begin, end; /* bytes of the file */
+    uint64_t wanted;     /* hinted bytes that are not read yet */
+    uint64_t last_hint;  /* number of the last prefetch hint that included the range */
+    uint64_t used;       /* time of the last read, by the clock of ebpo_range_cache */
+    bool fresh;          /* the range counts the bytes of the current prefetch hint (add_wanted) */
     range_state state;
     unsigned users; /* number of threads that need the range to stay in the list */
-    bool demanded;  /* a reader waits for the range, and receives the error of its request */
-    bool to_store;  /* to be written to disk when it has been fetched */
-    /* the requested part: blocks at the ends of the range may have come from disk */
+    bool demanded;  /* a reader waits for the range, and returns the error of the request */
+    bool to_store;  /* the range is to be written to disk when it has been fetched */
+    /* the part of the range that is requested; blocks before and after it came from disk */
     uint64_t fetch_begin, fetch_end;
     ebpo_request request;
     uint8_t *data; /* [end - begin] */
@@ -421,8 +434,9 @@ static bool insert_range(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64
     return true;
 }
 
-/* Inserts [begin, end) in ranges of about equal size, at most EBPO_RANGE_BYTES, on the grid of the
- * blocks. */
+/* Inserts ranges for [begin, end) from index i on. The ranges are about equally large and have at
+ * most EBPO_RANGE_BYTES bytes; inner boundaries are boundaries of blocks. Returns false when memory
+ * is short. */
 static bool insert_ranges(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     uint64_t number = (end - begin + EBPO_RANGE_BYTES - 1) / EBPO_RANGE_BYTES;
@@ -436,7 +450,8 @@ static bool insert_ranges(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint6
     return true;
 }
 
-/* Makes ranges for uncovered parts of [begin, end). With a folder, whole blocks. */
+/* Inserts ranges for the parts of [begin, end) that no range contains yet. If there is a cache
+ * folder, the ranges consist of whole blocks. Returns false when memory is short. */
 static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     if (p->disk) {
@@ -469,7 +484,7 @@ static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
  * fetch_begin and fetch_end to the part in the middle that must be requested. */
 static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
 {
-    uint64_t begin = range->begin, end = range->end, got = 0;
+    uint64_t begin = range->begin, end = range->end, loaded = 0;
     range->state = RANGE_LOADING;
     pthread_mutex_unlock(&p->lock);
     while (begin < end && has_block(p, begin, end)) {
@@ -477,24 +492,24 @@ static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
         if (!get_block(p->disk, begin / p->block, range->data + (begin - range->begin), size))
             break;
         begin += size;
-        got += size;
+        loaded += size;
     }
     while (begin < end) {
         uint64_t block = (end - 1) / p->block, at = block * p->block;
         if (at <= begin || (end % p->block && end != p->size) ||
             !get_block(p->disk, block, range->data + (at - range->begin), (size_t)(end - at)))
             break;
-        got += end - at;
+        loaded += end - at;
         end = at;
     }
     pthread_mutex_lock(&p->lock);
     range->fetch_begin = begin;
     range->fetch_end = end;
-    p->disk_bytes += got;
+    p->disk_bytes += loaded;
     p->disk_hits += begin == end;
 }
 
-/* Returns true if no thread needs the range, and its data can be dropped. */
+/* Returns true if no thread needs the range, so that its data can be dropped. */
 static bool is_idle(const ebpo_cached_range *range)
 {
     return range->users == 0 && range->data &&
@@ -502,8 +517,9 @@ static bool is_idle(const ebpo_cached_range *range)
             (range->state == RANGE_COMING && range->request.done));
 }
 
-/* Drops the range that was read least recently; if there is none, a range with an old hint. Returns
- * false if no range can be dropped. */
+/* Drops the range that was read least recently. If all ranges still have hinted bytes to read,
+ * drops the range with the oldest hint, if this hint is old (STALE_AFTER). Returns false if no
+ * range can be dropped. */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
@@ -524,7 +540,7 @@ static bool forget_one(ebpo_range_cache *p)
     return true;
 }
 
-/* Drops ranges until `bytes` more bytes fit the limit, as far as possible. */
+/* Drops ranges until `bytes` more bytes are within the limit, as far as possible. */
 static void reserve_space(ebpo_range_cache *p, uint64_t bytes)
 {
     while (p->held + bytes > p->held_limit && forget_one(p))
@@ -564,8 +580,8 @@ static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool ur
     return true;
 }
 
-/* Ends this thread's use of a range, after reading `read` bytes of the range. The data stays until
- * the memory is needed. */
+/* Ends this thread's use of a range, after it has read `read` bytes of the range. The data stay
+ * until the memory is needed, unless the request has failed. */
 static void release_range(ebpo_range_cache *p, ebpo_cached_range *range, uint64_t read)
 {
     range->users--;
@@ -607,7 +623,8 @@ static int by_offset(const void *a, const void *b)
     return x->offset < y->offset ? -1 : x->offset > y->offset;
 }
 
-/* Adds the hinted bytes to `wanted` of each new cached range; older ranges have counted them. */
+/* Adds the bytes of a hinted range to `wanted` of the cached ranges that contain them and are
+ * fresh. Other ranges have counted these bytes for an earlier hint. */
 static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
 {
     uint64_t begin = hinted->offset, end = begin + hinted->size;
@@ -639,8 +656,8 @@ static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t 
     uint64_t first = find_range(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
-        p->range[i]->fresh |=
-            p->range[i]->wanted == 0; /* the range was read before, and is needed again */
+        /* all hinted bytes of the range were read before, and are needed again */
+        p->range[i]->fresh |= p->range[i]->wanted == 0;
     for (size_t i = 0; i < count; i++)
         add_wanted(p, &sorted[i]);
     for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
@@ -679,7 +696,7 @@ static void store_blocks(ebpo_range_cache *p, ebpo_cached_range *range)
     pthread_mutex_lock(&p->lock);
 }
 
-/* Returns true if a range has been fetched and is not on disk yet. */
+/* Returns true if a range has been fetched and is to be written to disk. */
 static bool is_to_be_stored(const ebpo_cached_range *range)
 {
     return range->to_store && (range->state == RANGE_IN_MEMORY ||
@@ -687,8 +704,8 @@ static bool is_to_be_stored(const ebpo_cached_range *range)
                                 range->request.status == EBPO_OK));
 }
 
-/* Stores one range that has arrived but has not been read, so that it is not lost when the process
- * ends; returns false when there is none. The lock is released meanwhile. */
+/* Stores one range on disk that has been fetched but not read, so that its bytes are not lost when
+ * the process ends. Returns false if there is no such range. The lock is released meanwhile. */
 static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
@@ -703,8 +720,8 @@ static bool store_one(ebpo_range_cache *p)
     return false;
 }
 
-/* Waits for a range that this thread uses. A range that failed while no thread waited is requested
- * again. */
+/* Waits until a range that this thread uses is in memory. If the request has failed while no reader
+ * waited, requests the range again. */
 static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, ebpo_error *error)
 {
     while (range->state != RANGE_IN_MEMORY) {
@@ -737,7 +754,8 @@ static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, eb
     return EBPO_OK;
 }
 
-/* Reads bytes [*at, end) as far as one range contains them; advances *at. */
+/* Reads bytes from *at on, as far as one range contains them, but not beyond `end`. Advances *at.
+ */
 static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, uint8_t *data,
                               ebpo_error *error)
 {
@@ -794,7 +812,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
     }
     for (uint64_t i = find_range(p, at);
          status != EBPO_OK && i < p->count && p->range[i]->begin < end; i++)
-        /* this reader gives up, and does not receive the errors of these requests any more */
+        /* after an error, this reader does not wait for these requests, nor return their errors */
         p->range[i]->demanded = p->range[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);

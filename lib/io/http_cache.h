@@ -1,5 +1,5 @@
 /* Caches fetched parts of a file on a server: ranges in memory, and blocks of equal size in a
- * folder on disk. Blocks stay after the process has ended. */
+ * folder on disk (the cache folder). Blocks stay after the process has ended. */
 #ifndef EBPO_IO_HTTP_CACHE_H
 #define EBPO_IO_HTTP_CACHE_H
 
@@ -9,63 +9,65 @@
 #include "io/http_transfer.h"
 
 enum {
-    EBPO_DISK_BLOCK = 32768, /* default size of a block in bytes */
-    EBPO_DISK_BLOCK_LEAST = 4096,
-    /* size of the first request, in bytes; whole blocks follow. The first request returns the bytes
-       that opening needs (about 50 KB for 13 levels), and levels 0 to 4 */
+    EBPO_DISK_BLOCK = 32768,      /* default size of a block in bytes */
+    EBPO_DISK_BLOCK_LEAST = 4096, /* least size of a block in bytes */
+    /* size of the first request, in bytes; blocks begin after these bytes. The first request
+       returns the bytes that opening needs (about 50 KB for 13 levels), and levels 0 to 4 */
     EBPO_HTTP_HEAD = 131072
 };
 _Static_assert(EBPO_HTTP_HEAD % EBPO_DISK_BLOCK == 0, "blocks would begin within the head");
 
-/* The blocks of a cache folder. Each block is a separate file with a checksum. The name consists of
- * the digest of URL and version, and the block's index. A block is written under a temporary name
- * and then renamed, so any number of processes may share the folder. The cache works without the
- * folder: blocks that cannot be read or are damaged count as missing, and failed writes are
- * ignored. Thread-safe. */
+/* The blocks of a cache folder. Each block is a separate file with a checksum. The file's name
+ * consists of the digest of URL and version, and the block's index. A block is written under a
+ * temporary name and then renamed, so any number of processes may share the folder. A failure of
+ * the folder is never an error: blocks that cannot be read or are damaged count as missing, and
+ * failed writes are ignored. Any thread may call these functions. */
 typedef struct ebpo_disk ebpo_disk;
 
-/* Opens the folder, and makes the folder and its missing parents first. EBPO_E_ARGUMENT when the
- * folder cannot be written. `bytes`: limit of all blocks in the folder; `block`: size of a block.
- */
+/* Opens the folder. Makes the folder and its parents if they are missing. Returns EBPO_E_ARGUMENT
+ * if the folder cannot be written. `bytes`: limit of the size of all blocks in the folder. `block`:
+ * size of a block. */
 EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes,
                                          size_t block, const char *url,
                                          const ebpo_http_version *version, ebpo_error *error);
-/* Returns the number of bytes that the folder held when it was opened: *held: bytes of this version
- * of this file; *others: all other bytes. */
+/* Returns the number of bytes of the blocks that were in the folder when it was opened. *held: of
+ * this version of this file; *others: of other files and versions. */
 void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
-/* Reads a file's bytes in ranges, also ahead of the reader. One request fetches a range. A range
- * stays in memory while the limit allows. Ranges that have a prefetch hint and are not read yet
- * stay longest; then the ranges that were read last. */
+/* A cache of ranges reads a file's bytes in ranges, also before they are needed. One request
+ * fetches a range. A range stays in memory while the limit allows. When ranges must be dropped,
+ * those that were read least recently are dropped first, and those with a prefetch hint that are
+ * not read yet last. */
 
-enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request */
+enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request in bytes */
 
 typedef struct ebpo_cached_range ebpo_cached_range;
 
-/* A cache of ranges. Thread-safe. */
+/* A cache of ranges. Any thread may call its functions. */
 typedef struct ebpo_range_cache {
     pthread_mutex_t lock;
     pthread_cond_t done; /* a request or a load from disk has ended */
     ebpo_transfers *transfers;
     ebpo_disk *disk;           /* NULL: no cache folder */
     uint64_t block;            /* size of the disk's blocks */
-    uint64_t begin, size;      /* ranges are within [begin, size) */
-    uint64_t held_limit;       /* limit of `held`; readers that wait for a range may exceed it */
+    uint64_t begin, size;      /* ranges are within [begin, size); `size`: size of the file */
+    uint64_t held_limit;       /* limit of `held`; for a waiting reader, `held` may exceed it */
     ebpo_cached_range **range; /* [count] by offset, without overlaps */
     uint64_t count, capacity;
-    /* bytes of fetched and requested ranges; number of prefetch hints with new ranges */
-    uint64_t held, hint_count;
-    uint64_t clock; /* counts reads */
-    bool hinting;   /* ranges are being made for a prefetch hint */
+    uint64_t held;       /* bytes of fetched and requested ranges */
+    uint64_t hint_count; /* number of prefetch hints with new ranges */
+    uint64_t clock;      /* counts reads */
+    bool hinting;        /* true: ranges are being made for a prefetch hint */
+    /* number of ranges that came completely from disk; bytes that came from disk */
     uint64_t disk_hits, disk_bytes;
-    double wait_seconds;
+    double wait_seconds; /* time in which readers waited */
 } ebpo_range_cache;
 
-/* Records prefetch hints within [0, size), in any order. Ranges that cannot be recorded for lack of
- * memory are read without a hint. */
+/* Records prefetch hints for ranges within [0, size), in any order. If memory is short, ranges are
+ * not recorded, and are read later without a hint. */
 void ebpo_range_cache_hint(ebpo_range_cache *cache, const ebpo_range *ranges, size_t count);
-/* Reads bytes [offset, offset + size) within [begin, size of the file). */
+/* Reads the bytes [offset, offset + size), which are within [cache->begin, cache->size). */
 EBPO_MUST_USE ebpo_status ebpo_range_cache_read(ebpo_range_cache *cache, uint64_t offset,
                                                 uint64_t size, uint8_t *data, ebpo_error *error);
 /* Frees all ranges; call it after freeing the transfers. */

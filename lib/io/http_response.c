@@ -1,8 +1,8 @@
-/* Parses the head of a server's response line by line, and compares it with the request. A response
- * is a part of the file, or the whole file, or a reason to try again later; all other responses are
- * refused. Ranges, lengths, versions (entity tags or dates) and encodings must fit the request.
- * This file reads nothing from the network, so tests and fuzzers pass any bytes. Source: RFC 9110,
- * sections 8.8, 14 and 15. */
+/* Parses the head of a server's response line by line, and compares the response with the request.
+ * A response is a part of the file, or the whole file, or a reason to try again later; all other
+ * responses are refused. Ranges, lengths, versions (entity tags or dates) and encodings must fit
+ * the request. This file reads nothing from the network, so tests and fuzzers can pass any bytes.
+ * Source: RFC 9110, sections 8.8, 14 and 15. */
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -33,7 +33,8 @@ static bool parse_field(const char *line, size_t size, const char *name, const c
     return true;
 }
 
-/* Reads digits only; returns false beyond 2^63. */
+/* Parses digits, and moves *at past them. Returns false if there are no digits, or if the number is
+ * about 2^63 or more. */
 static bool parse_number(const char **at, const char *end, uint64_t *out)
 {
     const char *begin = *at;
@@ -46,6 +47,7 @@ static bool parse_number(const char **at, const char *end, uint64_t *out)
     return *at > begin;
 }
 
+/* Moves *at past the character c. Returns false if another character is there. */
 static bool parse_token(const char **at, const char *end, char c)
 {
     if (*at >= end || **at != c)
@@ -54,8 +56,9 @@ static bool parse_token(const char **at, const char *end, char c)
     return true;
 }
 
-/* Parses "bytes 0-99/1000" or "bytes * / 1000" without the blanks; a size of "*" means that the
- * size is not known. */
+/* Parses the field Content-Range: "bytes RANGE/SIZE". RANGE is "0-99", or "*" if there is no range.
+ * SIZE is "1000", or "*" if the size is not known. Returns false if the field is invalid or
+ * contradicts an earlier field. */
 static bool content_range(ebpo_http_response *a, const char *at, const char *end)
 {
     uint64_t begin = 0, last = 0, total = 0;
@@ -103,8 +106,8 @@ bool ebpo_http_response_is_text(const char *type)
            (length >= 3 && strcmp(type + length - 3, "xml") == 0);
 }
 
-/* Stores a text, or its digest if the text is too long. The text is only compared, so a digest
- * suffices. */
+/* Stores a text, or its digest if the text is too long. A digest is sufficient, because the text is
+ * only compared. */
 static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
 {
     if (length < EBPO_HTTP_TAG_BYTES) {
@@ -122,6 +125,7 @@ static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t le
     snprintf(out, EBPO_HTTP_TAG_BYTES, "sha256:%s", hex);
 }
 
+/* Clears the response, and parses its status line. */
 static void status_line(ebpo_http_response *a, const char *line, size_t size)
 {
     uint64_t bytes = a->header_bytes;
@@ -175,8 +179,9 @@ static bool is_temporary(int code)
     return code == 408 || code == 429 || code == 500 || code == 502 || code == 503 || code == 504;
 }
 
-/* Returns the message about a change of version, or NULL. Weak tags are compared like strong ones,
- * because servers and proxies add and drop the weak mark for one and the same file. */
+/* Compares the response with the pinned version. Returns the message about a change, or NULL.
+ * `size`: the file's size in the response. Weak tags are compared like strong tags, because servers
+ * and proxies add and drop the mark "W/" although the file is the same. */
 static const char *what_changed(const ebpo_http_response *a, const ebpo_http_request *request,
                                 uint64_t size)
 {
@@ -187,12 +192,12 @@ static const char *what_changed(const ebpo_http_response *a, const ebpo_http_req
         return NULL;
     /* Mirrors of one file may report different times, but not different tags. */
     if (strcmp(a->etag, pinned->etag) != 0)
-        return "has changed on the server while it was open (another ETag); open it again, or "
-               "with --http-unversioned if several servers with different tags respond there";
+        return "has changed on the server while it was open (another ETag); open it again, or use "
+               "--http-unversioned if several servers with different tags serve this address";
     if (!*pinned->etag && strcmp(a->modified, pinned->modified) != 0)
         return "has changed on the server while it was open (another Last-Modified); open it "
-               "again, or with --http-unversioned if several servers with different times "
-               "respond there";
+               "again, or use --http-unversioned if several servers with different times serve "
+               "this address";
     return NULL;
 }
 
@@ -230,8 +235,8 @@ static ebpo_verdict judge_whole(const ebpo_http_response *a, const ebpo_http_req
     if (request->pinned && ebpo_http_response_is_text(a->type)) {
         snprintf(
             why, EBPO_WHY_BYTES,
-            "the server returned %s instead of a part, after it had sent parts of a model; open "
-            "it again, in case a login or the address has expired",
+            "the server returned %s instead of a part, after it had sent parts of a model; a login "
+            "or the address may have expired, so open it again",
             a->type);
         return EBPO_HTTP_REFUSED;
     }
@@ -247,16 +252,17 @@ static ebpo_verdict judge_whole(const ebpo_http_response *a, const ebpo_http_req
     *status = EBPO_E_UNSUPPORTED;
     if (a->has_length && a->length > request->whole_limit) {
         snprintf(why, EBPO_WHY_BYTES,
-                 "the server has no byte ranges, and %" PRIu64 " bytes are more than the %" PRIu64
-                 " that would be read as a whole; download the file, or use a server with ranges",
+                 "the server does not support byte ranges, and the file's %" PRIu64
+                 " bytes are more than the limit of %" PRIu64
+                 " for whole files; download the file, or use a server with ranges",
                  a->length, request->whole_limit);
         return EBPO_HTTP_REFUSED;
     }
     if (!a->has_length && !a->chunked && !a->http2)
         return give_verdict(
             EBPO_HTTP_REFUSED, why,
-            "the server has no byte ranges and does not report the size of the file; download "
-            "the file, or use a server with ranges");
+            "the server does not support byte ranges and does not report the size of the file; "
+            "download the file, or use a server with ranges");
     return EBPO_HTTP_WHOLE;
 }
 
@@ -275,7 +281,8 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
     if (a->code == 416)
         return give_verdict(
             EBPO_HTTP_REFUSED, why,
-            "the server has no such bytes (416): the file is empty, or this server is broken");
+            "the server returned status 416 (no such bytes): the file is empty, or this server is "
+            "broken");
     if (a->code != 200 && a->code != 206) {
         const char *hint = a->code == 404 || a->code == 410
                                ? ": there is no such file; check the address"
@@ -286,9 +293,9 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
         return EBPO_HTTP_REFUSED;
     }
     if (a->encoded)
-        return give_verdict(
-            EBPO_HTTP_REFUSED, why,
-            "the server compressed the file, which was not requested (Content-Encoding); "
-            "switch that off for this file");
+        return give_verdict(EBPO_HTTP_REFUSED, why,
+                            "the server compressed the file, which was not requested "
+                            "(Content-Encoding); switch off "
+                            "this compression on the server");
     return a->code == 206 ? judge_part(a, request, why) : judge_whole(a, request, status, why);
 }

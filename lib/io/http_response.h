@@ -1,4 +1,5 @@
-/* Interprets the head of a server's response: RFC 9110, sections 8.8, 14 and 15. Pure functions. */
+/* Interprets the head (status line and headers) of a server's response. Source: RFC 9110, sections
+ * 8.8, 14 and 15. Any thread may call these functions. */
 #ifndef EBPO_IO_HTTP_RESPONSE_H
 #define EBPO_IO_HTTP_RESPONSE_H
 
@@ -7,39 +8,43 @@
 
 #include <ebpo/base.h>
 
-enum { EBPO_HTTP_TAG_BYTES = 200, EBPO_HTTP_TYPE_BYTES = 64, EBPO_HTTP_HEADERS_MAX = 1 << 18 };
+enum {
+    EBPO_HTTP_TAG_BYTES = 200,      /* size of a stored tag or time, with its zero byte */
+    EBPO_HTTP_TYPE_BYTES = 64,      /* size of a stored content type, with its zero byte */
+    EBPO_HTTP_HEADERS_MAX = 1 << 18 /* greatest size of a head */
+};
 
 /* The version of a file. Texts are "" when the server does not send them. */
 typedef struct ebpo_http_version {
     uint64_t size;
-    char etag[EBPO_HTTP_TAG_BYTES];     /* ETag, without the mark of a weak tag */
+    char etag[EBPO_HTTP_TAG_BYTES];     /* ETag, without the mark "W/" of a weak tag */
     char modified[EBPO_HTTP_TAG_BYTES]; /* Last-Modified */
 } ebpo_http_version;
 
 /* The head of a response. */
 typedef struct ebpo_http_response {
-    int code;       /* 0: no status line yet */
-    bool http2;     /* HTTP/2 or later, which detects a body that was cut off */
-    bool has_range; /* Content-Range with a range, [begin, last] of `total` */
-    /* Content-Range with a size; it may lack a range: "bytes * / 123", but without blanks */
-    bool has_total;
+    int code;        /* 0: no status line yet */
+    bool http2;      /* HTTP/2 or later, which detects a body that was cut off */
+    bool has_range;  /* Content-Range has a range: bytes `begin` to `last` */
+    bool has_total;  /* Content-Range has the file's size, `total` */
     bool bad_range;  /* an invalid Content-Range, or two different ones */
-    bool has_length; /* Content-Length */
+    bool has_length; /* Content-Length exists: `length` */
     bool chunked;    /* Transfer-Encoding: chunked */
     bool encoded;    /* Content-Encoding, other than identity */
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
     char type[EBPO_HTTP_TYPE_BYTES]; /* "text/html", in lower case */
-    uint64_t header_bytes;
+    uint64_t header_bytes;           /* size of all heads, including those of redirects */
 } ebpo_http_response;
 
-/* Reads one unmodified line of the head. A status line clears the response, because the previous
- * lines belong to a redirect or an interim response. */
+/* Reads one line of the head, as the server sent it. A status line clears the response, because the
+ * previous lines belong to a redirect or an interim response. */
 void ebpo_http_response_line(ebpo_http_response *response, const char *line, size_t size);
 
-/* Returns true for content types of text. Login and error pages have such types, models do not. */
+/* Returns true for content types of text. Login and error pages have these types; models do not. */
 bool ebpo_http_response_is_text(const char *type);
 
+/* How a response is to be used. */
 typedef enum ebpo_verdict {
     EBPO_HTTP_PART,   /* the body is the range, or its beginning */
     EBPO_HTTP_WHOLE,  /* the body is the whole file */
@@ -47,6 +52,7 @@ typedef enum ebpo_verdict {
     EBPO_HTTP_REFUSED /* the request fails */
 } ebpo_verdict;
 
+/* The request with which a response is compared. */
 typedef struct ebpo_http_request {
     uint64_t begin, end; /* bytes [begin, end) */
     /* version that the response must have. NULL: the first request, which determines the version;
@@ -56,10 +62,10 @@ typedef struct ebpo_http_request {
     bool unversioned;     /* only sizes are compared */
 } ebpo_http_request;
 
-enum { EBPO_WHY_BYTES = 240 };
+enum { EBPO_WHY_BYTES = 240 }; /* size of the text of an error message */
 
-/* Judges a response. For LATER and REFUSED, sets `why` to the text of an error message, which
- * follows the file's name. For REFUSED, *status is set. */
+/* Judges a response. For EBPO_HTTP_LATER and EBPO_HTTP_REFUSED, sets `why` to the text of an error
+ * message, which follows the file's name. For EBPO_HTTP_REFUSED, sets *status. */
 ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *response,
                                       const ebpo_http_request *request, ebpo_status *status,
                                       char why[EBPO_WHY_BYTES]);

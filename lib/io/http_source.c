@@ -1,7 +1,7 @@
-/* Provides the source for a URL: its options are checked and copied, the first request returns the
- * file's size, version and head, and reads use the cache of ranges (http_cache.c). A server that
- * does not support ranges sends the whole file, which then stays in memory, if it is not larger
- * than a limit. */
+/* Provides the source for a URL. Opening checks and copies the options; its first request returns
+ * the file's size, version and first bytes (the head). Reads use the cache of ranges
+ * (http_cache.c). A server that does not support ranges sends the whole file, which then stays in
+ * memory if it is not larger than a limit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,14 +14,15 @@
 
 enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
 
+/* A file on a server. */
 typedef struct http_source {
-    char *url;
+    char *url;                        /* with user and password, if any */
     char shown_url[EBPO_SHOWN_BYTES]; /* for messages: without passwords */
     ebpo_http_options options;        /* owns its texts */
     ebpo_range_cache cache;           /* also contains the lock and the transfers */
     bool has_lock;                    /* the lock and the condition of `cache` exist */
     ebpo_http_version version;
-    uint8_t *head; /* the first bytes, or the whole file, kept in memory */
+    uint8_t *head; /* [head_bytes] the first bytes, or the whole file */
     uint64_t head_bytes;
 } http_source;
 
@@ -97,22 +98,22 @@ static ebpo_status check_options(const ebpo_http_options *o, const char *shown, 
         !(o->time_limit > 0 && o->time_limit <= most))
         return ebpo_fail_file(
             error, EBPO_E_ARGUMENT, shown,
-            "a time-out must be above 0 (stalls: at least 1) and at most 1000000 seconds");
+            "a time-out must be above 0 (for stalls: at least 1) and at most 1000000 seconds");
     if (o->connections < 1 || o->connections > CONNECTIONS_MAX)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                              "%u connections at a time; give 1 to %d", o->connections,
-                              CONNECTIONS_MAX);
+                              "%u connections at a time were requested; use 1 to %d",
+                              o->connections, CONNECTIONS_MAX);
     if (o->cache_block &&
         (o->cache_block < EBPO_DISK_BLOCK_LEAST || o->cache_block > EBPO_HTTP_HEAD ||
          o->cache_block & (o->cache_block - 1)))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                              "blocks of %u bytes in the cache folder; give a power of two from "
-                              "%d to %d, or 0",
+                              "blocks of %u bytes in the cache folder were requested; use a power "
+                              "of two from %d to %d, or 0",
                               o->cache_block, EBPO_DISK_BLOCK_LEAST, EBPO_HTTP_HEAD);
     for (const char *const *h = o->headers; h && *h; h++)
         if (!header_ok(*h))
             return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                                  "a header to send must be 'Name: value' on one line");
+                                  "a header that is to be sent is not 'Name: value' on one line");
     return EBPO_OK;
 }
 
@@ -175,6 +176,7 @@ bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
 
 /* --- opening --- */
 
+/* Sends a request and waits for its end. */
 static ebpo_status request_range(http_source *s, ebpo_request *r, ebpo_error *error)
 {
     pthread_mutex_lock(&s->cache.lock);
@@ -189,6 +191,7 @@ static ebpo_status request_range(http_source *s, ebpo_request *r, ebpo_error *er
     return r->status;
 }
 
+/* Makes all later requests require the file's version. */
 static void pin_version(http_source *s)
 {
     pthread_mutex_lock(&s->cache.lock);
@@ -244,9 +247,9 @@ static ebpo_status read_whole(http_source *s, ebpo_error *error)
     if (s->version.size > s->options.whole_limit)
         return ebpo_fail_file(
             error, EBPO_E_UNSUPPORTED, s->shown_url,
-            "the server sends neither ETag nor Last-Modified, so a change of the "
-            "file could not be noticed, and its %llu bytes are more than "
-            "would be read at once; download the file, or read it with --http-unversioned",
+            "the server sends neither ETag nor Last-Modified, so a change of the file could not be "
+            "noticed, and the file's %llu bytes are too many for one request; download the file, "
+            "or read it with --http-unversioned",
             (unsigned long long)s->version.size);
     uint8_t *all = ebpo_alloc(s->version.size, 1);
     if (!all)
@@ -271,8 +274,8 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     if (status == EBPO_OK && s->head_bytes < s->version.size && !versioned && !o->unversioned)
         status = read_whole(s, error);
     /* The folder is opened last, because the names of its blocks depend on the file's version. A
-     * file without a version is not cached. The folder is opened for such a file too, so that an
-     * unusable folder is always reported. */
+     * file without a version is not cached on disk, but the folder is opened also in this case, so
+     * that an unusable folder is always reported. */
     s->cache.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
     if (status == EBPO_OK && o->cache_folder)
         status = ebpo_disk_open(&s->cache.disk, o->cache_folder, o->cache_bytes, s->cache.block,

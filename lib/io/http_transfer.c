@@ -1,10 +1,10 @@
 /* Sends requests for byte ranges through libcurl, which one thread drives. Requests wait in a
- * queue, urgent requests first. At most EBPO_SLOTS_MAX requests run at once, each in a slot with a
- * reusable handle. A response is judged by its head (http_response.c), before its body is accepted.
- * If a body breaks off, the received bytes are kept, and the next attempt requests the missing
- * bytes, after a pause that grows with each attempt. At most five redirects are followed, never
- * from https to http, and the caller's credentials are not sent to another server. The lock belongs
- * to the caller (http_transfer.h). */
+ * queue, urgent requests first (a reader waits for them). At most EBPO_SLOTS_MAX requests run at
+ * once, each in a slot with a reusable handle. A response is judged by its head (http_response.c)
+ * before its body is accepted. If a body breaks off, the received bytes are kept, and the next
+ * attempt requests the missing bytes, after a pause that grows with each attempt. At most five
+ * redirects are followed, never from https to http, and the caller's credentials are not sent to
+ * another server. The lock belongs to the caller (http_transfer.h). */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -25,7 +25,7 @@
 /* --- redirects: the target of a request, and whether the target is still on the original server
  * --- */
 
-/* Redirects of one attempt; zeroed: none so far. */
+/* Redirects of one attempt; all members are 0 if there was no redirect so far. */
 typedef struct ebpo_redirect {
     CURLU *at;      /* the latest address; NULL: the original address */
     char *target;   /* target that the current head names, or NULL */
@@ -40,6 +40,7 @@ static void clear_redirect(ebpo_redirect *r)
     *r = (ebpo_redirect){ .at = NULL };
 }
 
+/* Returns true if both URLs have the same part, such as the host. */
 static bool same_part(CURLU *a, CURLU *b, CURLUPart part)
 {
     char *x = NULL, *y = NULL;
@@ -56,7 +57,8 @@ static bool same_server(CURLU *a, CURLU *b)
            same_part(a, b, CURLUPART_PORT);
 }
 
-/* Returns false if the target is on another server, or its server is not known. */
+/* Moves r->at to the target. Returns false if the target is on another server than `url`, or if its
+ * server is not known. */
 static bool stays_on_server(ebpo_redirect *r, const char *url)
 {
     CURLU *first = curl_url();
@@ -73,7 +75,7 @@ static bool stays_on_server(ebpo_redirect *r, const char *url)
     return stays;
 }
 
-/* Stores the target without surrounding blanks. */
+/* Stores the target of a redirect, without surrounding blanks. */
 static void keep_target(ebpo_redirect *r, const char *from, size_t size)
 {
     while (size && (*from == ' ' || *from == '\t')) {
@@ -87,8 +89,9 @@ static void keep_target(ebpo_redirect *r, const char *from, size_t size)
     r->elsewhere = r->elsewhere || !r->target;
 }
 
-/* Reads one unmodified line of a head. `code`: status of the response. Returns true when the line
- * redirects the request to another server, and no earlier line did. */
+/* Reads one line of a head, as the server sent it. `code`: status of the response. Returns true if
+ * this line redirects the request to another server, and the request was on the original server
+ * before. */
 static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line,
                                size_t size)
 {
@@ -121,9 +124,11 @@ typedef struct ebpo_slot {
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
-    bool has_verdict, stopped, stalled; /* stopped, stalled: ended by this code, not by libcurl */
-    bool sent;                          /* connected, and the request was sent */
-    double moved;                       /* time of the last bytes */
+    /* stopped, stalled: the functions below have ended the transfer, not libcurl; stalled: because
+     * no bytes arrived */
+    bool has_verdict, stopped, stalled;
+    bool sent;    /* connected, and the request was sent */
+    double moved; /* time when the last bytes arrived */
     ebpo_verdict verdict;
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
@@ -133,29 +138,28 @@ typedef struct ebpo_slot {
 } ebpo_slot;
 
 struct ebpo_transfers {
-    const char *url, *shown; /* `shown` is the URL in messages, without login data */
+    const char *url, *shown; /* shown: the URL for messages, without login data */
     const ebpo_http_options *options;
     pthread_mutex_t *lock;
     pthread_cond_t *done; /* signalled when a request ends */
     CURLM *multi;
     struct curl_slist *headers, *bare_headers; /* headers with and without the caller's headers */
     pthread_t thread;
-    bool running;
+    bool running; /* the thread was started */
     ebpo_slot slots[EBPO_SLOTS_MAX];
-    unsigned slot_count, active;
-    /* Guarded by the lock. */
+    unsigned slot_count, active; /* usable slots; slots with a request */
+    /* protected by the lock */
     bool quit, cancelled;
     ebpo_request *queue; /* urgent requests first */
     ebpo_http_version pinned;
     bool is_pinned;
     ebpo_http_stats stats;
-    /* Used by the thread only. */
-    uint64_t random;
+    uint64_t random; /* state of random numbers, used only by the thread */
 };
 
 enum {
     REDIRECTS_MAX = 5,
-    STALL_BYTES = 100, /* fewer bytes per second are a stall */
+    STALL_BYTES = 100, /* libcurl reports a stall below this number of bytes per second */
     /* an unwanted body up to this size is read to its end, so that the connection can be used again
      */
     DRAIN_BYTES = 65536
@@ -163,8 +167,9 @@ enum {
 
 /* --- callbacks of libcurl --- */
 
-/* Checks for stalls, about ten times a second during a request. Returns a number other than 0 to
- * stop the request. libcurl's own measure of speed is an average over several seconds. */
+/* Called by libcurl about ten times a second during a request. Returns 1 to stop the request if no
+ * bytes have arrived for stall_timeout seconds, else 0. libcurl's own measure of speed is less
+ * exact: an average over several seconds. */
 static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
                        curl_off_t uploaded)
 {
@@ -217,7 +222,7 @@ static void judge_slot(ebpo_slot *s)
     s->has_verdict = true;
 }
 
-/* Ends the transfer with an error. Returns 0, the result of receive_body that stops libcurl. */
+/* Ends the transfer with an error. Returns 0, which receive_body returns to stop libcurl. */
 static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
 {
     s->verdict = EBPO_HTTP_REFUSED;
@@ -248,8 +253,8 @@ static size_t receive_whole(ebpo_slot *s, const char *bytes, size_t size)
     if (s->taken + size > s->owner->options->whole_limit)
         return refuse_body(
             s, EBPO_E_UNSUPPORTED,
-            "the server has no byte ranges, and the file is larger than what would be "
-            "read as a whole; download the file, or use a server with ranges");
+            "the server does not support byte ranges, and the file is larger than the limit for "
+            "whole files; download the file, or use a server with ranges");
     if (!ebpo_grow(&r->whole, &r->whole_capacity, s->taken + size, 1))
         return refuse_body(s, EBPO_E_MEMORY, "out of memory");
     memcpy(r->whole + s->taken, bytes, size);
@@ -275,7 +280,7 @@ static size_t receive_body(char *bytes, size_t size, size_t count, void *user)
     return s->stopped ? 0 : size;
 }
 
-/* --- setting up --- */
+/* --- setting up slots --- */
 
 static bool is_https(const char *url) { return url[4] == 's' || url[4] == 'S'; }
 
@@ -340,7 +345,7 @@ static CURLcode curl_state;
 
 static void start_curl(void) { curl_state = curl_global_init(CURL_GLOBAL_DEFAULT); }
 
-/* --- setting up --- */
+/* --- setting up transfers --- */
 
 static bool add_header(struct curl_slist **list, const char *text)
 {
@@ -399,7 +404,7 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
     ebpo_transfers_free(t);
     return ebpo_fail_file(
         error, EBPO_E_IO, shown,
-        "libcurl cannot be set up: no memory, no threads, or unsupported options");
+        "libcurl cannot be set up: memory or threads are short, or options are not supported");
 }
 
 void ebpo_transfers_free(ebpo_transfers *t)
@@ -428,6 +433,8 @@ void ebpo_transfers_free(ebpo_transfers *t)
 
 /* --- the queue; lock held --- */
 
+/* Adds a request to the queue: behind all urgent requests if it is urgent (has a deadline), else at
+ * the end. */
 static void enqueue_request(ebpo_transfers *t, ebpo_request *r)
 {
     ebpo_request **at = &t->queue;
@@ -484,6 +491,7 @@ void ebpo_transfers_add_stats(const ebpo_transfers *t, ebpo_http_stats *stats)
     stats->bytes += t->stats.bytes;
 }
 
+/* Ends a request. `why`: text of the error, if `status` is not EBPO_OK. */
 static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status status, const char *why)
 {
     r->status = status;
@@ -493,11 +501,11 @@ static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status statu
     pthread_cond_broadcast(t->done);
 }
 
-/* --- attempts, by the thread --- */
+/* --- attempts; only the thread calls the functions below --- */
 
 /* Returns the seconds until the next attempt. The pause doubles with each failure and is varied at
- * random, so that many readers do not return at the same time. If the server requests a longer
- * pause, returns that pause. *by_server: true if it does. */
+ * random, so that many readers do not repeat their requests at the same time. If the server
+ * requires a longer pause, returns the server's pause, and *by_server is true. */
 static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server)
 {
     curl_off_t retry_after = 0;
@@ -512,6 +520,7 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
     return *by_server ? (double)retry_after : pause;
 }
 
+/* Prepares a slot for the next attempt of a request: the bytes that are still missing. */
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
     char range[64];
@@ -560,8 +569,8 @@ static bool is_temporary(CURLcode code)
     }
 }
 
-/* Keeps received bytes, so that the next attempt requests only the missing bytes. Returns true if
- * the request is complete. */
+/* Records the received bytes in the request, so that the next attempt requests only the missing
+ * bytes. Returns true if the request is complete. */
 static bool keep_arrived(ebpo_slot *s, CURLcode code)
 {
     ebpo_request *r = s->request;
@@ -587,8 +596,8 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
     return r->got == r->size;
 }
 
-/* Returns the text of libcurl's error. libcurl reports a header line that is too long as a lack of
- * memory. */
+/* Returns the text of libcurl's error. libcurl reports a lack of memory also for a header line that
+ * is too long. */
 static const char *error_text(const ebpo_slot *s, CURLcode code)
 {
     if (code == CURLE_OUT_OF_MEMORY && !s->received)
@@ -612,8 +621,8 @@ static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t 
         snprintf(out, capacity, "%s", trouble);
 }
 
-/* Returns true if another response may complete the request. Returns false if the version is not
- * known, because a change of version would then remain undetected. */
+/* Returns true if bytes of another response may complete the request. Returns false if the file's
+ * version is not known, because both responses might be of different versions. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
@@ -639,18 +648,18 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     if (now >= r->deadline - 0.01 || (!by_server && now + pause >= r->deadline))
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
-                 ": not read within %g s (%s); try again later, or with a longer time limit",
+                 " were not read within %g s (%s); try again later, or use a longer time limit",
                  r->offset, r->offset + r->size - 1, t->options->time_limit, what);
     else if (r->failures > t->options->retries)
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
-                 ": %s; given up after %u attempt%s, try again later",
+                 ": %s; given up after %u attempt%s; try again later",
                  r->offset, r->offset + r->size - 1, what, r->failures,
                  r->failures == 1 ? "" : "s");
     else if (pause > PAUSE_BY_SERVER_MAX || now + pause >= r->deadline)
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
-                 ": %s and requires a pause of %.0f s; try again then",
+                 ": %s and requires a pause of %.0f s; try again after this pause",
                  r->offset, r->offset + r->size - 1, what, pause);
     else {
         if (!may_join(t, r))
@@ -700,12 +709,13 @@ static void cancel_queue(ebpo_transfers *t)
     while (t->queue) {
         ebpo_request *r = t->queue;
         t->queue = r->next;
-        finish_request(t, r, EBPO_E_CANCELLED, "stopped on request");
+        finish_request(t, r, EBPO_E_CANCELLED, "reading was stopped on request");
     }
 }
 
-/* Returns the number of slots that a request may use. The number is less for large requests: they
- * would only share the bandwidth, so that the first request would end late. */
+/* Returns the number of slots that may be in use together when a request starts. The number is less
+ * for large requests, because many of them would share the bandwidth, so that the first request
+ * would end late. */
 static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
 {
     enum { LARGE_BYTES = 1 << 20, LARGE_AT_A_TIME = 6 };
@@ -725,7 +735,7 @@ static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
             char why[160];
             snprintf(why, sizeof why,
                      "bytes %" PRIu64 " to %" PRIu64
-                     ": not read within %g s; try again later, or with a longer time limit",
+                     " were not read within %g s; try again later, or use a longer time limit",
                      r->offset, r->offset + r->size - 1, t->options->time_limit);
             finish_request(t, r, EBPO_E_IO, why);
             continue;
@@ -786,14 +796,15 @@ static void check_stop(ebpo_transfers *t)
     cancel_queue(t);
     for (unsigned i = 0; i < t->slot_count; i++)
         if (t->slots[i].request) {
-            finish_request(t, t->slots[i].request, EBPO_E_CANCELLED, "stopped on request");
+            finish_request(t, t->slots[i].request, EBPO_E_CANCELLED,
+                           "reading was stopped on request");
             t->slots[i].request = NULL;
             t->active--;
         }
     pthread_mutex_unlock(t->lock);
 }
 
-/* The thread that drives libcurl. */
+/* Drives libcurl: the function of the thread. */
 static void *drive_transfers(void *transfers)
 {
     ebpo_transfers *t = transfers;

@@ -1,5 +1,5 @@
-/* Sends requests for byte ranges, several at a time, with retries; a separate thread drives
- * libcurl. */
+/* Sends requests for byte ranges of a file on a server, several at a time, with retries. A separate
+ * thread drives libcurl. */
 #ifndef EBPO_IO_HTTP_TRANSFER_H
 #define EBPO_IO_HTTP_TRANSFER_H
 
@@ -21,32 +21,33 @@ typedef struct ebpo_request {
     bool done;
     ebpo_status status;
     ebpo_error error;
-    uint64_t got; /* bytes received; fewer than `size` only if `first` and the file is shorter */
+    uint64_t got; /* bytes received; fewer than `size` only if `first` is true and the file is
+                     shorter */
     /* if `first` is true and the server does not support ranges: all version.size bytes of the
      * file, which the caller frees; `data` is then unused */
     uint8_t *whole;
-    ebpo_http_version version; /* set if `first` is true */
-    char type[EBPO_HTTP_TYPE_BYTES];
-    /* Private to the transfers. */
-    struct ebpo_request *next;
-    unsigned failures;
-    double due;      /* time of the next attempt, in seconds of ebpo_seconds */
+    ebpo_http_version version;       /* version of the file, set if `first` is true */
+    char type[EBPO_HTTP_TYPE_BYTES]; /* content type of the response */
+    /* Private to http_transfer.c. */
+    struct ebpo_request *next; /* in the queue */
+    unsigned failures;         /* number of failed attempts */
+    double due;                /* time of the next attempt, in seconds of ebpo_seconds */
     double deadline; /* end of the time limit; 0: no reader waits and nothing was sent yet */
     uint64_t whole_capacity;
 } ebpo_request;
 
 typedef struct ebpo_transfers ebpo_transfers;
 
-/* Makes transfers: a queue of requests, and the thread that sends them. The texts of `options` must
- * outlive the transfers. Functions marked "Lock held" are called with `lock` held. `done` is
- * broadcast whenever a request ends. `url`: with user and password, if any; `shown`: the URL for
- * messages. */
+/* Creates a queue of requests, and starts the thread that sends them. `url`: with user and
+ * password, if any. `shown`: the URL for messages. `options`, `url` and `shown` must outlive the
+ * transfers. Functions marked "Lock held" are called with `lock` held. `done` is broadcast whenever
+ * a request ends. */
 EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url,
                                               const char *shown, const ebpo_http_options *options,
                                               pthread_mutex_t *lock, pthread_cond_t *done,
                                               ebpo_error *error);
-/* Stops the thread and frees the transfers. Running requests are aborted and stay unchanged. NULL
- * is allowed. The lock must not be held. */
+/* Stops the thread and frees the transfers. Running requests are aborted, without being marked as
+ * done. NULL is allowed. The lock must not be held. */
 void ebpo_transfers_free(ebpo_transfers *transfers);
 
 /* Lock held. Queues a request. Urgent requests are sent before all others. */

@@ -1,8 +1,8 @@
-/* Replaces output files atomically: a temporary file in the same folder, sync, rename, sync of the
- * folder. The file to be replaced may be compared with the version that was read, under the
- * target's lock. Of two outputs that belong together, the first is restored when the second fails.
- * A new file takes over owner, permissions and extended attributes of the file that it replaces.
- * The functions for the library's callers are at the end. */
+/* Replaces output files atomically: writes a temporary file in the same folder, syncs it, renames
+ * it to the target, and syncs the folder. The target may be compared with the version that was
+ * read, under the target's lock. If two outputs belong together and the second cannot be replaced,
+ * the first is restored. A new file gets the owner, permissions and extended attributes of the file
+ * that it replaces. The functions for the library's callers are at the end. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -25,18 +25,17 @@
 #include "io/publish.h"
 #include "io/unfinished.h"
 
-/* --- properties that a new file takes over from the replaced one --- */
+/* --- properties that a new file gets from the replaced file --- */
 
 #ifdef EBPO_HAVE_XATTR
-/* Bytes of all names, and of a value; no system allows more. */
+/* Greatest number of bytes of all names, and of a value; no system allows more. */
 enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
 static void copy_attribute(int from, int to, const char *name, void *value)
 {
     ssize_t size = fgetxattr(from, name, value, VALUE_MAX);
     if (size >= 0)
-        (void)!fsetxattr(to, name, value, (size_t)size,
-                         0); /* may fail: the system need not allow it */
+        (void)!fsetxattr(to, name, value, (size_t)size, 0); /* fails if the system forbids it */
 }
 
 static void copy_attributes(int from, int to)
@@ -54,9 +53,9 @@ static void copy_attributes(int from, int to)
 static void copy_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
-/* Gives the file the owner and group of `was`, and returns the mode to set. If the system does not
- * allow this, the new file belongs to this process's user, and the mode lacks the bits that let a
- * program act for its owner (set-user-ID). */
+/* Gives the file the owner and group of the replaced file, `was`. Returns the mode to set. If the
+ * system does not allow the change, the new file keeps the owner or group of this process, and the
+ * mode lacks the bits that let a program act for its owner (set-user-ID). */
 static mode_t copy_owner(int to, const struct stat *was)
 {
     struct stat is;
@@ -71,10 +70,9 @@ static mode_t copy_owner(int to, const struct stat *was)
     return group ? mode & 0777 : mode & (0707 | (mode & 007) << 3);
 }
 
-/* Sets for the open file the mode, owner and extended attributes (including access control lists)
- * of the regular file at `path`; owner and attributes only as far as the system allows. Without
- * such a file, sets `mode`, if it is not -1. Returns false with errno when the mode cannot be set.
- */
+/* Gives the open file the mode of the regular file at `path` and, as far as the system allows, its
+ * owner and extended attributes (including access control lists). If there is no such file, sets
+ * `mode`, unless it is -1. Returns false with errno if the mode cannot be set. */
 static bool copy_facts(int fd, const char *path, int mode)
 {
     struct stat was;
@@ -95,6 +93,7 @@ static bool copy_facts(int fd, const char *path, int mode)
 
 static atomic_uint name_counter;
 
+/* Checks that the target is missing or a regular file. Sets publish->mode. */
 static ebpo_status check_target(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
     struct stat st;
@@ -139,12 +138,12 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         /* Registers the name for the signal handler before the file exists, so that a signal never
          * leaves the file behind. */
         ebpo_unfinished_set(publish->slot, publish->temporary);
-        /* Mode 0600: the file that is replaced may be private, so its new content stays private,
-         * too. */
+        /* Mode 0600: the file that is replaced may be private, so the new content is private until
+         * copy_facts sets the mode. */
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
         if (publish->fd >= 0) {
-            /* shows programs that remove abandoned files that this file is in use */
+            /* so that processes that remove abandoned files see that this file is in use */
             (void)flock(publish->fd, LOCK_EX | LOCK_NB);
             return EBPO_OK;
         }
@@ -152,8 +151,8 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         if (errno != EEXIST)
             break;
     }
-    ebpo_status status =
-        ebpo_fail_errno(error, publish->shown, "no temporary file can be created in its folder");
+    ebpo_status status = ebpo_fail_errno(error, publish->shown,
+                                         "no temporary file can be created in the output's folder");
     free(publish->temporary);
     publish->temporary = NULL;
     return status;
@@ -168,7 +167,7 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
         status = check_target(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = ebpo_unfinished_reserve()) < 0)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                                "more than %d files are being written or locked at a time",
+                                "this process cannot write or lock more than %d files at a time",
                                 EBPO_UNFINISHED_MAX);
     if (status == EBPO_OK) {
         ebpo_remove_stale_files(publish.folder, ebpo_path_name(publish.target));
@@ -220,7 +219,7 @@ void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
 
 /* Opens the stream with an explicit buffer, so that a lack of memory for the buffer is reported,
- * and writes are few. */
+ * and so that there are few system calls. */
 FILE *ebpo_publish_stream(ebpo_publish *publish)
 {
     enum { BUFFER = 1 << 16 };
@@ -232,7 +231,7 @@ FILE *ebpo_publish_stream(ebpo_publish *publish)
     if (!publish->stream)
         return NULL;
     publish->fd = -1; /* the stream owns the descriptor now */
-    (void)!setvbuf(publish->stream, publish->buffer, _IOFBF, BUFFER); /* cannot fail */
+    (void)!setvbuf(publish->stream, publish->buffer, _IOFBF, BUFFER);
     return publish->stream;
 }
 
@@ -253,7 +252,7 @@ static bool close_writer(ebpo_publish *publish)
     return good;
 }
 
-/* Returns false, with errno, if the sync fails. */
+/* Syncs and closes a file or folder. Returns false, with errno, if the sync fails. */
 static bool sync_and_close(int fd)
 {
     /* EINVAL: a file system without sync of folders */
@@ -271,8 +270,8 @@ static bool sync_folder(const char *path)
     return fd >= 0 && sync_and_close(fd);
 }
 
-/* Closes the temporary file, and syncs it by its name, because a library may have written through
- * another descriptor. */
+/* Closes the temporary file, sets its mode, and syncs it. Opens it by its name, because a library
+ * may have written through another descriptor. */
 static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
 {
     errno = 0;
@@ -285,15 +284,15 @@ static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
         close(fd);
         errno = saved;
         return ebpo_fail_errno(error, publish->shown,
-                               "the mode of the replaced file could not be set on the new one");
+                               "the new file could not get the mode of the replaced file");
     }
     if (fd < 0 || !sync_and_close(fd))
         return ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
     return EBPO_OK;
 }
 
-/* Returns true if the target has the expected version, or is missing: then no other program's data
- * can be lost. */
+/* Returns true if the target has the expected version, or is missing, so that replacing it loses no
+ * data of another program. */
 static bool is_expected(const ebpo_publish *publish)
 {
     struct stat st;
@@ -306,13 +305,14 @@ static bool is_expected(const ebpo_publish *publish)
            e->modified.tv_nsec == current.modified.tv_nsec;
 }
 
+/* Renames the temporary file to the target, if the target has the expected version. */
 static ebpo_status put_in_place(ebpo_publish *publish, ebpo_error *error)
 {
     if (!is_expected(publish))
         return ebpo_fail_file(
             error, EBPO_E_IO, publish->shown,
-            "another program has changed the file since it was read; the file was not replaced; "
-            "read it again and repeat the change, or write to another file");
+            "another program has changed the file since it was read, so the file was not replaced; "
+            "read the file again and repeat the change, or write to another file");
     if (rename(publish->temporary, publish->target) != 0)
         return ebpo_fail_errno(error, publish->shown,
                                "the finished temporary file could not be renamed to the output");
@@ -327,7 +327,8 @@ static ebpo_status sync_name(const ebpo_publish *publish, ebpo_error *error)
     return sync_folder(publish->folder)
                ? EBPO_OK
                : ebpo_fail_errno(error, publish->shown,
-                                 "is complete, but its folder could not be synced to the disk");
+                                 "the file is complete, but its folder could not be synced to the "
+                                 "disk");
 }
 
 ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
@@ -345,7 +346,8 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     return status;
 }
 
-/* Exchanges the temporary file and the target, so that the temporary file is the previous file. */
+/* Exchanges the names of the temporary file and the target, so that the temporary name is that of
+ * the previous file. Returns false on failure, with errno; ENOENT: the target is missing. */
 static bool exchange_files(const ebpo_publish *publish)
 {
 #ifdef EBPO_HAVE_RENAMEAT2
@@ -359,15 +361,16 @@ static bool exchange_files(const ebpo_publish *publish)
 #endif
 }
 
-/* Restores the first target, because the second temporary file could not be renamed. `exchanged`:
- * the previous file still exists under the temporary name. `fresh`: there was no previous file. */
+/* Restores the first target, because the second target could not be replaced. `exchanged`: the
+ * previous file still exists under the temporary name. `fresh`: there was no previous file.
+ * `cause`: why the second target could not be replaced. */
 static ebpo_status restore_first(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
                                  ebpo_error *error)
 {
     if (exchanged ? exchange_files(first) : fresh && unlink(first->target) == 0)
         return ebpo_fail_with(error, cause);
     return ebpo_fail_file(error, cause->status, cause->file,
-                          "%s; of the two files only %s was replaced: write both again",
+                          "%s; of the two files, only %s was replaced; write both files again",
                           strerror(errno), first->shown);
 }
 

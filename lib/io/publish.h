@@ -1,5 +1,6 @@
-/* Replaces output files atomically: temporary name in the same folder, fsync, rename, fsync of the
- * folder.
+/* Replaces output files atomically. The output is written under a temporary name in the same
+ * folder, synced, and renamed to the target (the path that the caller has named); then the folder
+ * is synced.
  *
  *     ebpo_publish out = EBPO_PUBLISH_INIT;
  *     status = ebpo_publish_begin(&out, path, error);
@@ -28,22 +29,22 @@ typedef struct ebpo_file_version {
     struct timespec modified;
 } ebpo_file_version;
 
-/* Returns the version of an open file. While the descriptor is open, no later file can have the
- * same inode. */
+/* Returns the version of an open file. While the descriptor is open, no other file can get the same
+ * inode. */
 ebpo_file_version ebpo_file_version_of(int fd);
 
 typedef struct ebpo_publish {
-    char *shown;  /* the target as the caller named it, for messages */
-    char *target; /* absolute, so that changing the working folder does no harm */
-    char *folder; /* folder of the target; ends with '/' */
-    char *temporary;
-    FILE *stream; /* NULL until first used */
-    char *buffer; /* buffer of the stream */
-    int fd;       /* descriptor of the temporary file */
-    int slot;     /* in the registry of unfinished files (unfinished.h) */
-    int mode;     /* mode of the file that existed at the beginning; -1: none */
-    bool expects; /* the target must still have the version `expected` when it is replaced */
-    bool locked;  /* the caller holds the lock */
+    char *shown;     /* the target as the caller named it, for messages */
+    char *target;    /* absolute path, so that changing the working folder does no harm */
+    char *folder;    /* folder of the target; ends with '/' */
+    char *temporary; /* absolute path of the temporary file; NULL: there is none */
+    FILE *stream;    /* NULL until first used */
+    char *buffer;    /* buffer of the stream */
+    int fd;          /* descriptor of the temporary file */
+    int slot;        /* in the registry of unfinished files (unfinished.h) */
+    int mode;        /* mode of the target when ebpo_publish_begin was called; -1: no such file */
+    bool expects;    /* true: the target must still have the version `expected` at the commit */
+    bool locked;     /* true: the caller holds the target's lock (file_lock.h) */
     ebpo_file_version expected;
 } ebpo_publish;
 
@@ -52,14 +53,13 @@ typedef struct ebpo_publish {
         NULL, NULL, NULL, NULL, NULL, NULL, -1, -1, -1, false, false, { false } \
     }
 
-/* Creates the temporary file, exclusively. An existing regular file at `path` is replaced on
- * commit. The new file takes over the mode of the existing file and, where the system allows, its
- * owner and extended attributes, including the access control list; other hard links of the
- * replaced file keep the old content. If there is no such file, the mode is 0666 less the umask.
- * EBPO_E_IO: `path` is a folder, device or symbolic link, or its folder has no write permission. On
- * failure, no temporary file remains. Temporary files that killed processes left for the same
- * target are removed. EBPO_E_LIMIT: the process has EBPO_UNFINISHED_MAX outputs and locks
- * (io/file_lock.h) already. */
+/* Creates the temporary file. The commit replaces an existing regular file at `path`. The new file
+ * then gets the mode of the replaced file and, where the system allows, its owner and extended
+ * attributes, including the access control list; other hard links of the replaced file keep the old
+ * content. Without an existing file, the mode is 0666 less the umask. EBPO_E_IO: `path` is a
+ * folder, device or symbolic link, or its folder has no write permission. On failure, no temporary
+ * file remains. Also removes temporary files that killed processes have left for the same target.
+ * EBPO_E_LIMIT: the process already has EBPO_UNFINISHED_MAX outputs and locks (io/file_lock.h). */
 EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
                                              ebpo_error *error);
 
@@ -69,9 +69,9 @@ EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path
  * has taken if `locked` is true. */
 void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expected, bool locked);
 
-/* Same as ebpo_publish_expect, for an output that replaces the file that `input` reads; does
- * nothing for other outputs. If the input reads a copy, the expected version is the current version
- * of the file at the path. */
+/* Same as ebpo_publish_expect, if the output replaces the file that `input` reads; does nothing for
+ * other outputs. If the input reads a copy of the named file, the expected version is the current
+ * version of the file at the path. */
 void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input);
 
 /* Returns the absolute name of the temporary file, for libraries that open by name (truncating is
@@ -82,9 +82,11 @@ const char *ebpo_publish_path(const ebpo_publish *publish);
  * Commit and abort close it. */
 FILE *ebpo_publish_stream(ebpo_publish *publish);
 
-/* Flushes, syncs and renames. A caller that has opened the file by name must close it first. On
- * failure the temporary file is removed and the target is unchanged. Exception: if only the last
- * step, the sync of the folder, failed, the new file is in place. */
+/* Flushes and syncs the temporary file, and renames it to the target. A caller that has opened the
+ * file by name must close it first. On failure the temporary file is removed and the target is
+ * unchanged. Exception: if only the last step, the sync of the folder, fails, the target is
+ * replaced.
+ */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
 /* Same as ebpo_publish_commit for two files that belong together: replaces both files, or, on
@@ -94,7 +96,7 @@ EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error 
 EBPO_MUST_USE ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second,
                                                    ebpo_error *error);
 
-/* Closes and removes the temporary file. Harmless on EBPO_PUBLISH_INIT and after a commit. */
+/* Closes and removes the temporary file. Does nothing on EBPO_PUBLISH_INIT and after a commit. */
 void ebpo_publish_abort(ebpo_publish *publish);
 
 #endif

@@ -1,9 +1,9 @@
-/* Removes unfinished files: outputs and locks, when a signal ends this process. The names of these
- * files are in fixed storage with lock-free states, because a signal handler reads the names.
- * Temporary files and folders of killed processes are recognised by their names, which contain the
- * process id; they are removed when the process has ended and no process holds their lock. New
- * folders are created atomically: they are made under another name in the same parent folder, and
- * renamed. Files that cannot be examined or removed stay. */
+/* Removes unfinished files. When a signal ends this process, its outputs and lock files are
+ * removed. Their names are in static memory with atomic states, because a signal handler reads the
+ * names. Temporary files and folders of killed processes are also removed: their names contain the
+ * id of a process that has ended, and no process holds the files' locks. Files that cannot be
+ * examined or removed stay. This file also creates new folders atomically: a folder is made under
+ * another name in the same parent folder, filled by the caller, and renamed. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -27,7 +27,8 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE }; /* LIVE: `path` is a file to remove */
+/* States of a slot. TAKEN: reserved without a file. LIVE: `path` is a file to remove. */
+enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
 static struct slot {
     atomic_int state;
     char path[PATH_MAX];
@@ -66,7 +67,8 @@ void ebpo_unfinished_remove(void)
     errno = saved;
 }
 
-/* Returns the process id in ".NAME.PROCESS-NUMBER.tmp", or 0. */
+/* Returns the process id in the name ".NAME.PROCESS-NUMBER.tmp" of a temporary file of the output
+ * `name`; 0: `file` is not such a name. */
 static long process_of(const char *file, const char *name)
 {
     char *end;
@@ -106,10 +108,12 @@ void ebpo_remove_stale_files(const char *folder, const char *name)
     errno = saved;
 }
 
+/* Parts of the name of an unfinished folder (making_name). */
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
-/* Returns a number that is the same for all processes in this namespace of process ids until the
- * machine is restarted. 0: not known. */
+/* Returns a number that identifies this namespace of process ids (container) until the machine is
+ * restarted, so that processes of other machines are not taken for ended processes of this machine.
+ * Returns 0 if the number is not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
@@ -124,8 +128,8 @@ static uint32_t system_number(void)
     return (uint32_t)(sum ^ sum >> 32);
 }
 
-/* Returns the length of the path without slashes at its end, and sets *name to the offset of its
- * last part. */
+/* Returns the length of the path without slashes at its end; cuts the last part of the path to
+ * EBPO_TARGET_NAME_KEPT bytes. *name: offset of the last part. */
 static size_t without_slashes(const char *folder, size_t *name)
 {
     size_t size = strlen(folder);
@@ -136,8 +140,8 @@ static size_t without_slashes(const char *folder, size_t *name)
     return size - *name > EBPO_TARGET_NAME_KEPT ? *name + EBPO_TARGET_NAME_KEPT : size;
 }
 
-/* Returns "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp, where SYSTEM is system_number(); long
- * names are cut. Freed by free(); NULL: no memory. */
+/* Returns "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp. SYSTEM: system_number(). Long names are
+ * cut. The caller frees the result. Returns NULL when out of memory. */
 static char *making_name(const char *folder)
 {
     char *path;
@@ -148,8 +152,8 @@ static char *making_name(const char *folder)
     return path;
 }
 
-/* Renames the folder that mkdtemp has made: its inode number replaces XXXXXX. If another folder
- * later gets this name, its inode number differs. */
+/* Renames the folder that mkdtemp has made: the folder's inode number replaces the random letters.
+ * remove_one thus recognises another folder that later gets this name. */
 static void settle_making(char **made)
 {
     char *path;
@@ -166,8 +170,9 @@ static void settle_making(char **made)
     }
 }
 
-/* Returns the text after the process id in a name made by making_name, or NULL if that process
- * exists or the name has another form. */
+/* Returns the text after the process id in a name that settle_making has made. Returns NULL if this
+ * process exists, or if `file` is another name. `name`: [kept] beginning of the name. `system`:
+ * system_number(). */
 static const char *suffix_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
 {
     char *end;
@@ -180,20 +185,21 @@ static const char *suffix_of_dead(const char *file, const char *name, size_t kep
     return dead ? end + 1 : NULL;
 }
 
+/* Removes the files in a folder, but no folders, which the library does not make there. */
 static void empty_folder(int fd)
 {
     DIR *d = fdopendir(fd);
     for (struct dirent *e; d && (e = readdir(d));)
-        (void)unlinkat(dirfd(d), e->d_name,
-                       0); /* the library makes no folders here, so folders stay */
+        (void)unlinkat(dirfd(d), e->d_name, 0);
     if (d)
         closedir(d);
     else
         close(fd);
 }
 
-/* Removes one folder of this user. Removes its files only if the name ends with the folder's inode
- * number; a folder without this number in its name is empty. */
+/* Removes an unfinished folder of this user. Removes its files only if the name ends with the
+ * folder's inode number; `suffix`: the end of the name. Another folder is removed only if it is
+ * empty. */
 static void remove_one(int parent, const char *file, const char *suffix)
 {
     struct stat facts;
@@ -211,8 +217,9 @@ static void remove_one(int parent, const char *file, const char *suffix)
         (void)unlinkat(parent, file, AT_REMOVEDIR);
 }
 
-/* Removes abandoned unfinished folders for `folder` with their content: those of this user, made by
- * a process of this system that has ended. Files that cannot be examined or removed stay. */
+/* Removes abandoned unfinished folders for `folder` with their content: folders of this user that a
+ * process of this system has made which has ended. Files that cannot be examined or removed stay.
+ */
 static void remove_stale_folders(const char *folder)
 {
     int saved = errno;
@@ -239,7 +246,7 @@ ebpo_status ebpo_folder_begin(const char *folder, char **making, ebpo_error *err
     *making = NULL;
     if (stat(folder, &st) == 0)
         return ebpo_fail_file(error, EBPO_E_IO, folder,
-                              "exists already; the output must be a new folder");
+                              "exists already; name a new folder for the output");
     remove_stale_folders(folder);
     char *path = making_name(folder);
     if (!path)

@@ -1,14 +1,14 @@
-/* Removes unfinished files: outputs and locks when a signal ends the process, and files that killed
- * processes have left. */
+/* Removes unfinished files: outputs and lock files of this process when a signal ends the process,
+ * and temporary files that killed processes have left. */
 #ifndef EBPO_IO_UNFINISHED_H
 #define EBPO_IO_UNFINISHED_H
 
-/* The registry: names of files that are removed when a signal ends this process, namely unfinished
- * outputs and locks. */
+/* The functions ebpo_unfinished_... use the registry: the names of the files that are removed when
+ * a signal ends this process. */
 
-enum { EBPO_UNFINISHED_MAX = 32 }; /* greatest number of files at one time */
+enum { EBPO_UNFINISHED_MAX = 32 }; /* number of slots for names */
 
-/* Returns a slot for one name; -1: all slots are in use. */
+/* Reserves and returns a slot for one name. Returns -1 if all slots are in use. */
 int ebpo_unfinished_reserve(void);
 
 /* Registers a file for removal; `path` has less than PATH_MAX bytes. */
@@ -23,13 +23,13 @@ void ebpo_unfinished_forget(int slot);
 /* Removes all registered files. Calls only unlink, so a signal handler may call this function. */
 void ebpo_unfinished_remove(void);
 
-/* Number of bytes of a target's name that the names of its temporary files contain: enough to
- * recognise the target, and few enough to keep names below the common limit of 255. */
+/* Names of temporary files contain at most this number of bytes of the output's name: enough to
+ * recognise the output, and few enough to keep the names below the common limit of 255 bytes. */
 enum { EBPO_TARGET_NAME_KEPT = 200 };
 
-/* Removes abandoned temporary files for `name` in `folder`: their process does not exist, and no
- * process on any machine holds their lock (flock). Files that cannot be examined or removed stay.
- */
+/* Removes abandoned temporary files of the output `name` in `folder`. A file is abandoned if the
+ * process that made it does not exist, and no process on any machine holds its lock (flock). Files
+ * that cannot be examined or removed stay. */
 void ebpo_remove_stale_files(const char *folder, const char *name);
 
 #endif

@@ -11,8 +11,8 @@ ebpo_status ebpo_source_of_url(const char *url, const ebpo_http_options *options
     char shown[EBPO_SHOWN_BYTES];
     return ebpo_fail_file(
         error, EBPO_E_UNSUPPORTED, ebpo_url_redact(url, shown, sizeof shown),
-        "this library was built without HTTP; install libcurl and build it again, "
-        "or download the file");
+        "this library was built without HTTP; install libcurl and build the library again, or "
+        "download the file");
 }
 
 bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)

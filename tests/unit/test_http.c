@@ -228,7 +228,7 @@ static const struct {
     { "garbage", EBPO_E_IO, "" },
     { "not_satisfiable", EBPO_E_IO, "416" },
     { "private", EBPO_E_IO, "returned status 401" },
-    { "etag_by_server", EBPO_E_IO, "another ETag); open it again, or with --http-unversioned" },
+    { "etag_by_server", EBPO_E_IO, "another ETag); open it again, or use --http-unversioned" },
     { "html", EBPO_E_IO, "the server returned text/html, not a model" },
     { "html_bare", EBPO_E_IO, "the server returned a page of HTML" },
     { "html_later", EBPO_E_IO, "the server returned text/html instead of a part" },
