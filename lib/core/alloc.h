@@ -11,36 +11,35 @@ static inline bool ebpo_mul_ok(uint64_t a, uint64_t b, uint64_t *out)
     return !__builtin_mul_overflow(a, b, out);
 }
 
-/* Allocates count * size uninitialised bytes; returns NULL when the product overflows or memory is
- * short. A count of 0 gives a valid pointer. */
+/* Allocates count * size uninitialised bytes. Returns NULL if the product is too large or memory is
+ * short. If `count` is 0, returns a pointer that is not NULL. */
 void *ebpo_alloc(uint64_t count, size_t size);
 /* Same as ebpo_alloc, but zeroed. */
 void *ebpo_alloc_zero(uint64_t count, size_t size);
 /* Same as ebpo_alloc_zero, but aligned to a cache line (64 bytes), for data that vector
  * instructions read and write. */
 void *ebpo_alloc_lines(uint64_t count, size_t size);
-/* Resizes a block to count * size bytes. When the function returns NULL, the old block stays valid.
+/* Resizes a block to count * size bytes. On failure, returns NULL, and the old block stays valid.
  */
 void *ebpo_realloc(void *block, uint64_t count, size_t size);
 
-/* Ensures capacity for `need` items in a growing array (*capacity items of `size` bytes at *array),
- * which grows by half. Returns false when memory is short; the array stays valid. */
+/* Ensures that a growing array has capacity for `need` items. `array`: address of the pointer to
+ * the items. *capacity: number of items of `size` bytes that have space; grows by at least half.
+ * Returns false when memory is short; the array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
 
-/* The memory limit of an object that is being built; used by one thread. All fields are in bytes.
- */
+/* The memory limit of an object that is being built, for one thread. All members are in bytes. */
 typedef struct ebpo_quota {
     uint64_t most;   /* the limit */
-    uint64_t taken;  /* at most `most` */
-    uint64_t needed; /* after a refused request: a limit above `most` that might suffice */
+    uint64_t taken;  /* reserved bytes, at most `most` */
+    uint64_t needed; /* after a refused request: a higher limit that might be sufficient */
 } ebpo_quota;
 
-/* Returns EBPO_E_LIMIT if `bytes` more bytes exceed the limit. If `space` is NULL, there is no
- * limit. */
+/* Returns EBPO_E_LIMIT if `bytes` more bytes would exceed the limit. `space` is NULL: no limit. */
 EBPO_MUST_USE ebpo_status ebpo_quota_check(ebpo_quota *space, uint64_t bytes, ebpo_error *error);
 /* Same as ebpo_quota_check, and counts the bytes as taken. */
 EBPO_MUST_USE ebpo_status ebpo_quota_take(ebpo_quota *space, uint64_t bytes, ebpo_error *error);
-/* Returns bytes that ebpo_quota_take has counted. */
+/* Reverses ebpo_quota_take: counts these bytes as free again. */
 void ebpo_quota_give(ebpo_quota *space, uint64_t bytes);
 
 #endif

@@ -1,10 +1,10 @@
-/* Keeps items in caches under a memory budget. A pool is a budget that several caches share. A pool
- * has one lock, one table of slots by cache and key, and one order of last use for all its caches;
- * a cache with a separate budget has its own pool. Memory for an item is reserved before it is
- * loaded, and the lock is not held while a source loads or releases. Meanwhile the slot is LOADING,
- * and threads that want the same key wait. Waiting reservations are served in order of arrival;
- * otherwise a large reservation might wait for ever. A background thread loads prefetched keys; it
- * evicts no item that is in use or in the same prefetch. */
+/* Keeps items in caches under a memory budget. A pool is a budget that several caches share; a
+ * cache with a separate budget has its own pool. A pool has one lock, one table of slots by cache
+ * and key, and one order of last use for all its caches. Memory for an item is reserved before the
+ * item is loaded, and the lock is not held while a source loads or releases items. While an item is
+ * loaded, its slot is LOADING, and threads that need the same key wait. Waiting reservations are
+ * served in order of arrival; otherwise a large reservation might wait for ever. A background
+ * thread loads prefetched keys; it drops no item that is in use or in the same prefetch. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <signal.h>
@@ -20,49 +20,45 @@
 #include "core/os.h"
 #include "core/parallel.h"
 
-/* The slots of all caches that share a budget: a table by cache and key, and the order of last use
- * of the items that are not in use. */
-
 typedef enum cache_slot_state { LOADING, READY, FAILED } cache_slot_state;
 
 struct ebpo_cache;
 
-/* The slot of one key of one cache. It is in the table while LOADING or READY; a FAILED slot lives
- * until its last waiter has seen it. */
+/* The slot of one key of one cache. The slot is in the table while it is LOADING or READY; a FAILED
+ * slot is freed when the last waiting thread has seen it. */
 typedef struct cache_slot {
     struct ebpo_cache *owner;
-    uint64_t key, bytes;
+    uint64_t key, bytes; /* bytes: size of the item */
     cache_slot_state state;
-    unsigned pins, waiters;
-    void *item;
+    unsigned pins, waiters;           /* number of pins, and of threads that wait for the load */
+    void *item;                       /* if READY */
     struct cache_slot *chain;         /* next slot in the bucket, or in a list of leaving items */
     struct cache_slot *older, *newer; /* READY and not pinned: neighbours in order of last use */
 } cache_slot;
 
-/* A hash table with chains, because keys are removed again; the tables of core/hash.h cannot do
- * that. */
+/* The slots of all caches that share a budget. This is a hash table with chains, because keys are
+ * also removed, which the tables of core/hash.h do not allow. */
 typedef struct cache_slots {
-    cache_slot **bucket;
+    cache_slot **bucket; /* [bucket_count], a power of two */
     uint64_t bucket_count, count;
-    cache_slot *oldest, *newest;
+    cache_slot *oldest, *newest; /* order of last use of the items that are not pinned */
 } cache_slots;
 
-/* A budget, with one lock and one order of last use for all caches of the pool. A cache with a
- * separate budget has a separate pool. */
 struct ebpo_cache_pool {
-    uint64_t budget;
-    pthread_mutex_t lock;   /* guards all below; never held while a source is called */
-    pthread_cond_t changed; /* loads ended, or memory became free */
+    uint64_t budget;        /* bytes; 0: no limit */
+    pthread_mutex_t lock;   /* protects all members below; never held while a source is called */
+    pthread_cond_t changed; /* broadcast when a load has ended or memory has become free */
     cache_slots slots;
-    uint64_t bytes, peak_bytes; /* of all caches, and those taken permanently */
-    uint64_t pinned;            /* bytes of items that are in use */
-    uint64_t taken;             /* bytes taken permanently by ebpo_cache_pool_take */
-    uint64_t aside_max;
-    /* bytes reserved for running loads, and bytes of items being released: they become free or
-     * pinned when the loads and releases end */
+    /* bytes of all caches and of ebpo_cache_pool_take: now, and greatest so far */
+    uint64_t bytes, peak_bytes;
+    uint64_t pinned;    /* bytes of pinned items */
+    uint64_t taken;     /* bytes that ebpo_cache_pool_take has reserved */
+    uint64_t aside_max; /* sum of aside_max of all caches */
+    /* bytes reserved for running loads, and bytes of items that are being released: they will
+     * become free or pinned when the loads and releases end */
     uint64_t passing;
-    /* waiting gets are served in order of arrival (by ticket); otherwise a large one might wait for
-     * ever */
+    /* number of reservations that have waited or wait; number of those that have ended. Each waits
+     * until `serving` is its ticket */
     uint64_t tickets, serving;
 };
 
@@ -71,17 +67,17 @@ struct ebpo_cache {
     char name[32];
     ebpo_cache_pool *pool;
     bool owns_pool; /* true: no other cache uses the pool, which is freed with this cache */
-    /* signalled when the background thread has work; it is separate from `changed`, because each
-     * unpin would wake the thread */
+    /* signalled when the background thread has work; separate from `changed`, because each unpin
+     * broadcasts `changed`, which would wake the thread */
     pthread_cond_t work_added;
-    uint64_t aside_max, aside;
-    uint64_t leaving; /* items that are out of the table and being released */
+    uint64_t aside_max, aside; /* bytes set aside, and those of them that are used */
+    uint64_t leaving;          /* number of items that are out of the table and being released */
     ebpo_cache_stats stats;
-    bool ahead_runs, stop;
-    pthread_t ahead_thread;
-    uint64_t ahead[EBPO_CACHE_AHEAD];
-    unsigned ahead_count, ahead_next;
-    uint64_t prefetch_count; /* number of calls of ebpo_cache_prefetch */
+    bool ahead_runs, stop;            /* the background thread was started; the thread must end */
+    pthread_t ahead_thread;           /* the background thread */
+    uint64_t ahead[EBPO_CACHE_AHEAD]; /* [ahead_count] keys of the latest prefetch */
+    unsigned ahead_count, ahead_next; /* ahead_next: index of the next key to load */
+    uint64_t prefetch_count;          /* number of calls of ebpo_cache_prefetch */
 };
 
 /* A request for a reservation. Requests of the background thread wait for all other requests, and
@@ -89,16 +85,18 @@ struct ebpo_cache {
 typedef struct cache_demand {
     ebpo_cache *cache;  /* NULL: ebpo_cache_pool_take */
     uint64_t key, peak; /* peak: bytes to reserve */
-    bool ahead;         /* the background thread loads the item */
-    bool aside;         /* a part of the bytes set aside (ebpo_cache_set_aside) */
-    bool known;         /* the peak is known from an earlier attempt */
+    bool ahead;         /* true: the background thread loads the item */
+    bool aside;         /* true: the bytes are a part of those that are set aside */
+    bool known;         /* true: `peak` is known from an earlier attempt */
 } cache_demand;
 
-/* The functions below are called with the lock held, and may release it meanwhile. */
-
+/* Result of a reservation: made; possible later, when running loads end; never possible. */
 typedef enum cache_capacity { CAPACITY_MADE, CAPACITY_LATER, CAPACITY_NEVER } cache_capacity;
 
-/* Returns false if memory is short. The caller frees the slots, then `bucket`. */
+/* The functions below are called with the lock held, and may release the lock for a time. */
+
+/* Makes an empty table. Returns false if memory is short. The caller frees the slots, and then
+ * t->bucket. */
 static bool make_slots(cache_slots *t)
 {
     enum { BUCKETS = 64 };
@@ -142,8 +140,8 @@ static void grow_table(cache_slots *t)
     t->bucket_count = count;
 }
 
-/* Adds a slot, LOADING, in the table but not in the order of use; returns NULL if memory is short.
- */
+/* Adds a slot with the state LOADING to the table, but not to the order of use. Returns NULL if
+ * memory is short. */
 static cache_slot *add_slot(cache_slots *t, struct ebpo_cache *owner, uint64_t key)
 {
     cache_slot *s = ebpo_alloc_zero(1, sizeof *s);
@@ -168,7 +166,7 @@ static void remove_slot(cache_slots *t, cache_slot *s)
     t->count--;
 }
 
-/* Adds a slot to the order of last use as the newest, or removes it. */
+/* Adds a slot to the order of last use, as the newest. */
 static void link_slot(cache_slots *t, cache_slot *s)
 {
     s->older = t->newest;
@@ -177,13 +175,14 @@ static void link_slot(cache_slots *t, cache_slot *s)
     t->newest = s;
 }
 
+/* Removes a slot from the order of last use. */
 static void unlink_slot(cache_slots *t, cache_slot *s)
 {
     *(s->older ? &s->older->newer : &t->oldest) = s->newer;
     *(s->newer ? &s->newer->older : &t->newest) = s->older;
 }
 
-/* Reservations in a budget: the least recently used item of any cache is dropped first. */
+/* --- reservations in a budget: the least recently used item of any cache is dropped first --- */
 
 static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
 {
@@ -206,8 +205,8 @@ static bool is_in_prefetch(const ebpo_cache *c, uint64_t key)
     return false;
 }
 
-/* Releases items that are out of the table. Their bytes count until then; otherwise another thread
- * would reserve memory that is still in use. */
+/* Releases items that are out of the table. Their bytes count until they are released; otherwise
+ * another thread would reserve memory that is still in use. */
 static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
 {
     if (!leaving)
@@ -238,8 +237,8 @@ static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
     *leaving = s;
 }
 
-/* Returns the bytes of the items that the background thread may not drop: those of the same
- * prefetch. */
+/* Returns the bytes of the unpinned items that must not be dropped for a reservation of the
+ * background thread, because they are in the same prefetch. */
 static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t bytes = 0;
@@ -255,15 +254,15 @@ static uint64_t saturated_sum(uint64_t a, uint64_t b)
     return a > UINT64_MAX - b ? UINT64_MAX : a + b;
 }
 
-/* Returns the bytes of the budget that no dropped item can free. */
+/* Returns the bytes that are needed even if all items are dropped that may be dropped: those in use
+ * or set aside, and those of the reservation. */
 static uint64_t held_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t held = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_max);
     return saturated_sum(saturated_sum(held, kept_for(p, d)), d->aside ? 0 : d->peak);
 }
 
-/* Reserves d->peak, dropping the least recently used items. CAPACITY_LATER: possible when running
- * loads end. */
+/* Reserves d->peak bytes. Drops the least recently used items if necessary. */
 static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
 {
     while (p->budget && saturated_sum(p->bytes, d->peak) > p->budget) {
@@ -289,17 +288,17 @@ static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
     return CAPACITY_MADE;
 }
 
-/* Waits its turn, in order of arrival, then reserves as reserve_space does and waits for free
- * memory. Returns false if there will never be enough. */
+/* Waits until all earlier reservations have ended, then reserves as reserve_space does, and waits
+ * for free memory. Returns false if the budget will never have enough. */
 static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t ticket = p->tickets++;
-    cache_capacity got = CAPACITY_LATER;
-    while (ticket != p->serving || (got = reserve_space(p, d)) == CAPACITY_LATER)
+    cache_capacity result = CAPACITY_LATER;
+    while (ticket != p->serving || (result = reserve_space(p, d)) == CAPACITY_LATER)
         pthread_cond_wait(&p->changed, &p->lock);
     p->serving++;
     pthread_cond_broadcast(&p->changed);
-    return got == CAPACITY_MADE;
+    return result == CAPACITY_MADE;
 }
 
 /* Returns the reservation of a load to the budget. */
@@ -352,7 +351,7 @@ ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *p, uint64_t bytes, ebpo_error 
     return made ? EBPO_OK
                 : ebpo_fail(error, EBPO_E_LIMIT,
                             "%" PRIu64 " bytes are not free in a shared budget of %" PRIu64 " bytes"
-                            "; with the items in use, %" PRIu64 " would be needed",
+                            "; a budget of %" PRIu64 " bytes would suffice",
                             bytes, p->budget, held);
 }
 
@@ -399,9 +398,9 @@ static ebpo_status wait_for_capacity(ebpo_cache *c, uint64_t peak, ebpo_error *e
                      c->name, p->budget, used, c->name, peak, saturated_sum(used, peak));
 }
 
-/* Ends a load: the item's bytes replace the `reserved` bytes, and the item is pinned once for each
- * waiting thread and `caller_pins` times for this thread. After a failure, only `reserved` is given
- * back. */
+/* Ends a load. The item's bytes replace the `reserved` bytes, and the item is pinned once for each
+ * waiting thread and `caller_pins` times for this thread. If the load has failed, only gives the
+ * reserved bytes back. */
 static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved,
                      unsigned caller_pins)
 {
@@ -422,7 +421,7 @@ static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserve
     }
 }
 
-/* Writes the bytes that loading a key takes to *peak. The lock is not held. */
+/* Sets *peak to the bytes that loading a key takes. The lock is not held. */
 static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_error *error)
 {
     uint64_t keep = 0;
@@ -432,8 +431,8 @@ static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, e
     return status;
 }
 
-/* Calls the source, without the lock; an item larger than its estimate is dropped. *needed: bytes
- * that the source requests instead of `reserved`, or 0. */
+/* Calls the source to load an item; the lock is not held. If the item is larger than `reserved`,
+ * drops the item and fails. *needed: bytes that the source requests instead of `reserved`, or 0. */
 static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
@@ -446,7 +445,7 @@ static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, ui
     if (status == EBPO_OK && bytes > reserved && c->pool->budget) {
         c->source.release(c->source.user, item);
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "%s %" PRIu64 " takes %" PRIu64 " bytes, and at most %" PRIu64
+                         "%s %" PRIu64 " takes %" PRIu64 " bytes, but at most %" PRIu64
                          " were expected; please report this",
                          c->name, s->key, bytes, reserved);
     }
@@ -455,8 +454,8 @@ static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, ui
     return status;
 }
 
-/* Loads s, enlarging the reservation each time the source requests it; *reserved: bytes that are
- * given back when the load ends. The lock is held at beginning and end. */
+/* Loads the item of slot s, and enlarges the reservation whenever the source requests this.
+ * *reserved: bytes to give back when the load ends. The lock is held at beginning and end. */
 static ebpo_status load_with_capacity(ebpo_cache *c, cache_slot *s, uint64_t peak,
                                       uint64_t *reserved, ebpo_error *error)
 {
@@ -477,7 +476,7 @@ static ebpo_status load_with_capacity(ebpo_cache *c, cache_slot *s, uint64_t pea
     }
 }
 
-/* Loads on this thread. The lock is held at beginning and end. */
+/* Loads an item on this thread, and pins it. The lock is held at beginning and end. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
     /* after this line, other threads that need the key wait for this load */
@@ -498,8 +497,8 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
     return status;
 }
 
-/* Waits for another thread's load; returns false when the load failed. The loading thread has
- * pinned the item for this thread. */
+/* Waits for another thread's load, and returns false if the load has failed. The loading thread
+ * pins the item for this thread. */
 static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
 {
     s->waiters++;
@@ -515,7 +514,8 @@ static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
     return false;
 }
 
-/* Pins the item of a key, which another thread has loaded or loads, or which this thread loads. */
+/* Pins the item of a key that was not in memory. Waits if another thread loads the item, else loads
+ * it on this thread. */
 static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
     for (cache_slot *s; (s = find_slot(&c->pool->slots, c, key)) != NULL;) {
@@ -624,8 +624,9 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
 
 /* --- prefetch --- */
 
-/* Loads d->key in the background, or skips it. Returns false when the load must wait for other
- * loads: then the slot is removed, so that a thread that needs the key can load it. */
+/* Loads the item of d->key in the background, or skips it. Returns false if the load must wait for
+ * other loads. The slot is removed in this case, so that a thread that needs the item can load it.
+ */
 static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
     cache_slot *s =
@@ -637,12 +638,12 @@ static bool load_ahead(ebpo_cache *c, cache_demand *d)
         d->known = estimate_bytes(c, d->key, &d->peak, NULL) == EBPO_OK;
         pthread_mutex_lock(&c->pool->lock);
     }
-    cache_capacity got = !d->known                              ? CAPACITY_NEVER
-                         : c->pool->serving != c->pool->tickets ? CAPACITY_LATER
-                                                                : reserve_space(c->pool, d);
-    if (got != CAPACITY_MADE) {
+    cache_capacity capacity = !d->known                              ? CAPACITY_NEVER
+                              : c->pool->serving != c->pool->tickets ? CAPACITY_LATER
+                                                                     : reserve_space(c->pool, d);
+    if (capacity != CAPACITY_MADE) {
         end_load(c, s, false, 0, 0);
-        return got == CAPACITY_NEVER;
+        return capacity == CAPACITY_NEVER;
     }
     pthread_mutex_unlock(&c->pool->lock);
     uint64_t needed;
@@ -653,6 +654,7 @@ static bool load_ahead(ebpo_cache *c, cache_demand *d)
     return true;
 }
 
+/* Loads the keys of the latest prefetch: the function of the background thread. */
 static void *run_ahead(void *context)
 {
     ebpo_cache *c = context;
@@ -690,8 +692,8 @@ static bool start_ahead(ebpo_cache *c)
     return started;
 }
 
-/* Replaces the list of items to load ahead, without repetitions. Items in memory become the newest,
- * the first key last, because it is used next. */
+/* Replaces the list of keys to load in the background, without repetitions. Makes items that are in
+ * memory the most recently used: the item of the first key the newest, because it is used next. */
 static void replace_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     c->ahead_count = c->ahead_next = 0;
@@ -794,7 +796,7 @@ void ebpo_cache_free(ebpo_cache *c)
     stop_ahead(c);
     pthread_mutex_lock(&p->lock);
     drop_unpinned(c);
-    while (c->leaving) /* dropped by other threads, for reservations */
+    while (c->leaving) /* other threads have dropped items for reservations and release them now */
         pthread_cond_wait(&p->changed, &p->lock);
     p->bytes -= c->aside;
     p->aside_max -= c->aside_max;

@@ -1,5 +1,6 @@
-/* Caches: items found by key and loaded when missing, under a budget that several caches may share.
- * The least recently used items are dropped first. Thread-safe. */
+/* Provides caches. A cache finds items by keys, and loads missing items, under a memory budget that
+ * several caches may share. The least recently used items are dropped first. Any thread may call
+ * these functions. */
 #ifndef EBPO_CORE_CACHE_H
 #define EBPO_CORE_CACHE_H
 
@@ -7,55 +8,64 @@
 
 typedef struct ebpo_cache ebpo_cache;
 
-/* The source of items. Called without locks held, by any thread; estimate and load never run twice
- * at once for one key. They may use other caches; on this cache they may only call
- * ebpo_cache_take_aside. */
+/* Callbacks that load the items of a cache. Any thread may call them, without a lock; estimate and
+ * load are never called at the same time for the same key. They may use other caches; of this cache
+ * they may only call ebpo_cache_take_aside. */
 typedef struct ebpo_cache_source {
     void *user;
-    /* Estimates the bytes that loading `key` takes, including the item; they are reserved first.
-     * *keep: bytes of the loaded item. */
+    /* Estimates the memory for an item. *peak: bytes that loading takes, including the item, which
+     * are reserved before loading. *keep: bytes of the loaded item. */
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error);
-    /* Loads an item within `most` bytes: the estimate, or UINT64_MAX without a budget. *bytes: size
-     * of the item. If `most` is too little, load returns EBPO_E_LIMIT with a sufficient size, above
-     * `most`, in *bytes; the cache then reserves that size and calls load again. An item larger
-     * than `most` is dropped, and ebpo_cache_get fails with EBPO_E_LIMIT. */
+    /* Loads an item with at most `most` bytes of memory: the estimate, or UINT64_MAX without a
+     * budget. *bytes: size of the item. If `most` is not sufficient, load returns EBPO_E_LIMIT and
+     * sets *bytes to a sufficient number above `most`; the cache then reserves this number and
+     * calls load again. If the item is larger than `most`, it is dropped, and ebpo_cache_get fails
+     * with EBPO_E_LIMIT. */
     ebpo_status (*load)(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
                         ebpo_error *error);
+    /* Frees an item. */
     void (*release)(void *user, void *item);
 } ebpo_cache_source;
 
 typedef struct ebpo_cache_stats {
-    uint64_t hits;                       /* lookups that did not wait */
-    uint64_t loads, prefetched, evicted; /* loads by get, loads in the background, items dropped */
-    /* bytes of items and of reservations for running loads, and bytes set aside; now and at most */
+    uint64_t hits;  /* number of calls of ebpo_cache_get and ebpo_cache_try that found an item */
+    uint64_t loads; /* number of items that ebpo_cache_get has loaded */
+    uint64_t prefetched; /* number of items that the background thread has loaded */
+    uint64_t evicted;    /* number of items that were dropped to free memory */
+    /* bytes of items, of reservations for running loads, and of used bytes that were set aside:
+     * now, and greatest so far */
     uint64_t bytes, peak_bytes;
-    double load_seconds; /* time that callers of get waited */
+    double load_seconds; /* time that callers of ebpo_cache_get waited */
 } ebpo_cache_stats;
 
-/* Number of keys that may be prefetched. */
+/* Greatest number of keys of a prefetch. */
 enum { EBPO_CACHE_AHEAD = 64 };
 
-/* A budget shared by caches: the least recently used items of all of them are dropped first. */
+/* A budget that caches share: the least recently used items of all these caches are dropped first.
+ */
 typedef struct ebpo_cache_pool ebpo_cache_pool;
 
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t budget,
                                                ebpo_error *error);
 /* Frees the pool; call it after freeing its caches. NULL is allowed. */
 void ebpo_cache_pool_free(ebpo_cache_pool *pool);
-/* Reserves bytes of the budget for another purpose, until ebpo_cache_pool_give_back returns them.
- * Drops items to free the bytes. EBPO_E_LIMIT: the items in use leave too few bytes. */
+/* Reserves bytes of the budget for other data than items, until ebpo_cache_pool_give_back is
+ * called. Drops items to free these bytes. Returns EBPO_E_LIMIT if the items in use leave too few
+ * bytes. */
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *pool, uint64_t bytes,
                                                ebpo_error *error);
 void ebpo_cache_pool_give_back(ebpo_cache_pool *pool, uint64_t bytes);
-/* Returns the current bytes, the peak, and the bytes taken by ebpo_cache_pool_take. */
+/* Gets the bytes in use now, the greatest number so far, and the bytes that ebpo_cache_pool_take
+ * has reserved. */
 void ebpo_cache_pool_get_bytes(ebpo_cache_pool *pool, uint64_t *now, uint64_t *peak,
                                uint64_t *taken);
 
-/* Makes a cache. `budget` is in bytes; 0 means no limit. `name` ("subtree") is for messages. */
+/* Makes a cache. `budget`: in bytes; 0: no limit. `name`: kind of the items, such as "subtree", for
+ * messages. */
 EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source,
                                           const char *name, uint64_t budget, ebpo_error *error);
-/* Makes a cache in a shared pool, which must outlive it. */
+/* Makes a cache that uses a shared budget. The pool must outlive the cache. */
 EBPO_MUST_USE ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source,
                                              const char *name, ebpo_cache_pool *pool,
                                              ebpo_error *error);
@@ -63,9 +73,10 @@ EBPO_MUST_USE ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_
 void ebpo_cache_free(ebpo_cache *cache);
 
 /* Finds or loads an item and pins it: the item stays until ebpo_cache_unpin was called once for
- * each get. Waits while another thread loads the same key, or while a background load holds the
- * memory. EBPO_E_LIMIT when the item does not fit the budget even with all unpinned items dropped;
- * the message states a sufficient budget. *hit may be NULL. */
+ * each call of this function. Waits while another thread loads the same key, or while a background
+ * load uses the memory. Returns EBPO_E_LIMIT if the item exceeds the budget even after all unpinned
+ * items are dropped; the message states a sufficient budget. *hit: true if the item was in memory;
+ * `hit` may be NULL. */
 EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit,
                                          ebpo_error *error);
 /* Returns true if an item is in memory now; this does not count as a use or a hit. */
@@ -75,17 +86,18 @@ void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 /* Pins an item if it is in memory; otherwise returns false without waiting. */
 bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
 
-/* Requests that a background thread (started by the first call) loads the items of these keys in
- * this order; pending earlier requests are dropped. Background loads evict only items that are
- * unpinned and not among the keys; their failures are silent (get will load the key when needed).
- * Keys beyond EBPO_CACHE_AHEAD are ignored. Items that are in memory already count as just used. */
+/* Requests that a background thread, which the first call starts, loads the items of these keys in
+ * this order. Requests of earlier calls that are not loaded yet are dropped. Background loads drop
+ * only items that are unpinned and not among these keys. If a background load fails, nothing is
+ * reported; ebpo_cache_get loads the item when it is needed. Keys beyond the first EBPO_CACHE_AHEAD
+ * are ignored. Items that are already in memory count as just used. */
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 
-/* Sets the number of bytes of the budget that are set aside for other data than the items. Loads
- * are refused as if all these bytes were taken. Call it before the cache is used. */
+/* Sets `most` bytes of the budget aside for other data than items: loads are refused as if all
+ * these bytes were in use. Call this function before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Uses bytes that are set aside, and drops items to free them. Returns false if too few are left,
- * or if items in use and running loads leave too little memory now. */
+/* Uses bytes that are set aside, and drops items to free memory. Returns false if fewer bytes are
+ * still set aside, or if items in use and running loads leave too little memory now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
 /* Returns bytes that ebpo_cache_take_aside has used. */
 void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);

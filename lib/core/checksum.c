@@ -25,12 +25,13 @@ void ebpo_sha256_hex(const uint8_t digest[32], char hex[65])
 
 static uint32_t rotate_left(uint32_t x, int k) { return x << k | x >> (32 - k); }
 
+/* Mixes the state after 12 bytes. */
 static void mix_state(uint32_t s[3])
 {
-    static const uint8_t turn[6] = { 4, 6, 8, 16, 19, 4 };
+    static const uint8_t rotation[6] = { 4, 6, 8, 16, 19, 4 };
     for (int i = 0; i < 6; i++) {
         uint32_t *a = &s[i % 3], *b = &s[(i + 1) % 3], *c = &s[(i + 2) % 3];
-        *a = (*a - *c) ^ rotate_left(*c, turn[i]);
+        *a = (*a - *c) ^ rotate_left(*c, rotation[i]);
         *c += *b;
     }
 }
@@ -38,10 +39,10 @@ static void mix_state(uint32_t s[3])
 /* Mixes the state for the last time, and returns the hash. */
 static uint32_t finish_state(uint32_t s[3])
 {
-    static const uint8_t turn[7] = { 14, 11, 25, 16, 4, 14, 24 };
+    static const uint8_t rotation[7] = { 14, 11, 25, 16, 4, 14, 24 };
     for (int i = 0; i < 7; i++) {
         uint32_t *x = &s[(i + 2) % 3], y = s[(i + 1) % 3];
-        *x = (*x ^ y) - rotate_left(y, turn[i]);
+        *x = (*x ^ y) - rotate_left(y, rotation[i]);
     }
     return s[2];
 }

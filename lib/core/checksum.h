@@ -1,5 +1,5 @@
-/* Checksums: SHA-256 (nettle) of sources and content, Jenkins' lookup3 of HDF5 metadata, and their
- * comparison with the values that a file states. */
+/* Computes checksums: SHA-256 (nettle) of sources and content, and Jenkins' lookup3 of HDF5
+ * metadata. Compares checksums with the values that a file states. */
 #ifndef EBPO_CORE_CHECKSUM_H
 #define EBPO_CORE_CHECKSUM_H
 
@@ -19,9 +19,10 @@ void ebpo_sha256_end(ebpo_sha256 *state, uint8_t digest[32]);
 /* Writes lower-case hexadecimal digits and a terminating zero byte. */
 void ebpo_sha256_hex(const uint8_t digest[32], char hex[65]);
 
-/* Compares a computed checksum with the one that a file states. All comparisons are here, so that a
- * fuzzing build (`-Dfuzzing=true`, never installed) can skip them: otherwise damaged input would be
- * rejected at the checksum and never reach the code after it. */
+/* The functions below compare a computed checksum with the checksum that a file states. All
+ * comparisons are here, so that a fuzzing build (`-Dfuzzing=true`, never installed) can skip them:
+ * otherwise damaged input would be rejected by its checksum and never reach the code after the
+ * comparison. */
 
 #ifdef EBPO_FUZZING
 enum { EBPO_CHECKSUMS_COMPARED = 0 };
@@ -41,7 +42,6 @@ static inline bool ebpo_digest_differs(const uint8_t stated[32], const uint8_t c
 
 /* Returns Jenkins' lookup3 ("hashlittle" with the initial value 0), the checksum of HDF5 metadata.
  */
-
 uint32_t ebpo_lookup3(const uint8_t *bytes, size_t size);
 
 #endif

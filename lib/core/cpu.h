@@ -1,9 +1,11 @@
-/* Kernels: inner loops that are compiled once for each instruction set, with the same results.
+/* Selects kernels: inner loops that are compiled once for each instruction set, with the same
+ * results.
  *
- * A kernel is a table of functions in NAME_kernels.c, defined as EBPO_KERNEL(table). Its header
- * declares it by EBPO_KERNELS(type, table), and callers use table_best(). lib/meson.build has one
- * row for each instruction set: its suffix and its flags. With EBPO_BASE_KERNELS_ONLY, tests
- * compile only the kernels of the base set, with other flags. */
+ * A kernel is a table of functions. NAME_kernels.c defines the table as EBPO_KERNEL(TABLE), its
+ * header declares it by EBPO_KERNELS(TYPE, TABLE), and callers use TABLE_best(), which returns the
+ * table for this processor. lib/meson.build has one row for each instruction set: its suffix and
+ * its compiler flags. With EBPO_BASE_KERNELS_ONLY, tests compile only the kernels of the base set,
+ * with other flags. */
 #ifndef EBPO_CORE_CPU_H
 #define EBPO_CORE_CPU_H
 

@@ -1,11 +1,13 @@
-/* Disjoint sets of items (union-find) in one array: parent[i] is an item of the set of i, and the
- * root, the lowest item of a set, is its own parent. */
+/* Keeps disjoint sets of items (union-find) in one array. parent[i] is an item of the set of item
+ * i. The root of a set is its lowest item, and is its own parent. */
 #ifndef EBPO_CORE_DISJOINT_SETS_H
 #define EBPO_CORE_DISJOINT_SETS_H
 
 #include <stdint.h>
 
-/* Returns the root of the set of an item, and halves the path to it. */
+/* Returns the root of the set of an item. Halves the path to the root, so that later calls are
+ * fast.
+ */
 static inline uint32_t ebpo_set_root(uint32_t *parent, uint32_t item)
 {
     while (parent[item] != item)

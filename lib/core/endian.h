@@ -1,11 +1,11 @@
-/* Little-endian loads and stores: files are little-endian on every machine. */
+/* Loads and stores little-endian numbers, because files are little-endian on every machine. */
 #ifndef EBPO_CORE_ENDIAN_H
 #define EBPO_CORE_ENDIAN_H
 
 #include <stdint.h>
 #include <string.h>
 
-/* Converts a number between the machine's and little-endian byte order. */
+/* Convert a number between the machine's and little-endian byte order. */
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 static inline uint16_t ebpo_little16(uint16_t v) { return v; }
 static inline uint32_t ebpo_little32(uint32_t v) { return v; }

@@ -1,40 +1,42 @@
-/* Errors and versioned structs of public functions: they fill in the caller's ebpo_error, and read
- * and write structs that begin with their size. */
+/* Provides functions that fill in the caller's ebpo_error, and functions that read and write the
+ * versioned structs of public functions, which begin with their size. */
 #ifndef EBPO_CORE_ERROR_H
 #define EBPO_CORE_ERROR_H
 
 #include <ebpo/base.h>
 
-/* Writes the message (printf style) and returns `status`, so that `return ebpo_fail(...)` reads
- * well. `error` may be NULL. An error that is already set is overwritten. */
+/* Writes the message (printf style) and the status to *error, and returns `status`. `error` may be
+ * NULL. An error that is already set is overwritten. */
 ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format, ...)
     EBPO_PRINTF(3, 4);
 
-/* Same as ebpo_fail about a file: the message becomes "`file`: ...". */
+/* Same as ebpo_fail, for an error about a file: the message becomes "FILE: ...". */
 ebpo_status ebpo_fail_file(ebpo_error *error, ebpo_status status, const char *file,
                            const char *format, ...) EBPO_PRINTF(4, 5);
 
-/* Same as ebpo_fail about an object in a file: "`file`: `object`: ..."; "" means no object.
- * `offset` is the byte at fault, reported beside the message; -1: not known. */
+/* Same as ebpo_fail, for an error about an object in a file: the message becomes "FILE: OBJECT:
+ * ...". `object` "": no object. `offset`: offset of the wrong byte, a member of the error; -1: not
+ * known. */
 ebpo_status ebpo_fail_at(ebpo_error *error, ebpo_status status, const char *file,
                          const char *object, int64_t offset, const char *format, ...)
     EBPO_PRINTF(6, 7);
 
-/* Passes on the error of another call. */
+/* Copies the error of another call to *error, and returns its status. */
 ebpo_status ebpo_fail_with(ebpo_error *error, const ebpo_error *cause);
 
-/* Returns EBPO_E_MEMORY with the number of bytes that could not be allocated. */
+/* Returns EBPO_E_MEMORY. `bytes`: the number of bytes that could not be allocated, for the message.
+ */
 ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes);
 
-/* Returns EBPO_E_IO: "`path`: `what`: strerror(errno)". */
+/* Returns EBPO_E_IO, with the message "PATH: WHAT: " and the text of errno. */
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what);
 
-/* Structs that begin with their size (ebpo/base.h): reads the caller's options and fills in the
- * caller's results, for any version of the header that the caller was compiled with. */
+/* Structs that begin with their size (ebpo/base.h). The macros below read the caller's options and
+ * fill in the caller's results, for any version of the header that the caller was compiled with. */
 
-/* Reads options into *own, which holds the defaults; a NULL `given` keeps them. EBPO_E_ARGUMENT:
- * struct_size was not set; EBPO_E_UNSUPPORTED: a field is set that this version does not support.
- */
+/* Reads the caller's options `given` into *own, which has the defaults. If `given` is NULL, *own
+ * does not change. EBPO_E_ARGUMENT: struct_size is not set. EBPO_E_UNSUPPORTED: a member is set
+ * that this version of the library does not support. */
 #define EBPO_TAKE(type, own, given, error)  \
     (!(given) ? EBPO_OK                     \
      : (given)->struct_size == sizeof(type) \
@@ -44,8 +46,9 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
 /* Returns EBPO_E_ARGUMENT when the caller's result struct does not state its size. */
 #define EBPO_CHECK_SIZED(type, out, error) ebpo_sized_check((out)->struct_size, #type, error)
 
-/* Copies as much of `filled` as the caller's struct has, and zeros beyond; the caller's struct_size
- * stays. Returns EBPO_E_ARGUMENT and writes nothing if struct_size is not set. */
+/* Copies the members of *filled that the caller's struct has to *out. Sets members of *out that
+ * *filled lacks to 0. Keeps the caller's struct_size. Returns EBPO_E_ARGUMENT and writes nothing if
+ * struct_size is not set. */
 #define EBPO_GIVE(type, out, filled) \
     ebpo_sized_give((out), (out)->struct_size, (filled), sizeof(type))
 

@@ -1,18 +1,19 @@
-/* Sets and restores the floating-point environment in public functions: rounding to nearest,
- * denormals kept, no traps, whatever the caller has set.
+/* Sets the floating-point environment that the library needs in public functions: rounding to
+ * nearest, denormals kept, no traps.
  *
- * EBPO_DEFAULT_FP; as the first line of a public function saves the caller's environment and
- * restores it on every return. Where the caller's environment is already the default, it writes
- * nothing and takes a few nanoseconds. Threads that the function starts inherit the environment.
- * Exception flags that the caller had raised stay; the flags of the library's own operations may be
- * added. */
+ * A public function begins with the line EBPO_DEFAULT_FP; which saves the caller's environment,
+ * sets the default environment, and restores the caller's environment on every return. If the
+ * caller's environment is already the default, nothing is written, and the line takes a few
+ * nanoseconds. Threads that the function starts inherit the environment. Exception flags that the
+ * caller had raised stay; flags that the library's operations raise may be added. */
 #ifndef EBPO_CORE_FP_ENV_H
 #define EBPO_CORE_FP_ENV_H
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 
-/* On x86 only the SSE control register is set, because strict_fp.h rejects x87 arithmetic. */
+/* The saved environment. On x86 this is only the SSE control register, because strict_fp.h rejects
+ * x87 arithmetic. */
 typedef struct ebpo_fp_env {
     unsigned control;
 } ebpo_fp_env;
@@ -32,6 +33,7 @@ static inline ebpo_fp_env ebpo_fp_enter(void)
     return env;
 }
 
+/* Restores a saved environment. */
 static inline void ebpo_fp_leave(const ebpo_fp_env *env)
 {
     __asm__ volatile("" ::: "memory");
@@ -55,7 +57,7 @@ static inline ebpo_fp_env ebpo_fp_enter(void)
 {
     ebpo_fp_env env;
     __asm__ volatile("mrs %0, fpcr" : "=r"(env.control)::"memory");
-    if (__builtin_expect(env.control != 0, 0))
+    if (__builtin_expect(env.control != 0, 0)) /* 0: the default environment */
         ebpo_fp_set(0);
     return env;
 }

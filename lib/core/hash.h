@@ -7,20 +7,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Mixes all bits of the key into the low bits, which choose the slot. */
+/* Returns the hash of a key: mixes all bits of the key into the low bits, which choose the slot. */
 static inline uint64_t ebpo_hash_number(uint64_t key)
 {
     key = (key ^ key >> 31) * UINT64_C(0x9e3779b97f4a7c15);
     return key ^ key >> 32;
 }
 
+/* Returns the hash of a key of three numbers. */
 static inline uint64_t ebpo_hash_three(const uint64_t key[3])
 {
     return ebpo_hash_number(ebpo_hash_number(ebpo_hash_number(key[0]) + key[1]) + key[2]);
 }
 
-/* Continues the FNV-1a hash `hash` with bytes; `hash` is EBPO_HASH_BYTES_BEGIN for the first bytes.
- */
+/* Returns the FNV-1a hash of bytes that follow the bytes with the hash `hash`. For the first bytes,
+ * `hash` is EBPO_HASH_BYTES_BEGIN. */
 #define EBPO_HASH_BYTES_BEGIN UINT64_C(0xcbf29ce484222325)
 static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t size)
 {
@@ -29,8 +30,8 @@ static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t 
     return hash;
 }
 
-/* Returns the number of slots: the smallest power of two that is at least `least` and at least 16.
- * Tables that are more than three quarters full are slow. */
+/* Returns the number of slots of a table: the smallest power of two that is at least `least` and at
+ * least 16. A table becomes slow if more than three quarters of the slots are in use. */
 static inline uint64_t ebpo_hash_slots(uint64_t least)
 {
     uint64_t slots = 16;
@@ -39,9 +40,9 @@ static inline uint64_t ebpo_hash_slots(uint64_t least)
     return slots;
 }
 
-/* Sets `at` to the slot that a key with this hash has or would get, out of mask + 1 slots. `found`
- * is an expression in `at` that is true if the slot is free or holds the key. At least one slot
- * must be free. */
+/* Sets `at` to the slot of a key with this hash, or to the free slot for a new key. The table has
+ * mask + 1 slots. `found`: an expression with `at` that is true if slot `at` is free or holds the
+ * key. At least one slot must be free. */
 #define EBPO_HASH_FIND(at, hash, mask, found)                          \
     for ((at) = (hash) & (mask); !(found); (at) = ((at) + 1) & (mask)) \
     continue
@@ -50,7 +51,7 @@ static inline uint64_t ebpo_hash_slots(uint64_t least)
 
 #define EBPO_RANDOM_STEP UINT64_C(0x9e3779b97f4a7c15)
 
-/* Maps different numbers to different numbers that look unrelated. */
+/* Maps a number to a number that looks random; different numbers have different results. */
 static inline uint64_t ebpo_random_mix(uint64_t x)
 {
     x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
@@ -64,7 +65,7 @@ static inline uint64_t ebpo_random_next(uint64_t *state)
     return ebpo_random_mix(*state += EBPO_RANDOM_STEP);
 }
 
-/* Returns a number in [0, 1) from the upper 53 bits. */
+/* Converts a random number to a double in [0, 1): its upper 53 bits. */
 static inline double ebpo_random_unit(uint64_t number) { return (double)(number >> 11) * 0x1p-53; }
 
 #endif

@@ -1,6 +1,6 @@
-/* Functions that depend on the operating system: clock, cores, memory, pages, and unnamed files
- * (os_machine.c, os_files.c). All other code is written for POSIX; os_windows.h declares what
- * Windows lacks of it. */
+/* Declares functions that depend on the operating system: clock, cores, memory, pages, and unnamed
+ * files (os_machine.c, os_files.c). All other code is written for POSIX; os_windows.h declares the
+ * parts of POSIX that Windows lacks. */
 #ifndef EBPO_CORE_OS_H
 #define EBPO_CORE_OS_H
 
@@ -18,23 +18,23 @@ static inline uint64_t ebpo_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-/* Returns the same clock in seconds. */
+/* Returns the time of ebpo_clock in seconds. */
 static inline double ebpo_seconds(void) { return 1e-9 * (double)ebpo_clock(); }
 
 /* Returns the number of cores that this process may use, at least 1. */
 int ebpo_cores(void);
 
-/* Advises the system to back an array with pages of 2 MiB, as far as whole pages fit within it (no
- * more memory is taken): without such pages, address translation takes a fifth of the time of a
- * search in a large model. Call it before the array is filled. The call is only advice; any pointer
- * and size are allowed. */
+/* Advises the system to use pages of 2 MiB for an array, as far as such pages are completely within
+ * the array. Otherwise address translation takes a fifth of the time of a search in a large model.
+ * Call this function before the array is filled. Any pointer and size are allowed. */
 void ebpo_prefer_huge_pages(void *array, size_t bytes);
 
-/* Returns the bytes of memory: the machine's, or the lowest limit of a control group of this
- * process. */
+/* Returns the memory of the machine in bytes, or the lowest limit of the control groups (such as
+ * containers) of this process, if this limit is less. */
 uint64_t ebpo_machine_memory(void);
 
-/* Returns the last separator of a path, '/' (on Windows also '\\'); NULL if there is none. */
+/* Returns the last separator of a path: '/', on Windows also '\\'. Returns NULL if there is none.
+ */
 static inline char *ebpo_last_separator(const char *path)
 {
     char *last = strrchr(path, '/');
@@ -45,8 +45,8 @@ static inline char *ebpo_last_separator(const char *path)
     return last;
 }
 
-/* Returns true for a path that does not depend on the current folder; on Windows also for one with
- * a drive ("C:"). */
+/* Returns true for a path that does not depend on the current folder; on Windows also for a path
+ * with a drive ("C:"). */
 static inline bool ebpo_path_is_absolute(const char *path)
 {
 #ifdef _WIN32
@@ -56,11 +56,11 @@ static inline bool ebpo_path_is_absolute(const char *path)
     return *path == '/';
 }
 
-/* Creates an unnamed temporary file. Returns its descriptor, or -1 with errno. */
+/* Creates an unnamed temporary file in a folder. Returns its descriptor, or -1 with errno. */
 int ebpo_open_unnamed(const char *folder);
 
-/* Removes the temporary file that is being created, if the file has a name at this moment. For
- * signal handlers, just before the process ends. */
+/* Removes the temporary file that another thread is creating, if the file has a name at this
+ * moment. For signal handlers, just before the process ends. */
 void ebpo_workspace_abandon(void);
 
 #endif

@@ -1,6 +1,6 @@
-/* Makes unnamed temporary files. Where the system cannot make a file without a name, the file has
- * one for a moment. The name is stored before the file exists, so that a signal handler can remove
- * the file. Only one file at a time has a name. */
+/* Makes unnamed temporary files. On systems that cannot make a file without a name, the file has a
+ * name for a moment. This name is stored before the file exists, so that a signal handler can
+ * remove the file. Only one of these files has a name at a time. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -11,40 +11,41 @@
 
 #include "core/os.h"
 
-enum { PATH_BYTES = 4096 + 64 }; /* the longest name of a folder, and of a file in it */
+enum { PATH_BYTES = 4096 + 64 }; /* the longest path of a folder, and a file name */
 
-/* The name of the file that has one for a moment, for ebpo_workspace_abandon in a signal handler.
- */
-static pthread_mutex_t passing_lock = PTHREAD_MUTEX_INITIALIZER;
-static atomic_bool is_passing;
-static char passing[PATH_BYTES];
+/* The path of the file that has a name at this moment, for ebpo_workspace_abandon in a signal
+ * handler. The lock is held from before the file exists until its name is removed. */
+static pthread_mutex_t named_lock = PTHREAD_MUTEX_INITIALIZER;
+static atomic_bool is_named;
+static char named[PATH_BYTES];
 
 void ebpo_workspace_abandon(void)
 {
     int saved = errno;
-    if (atomic_load(&is_passing))
-        unlink(passing);
+    if (atomic_load(&is_named))
+        unlink(named);
     errno = saved;
 }
 
+/* Creates a file and removes its name at once. */
 static int open_and_unlink(const char *folder)
 {
     static unsigned counter;
     int fd = -1;
-    pthread_mutex_lock(&passing_lock);
+    pthread_mutex_lock(&named_lock);
     for (int attempt = 0; attempt < 100 && fd < 0; attempt++) {
-        snprintf(passing, sizeof passing, "%s/.ebpo-%ld-%u.tmp", folder, (long)getpid(), counter++);
-        /* set before the file exists, so that a signal never leaves it behind */
-        atomic_store(&is_passing, true);
-        fd = open(passing, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+        snprintf(named, sizeof named, "%s/.ebpo-%ld-%u.tmp", folder, (long)getpid(), counter++);
+        /* set before the file exists, so that a signal never leaves the file behind */
+        atomic_store(&is_named, true);
+        fd = open(named, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (fd >= 0)
-            unlink(passing);
-        atomic_store(&is_passing, false);
+            unlink(named);
+        atomic_store(&is_named, false);
         if (fd < 0 && errno != EEXIST)
             break;
     }
     int fault = errno;
-    pthread_mutex_unlock(&passing_lock);
+    pthread_mutex_unlock(&named_lock);
     errno = fault;
     return fd;
 }

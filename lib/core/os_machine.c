@@ -1,8 +1,8 @@
-/* Reads the machine's properties from the operating system: instruction sets, cores, the memory
- * that this process may use, and large pages. The memory is the memory of the machine, or the
- * lowest limit of the control groups of this process (as in containers; version 1 or 2,
- * cgroups(7)). The system may ignore advice on pages. On systems without the files in /proc and
- * /sys, the values come from sysconf. */
+/* Reads the machine's properties from the operating system: instruction sets, cores, and the memory
+ * that this process may use; and advises the system on large pages. The memory is the memory of the
+ * machine, or the lowest limit of the control groups of this process (as in containers; version 1
+ * or 2, cgroups(7)). On systems without the files in /proc and /sys, the values come from sysconf.
+ */
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -27,7 +27,7 @@ bool ebpo_cpu_has_v3(void)
 
 enum { PATH_BYTES = 4096 };
 
-/* Returns the number in a file; 0 when it is missing or holds none ("max"). */
+/* Returns the number in a file. Returns 0 if the file is missing or has no number ("max"). */
 static uint64_t number_in(const char *path)
 {
     unsigned long long value = 0;
@@ -40,7 +40,8 @@ static uint64_t number_in(const char *path)
     return value;
 }
 
-/* Returns the number after the word `word` at the beginning of a line; 0 when there is none. */
+/* Returns the number after `word` in the first line of a file that begins with this word. Returns 0
+ * if there is none. */
 static uint64_t number_of(const char *path, const char *word)
 {
     char line[256];
@@ -55,7 +56,8 @@ static uint64_t number_of(const char *path, const char *word)
     return value;
 }
 
-/* File names in the two versions of control groups. */
+/* Names in one version of control groups: the folder of all groups; the files in a group's folder
+ * with its limit and its used memory; the word in memory.stat for cached file data. */
 typedef struct group_files {
     const char *mounted, *limit, *used, *cached;
 } group_files;
@@ -65,8 +67,9 @@ static const group_files files_of[] = {
       "total_inactive_file" },
 };
 
-/* Returns the least limit of the group `path` (which is cut short) and the groups above it; with
- * `free`, the least free memory. Cached file data counts as free. */
+/* Returns the least of `least` and the limits of the group `path` and all groups above it. If
+ * `free` is true, uses the free memory of the groups instead of the limits; cached file data count
+ * as free. Changes `path`. */
 static uint64_t least_limit(const group_files *files, char *path, bool free, uint64_t least)
 {
     for (;;) {
@@ -89,9 +92,10 @@ static uint64_t least_limit(const group_files *files, char *path, bool free, uin
     }
 }
 
-/* Returns the memory limit of the control groups of this process (cgroups(7): lines "0::/path", or
- * in version 1 "4:memory:/path"). Within a container the path may be missing, but the topmost group
- * is the container's own. */
+/* Returns the least of `least` and the memory limits (`free`: free memory) of the control groups of
+ * this process. `groups`: file with the lines "0::/path", or in version 1 "4:memory:/path"
+ * (cgroups(7)). In a container, the path may not exist, but the topmost group is that of the
+ * container. */
 static uint64_t group_memory(const char *groups, bool free, uint64_t least)
 {
     char line[PATH_BYTES];

@@ -5,8 +5,8 @@
  * POSIX headers and are empty.
  *
  * Paths are UTF-8 with '/' or '\' between names, and may be long. They are converted to UTF-16.
- * Errors are values of errno. Functions that Windows cannot have (fork, sockets of haptics) fail
- * with ENOSYS. */
+ * Errors are values of errno. Functions that are not provided on Windows (fork, sockets of haptics)
+ * fail with ENOSYS. */
 #ifndef EBPO_CORE_OS_WINDOWS_H
 #define EBPO_CORE_OS_WINDOWS_H
 
@@ -137,7 +137,7 @@ int fcntl(int fd, int what, ...);
 int pipe(int ends[2]);
 int futimens(int fd, const struct timespec *times);
 
-/* Says that advice on a file is not supported; POSIX returns the error. */
+/* Returns the error that advice on a file is not supported. */
 static inline int posix_fadvise(int fd, off_t at, off_t bytes, int advice)
 {
     (void)fd, (void)at, (void)bytes, (void)advice;
@@ -182,7 +182,7 @@ int mincore(void *at, size_t bytes, unsigned char *flags);
 int mlockall(int flags);
 int munlockall(void);
 
-/* Blocks of aligned_alloc are freed with free, which therefore has to know them. */
+/* Blocks of aligned_alloc are freed with `free`, so `free` is a function that recognises them. */
 #define free ebpo_windows_free
 void *aligned_alloc(size_t alignment, size_t bytes);
 void ebpo_windows_free(void *block);
@@ -213,7 +213,7 @@ struct sigaction {
 #undef pthread_sigmask
 int sigaction(int number, const struct sigaction *action, struct sigaction *before);
 
-/* There are no signal masks: handlers run on threads of their own. */
+/* Signal masks have no effect, because handlers run on separate threads. */
 static inline int sigemptyset(sigset_t *set)
 {
     *set = 0;
@@ -256,7 +256,7 @@ int getrlimit(int what, struct rlimit *out);
 int setrlimit(int what, const struct rlimit *limit);
 
 struct rusage {
-    uint64_t ru_minflt, ru_majflt; /* the faults of all kinds; 0 */
+    uint64_t ru_minflt, ru_majflt; /* page faults of all kinds; always 0 */
 };
 #define RUSAGE_SELF 0
 int getrusage(int who, struct rusage *out);
@@ -312,8 +312,8 @@ const char *dlerror(void);
 
 /* --- numbers --- */
 
-/* Returns the root rounded once. The function of mingw-w64, which is called where the compiler
- * generates no instruction, rounds twice. */
+/* Returns the square root, rounded once. The function sqrt of mingw-w64, which is called if the
+ * compiler generates no instruction, rounds twice. */
 static inline double ebpo_windows_sqrt(double x)
 {
     return _mm_cvtsd_f64(_mm_sqrt_sd(_mm_setzero_pd(), _mm_set_sd(x)));
@@ -325,7 +325,7 @@ static inline double ebpo_windows_sqrt(double x)
 #define getenv ebpo_windows_getenv
 char *ebpo_windows_getenv(const char *name);
 
-/* There is one locale, that of the C language, as the library never changes it. */
+/* The only locale is "C", because the library never uses another one. */
 typedef struct ebpo_windows_locale *locale_t;
 #define LC_ALL_MASK 0
 locale_t newlocale(int mask, const char *name, locale_t base);

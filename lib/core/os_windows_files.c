@@ -1,18 +1,22 @@
-/* Implements the functions of POSIX for files and folders (os_windows.h) with those of Windows.
+/* Implements the functions of POSIX for files and folders (os_windows.h) with functions of Windows.
  *
- * Every file is opened so that others may read, write, rename and remove it meanwhile, as on POSIX.
- * A removed file loses its name at once where the file system can do that (NTFS), elsewhere when it
- * is closed. A path gets the prefix "\\?\", which permits names of 32,767 characters. A descriptor
- * of a folder stands for the folder's present path. */
+ * Every file is opened so that other programs may read, write, rename and remove it meanwhile, as
+ * on POSIX. A removed file loses its name at once if the file system supports this (NTFS),
+ * otherwise when it is closed. A path gets the prefix "\\?\", which permits paths of 32,767
+ * characters. A descriptor of a folder stands for the folder's current path. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
 #include "core/os.h"
 #include "core/os_windows_parts.h"
 
-enum { WIDE_MAX = 32768, TRIES = 20, TRY_MS = 10 };
+enum {
+    WIDE_MAX = 32768, /* longest path in UTF-16, with its zero */
+    TRIES = 20,       /* attempts to rename a file, or to find a new name */
+    TRY_MS = 10       /* milliseconds between attempts */
+};
 
-/* Values and structures that mingw-w64 declares only for some versions of Windows. */
+/* Values and a struct that mingw-w64 declares only for some versions of Windows. */
 enum { FILE_DISPOSITION_EX = 21, FILE_RENAME_EX = 22 };
 enum { DISPOSE = 1, DISPOSE_AT_ONCE = 2, DISPOSE_READ_ONLY = 16 };
 enum { RENAME_REPLACE = 1, RENAME_AT_ONCE = 2 };
@@ -25,6 +29,7 @@ typedef struct rename_info {
 
 /* --- errors --- */
 
+/* Errors of Windows, and the values of errno for them. */
 static const struct {
     DWORD fault;
     int number;
@@ -79,7 +84,7 @@ static int fail_with(int number)
 
 /* --- paths --- */
 
-/* Converts text to UTF-16; NULL with errno. The caller frees it. */
+/* Converts text to UTF-16. Returns NULL on failure, with errno. The caller frees the result. */
 static WCHAR *widen_text(const char *text)
 {
     int size = MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, text, -1, NULL, 0);
@@ -100,7 +105,8 @@ char *ebpo_windows_narrow(const wchar_t *wide)
     return text;
 }
 
-/* Makes a path absolute with the prefix for long names; NULL with errno. The caller frees it. */
+/* Returns the absolute path, with the prefix for long paths. Returns NULL on failure, with errno.
+ * The caller frees the result. */
 static WCHAR *absolute_path(const WCHAR *path)
 {
     static const WCHAR plain[] = L"\\\\?\\", network[] = L"\\\\?\\UNC";
@@ -126,7 +132,8 @@ static WCHAR *absolute_path(const WCHAR *path)
     return out;
 }
 
-/* Converts a path for the functions of Windows; NULL with errno. The caller frees it. */
+/* Converts a path for the functions of Windows. Returns NULL on failure, with errno. The caller
+ * frees the result. */
 static WCHAR *wide_path(const char *path)
 {
     if (!*path) {
@@ -139,9 +146,8 @@ static WCHAR *wide_path(const char *path)
     return out;
 }
 
-/* Converts a path with the prefix to one without it and with '/'; NULL: no memory. The caller frees
- * it.
- */
+/* Converts a path with the prefix to a path without the prefix and with '/'. Returns NULL when out
+ * of memory. The caller frees the result. Changes `wide`. */
 static char *plain_path(WCHAR *wide)
 {
     bool is_network = wcsncmp(wide, L"\\\\?\\UNC\\", 8) == 0;
@@ -154,7 +160,8 @@ static char *plain_path(WCHAR *wide)
     return path;
 }
 
-/* Returns the path of an open file without links; NULL with errno. The caller frees it. */
+/* Returns the path of an open file, with all links resolved. Returns NULL on failure, with errno.
+ * The caller frees the result. */
 static char *path_of(HANDLE file)
 {
     WCHAR *wide = malloc(WIDE_MAX * sizeof *wide);
@@ -170,8 +177,9 @@ static char *path_of(HANDLE file)
 
 static HANDLE handle_of(int fd) { return (HANDLE)_get_osfhandle(fd); }
 
-/* Returns the path of a name below a folder; NULL with errno. The name has no '\' and no ':', so
- * that it does not leave the folder. The caller frees the path. */
+/* Returns the path of a name below a folder. Returns NULL on failure, with errno; EXDEV: the name
+ * might lead out of the folder, because it contains '\' or ':' or begins with '/'. The caller frees
+ * the path. */
 static char *path_below(int folder, const char *name)
 {
     char *out = NULL, *path;
@@ -215,6 +223,8 @@ static bool names_link(const WCHAR *path)
     return yes;
 }
 
+/* Returns the value of CreateFile for the flags of open: whether the file is created or truncated.
+ */
 static DWORD way_of(int flags)
 {
     if (flags & O_CREAT)
@@ -245,7 +255,7 @@ static int open_wide(const WCHAR *path, int flags, DWORD more)
     return fd;
 }
 
-/* Opens a new file in the folder, which is removed when it is closed. */
+/* Opens a new file in the folder. The file is removed when it is closed. */
 static int open_temporary(const char *folder)
 {
     static atomic_uint number;
@@ -289,7 +299,7 @@ int openat(int folder, const char *name, int flags, ...)
     return fd;
 }
 
-/* Converts a mode of fopen: sets the flags of open, and writes the mode of fdopen. */
+/* Converts a mode of fopen. Returns the flags of open, and writes the mode of fdopen to `out`. */
 static int flags_of_mode(const char *mode, char out[4])
 {
     bool both = strchr(mode, '+') != NULL;
@@ -321,6 +331,7 @@ FILE *fopen(const char *path, const char *mode)
 
 /* --- facts --- */
 
+/* Converts a time of Windows, in units of 100 ns since 1601. */
 static struct timespec time_of(int64_t ticks)
 {
     const int64_t a_second = 10000000, to_1970 = INT64_C(11644473600);
@@ -399,7 +410,7 @@ int access(const char *path, int mode)
     return facts == INVALID_FILE_ATTRIBUTES ? -1 : 0;
 }
 
-/* Windows has no permission bits: a mode can always be set. */
+/* Does nothing but check that the file exists, because Windows has no permission bits. */
 int chmod(const char *path, mode_t mode)
 {
     (void)mode;
@@ -444,7 +455,7 @@ char *realpath(const char *path, char *out)
         return NULL;
     }
     char *found = path_of(file);
-    if (!found && wcslen(wide) > MAX_PATH) /* wine 8 knows the paths of short names only */
+    if (!found && wcslen(wide) > MAX_PATH) /* wine 8 does not support long paths here */
         found = plain_path(wide);
     CloseHandle(file);
     free(wide);
@@ -463,8 +474,8 @@ char *realpath(const char *path, char *out)
 
 /* --- renaming and removing --- */
 
-/* Removes the name of an open file or folder at once; false where the file system cannot do that.
- */
+/* Removes the name of an open file or folder at once. Returns false if the file system does not
+ * support this. */
 static bool dispose_at_once(HANDLE file)
 {
     DWORD flags = DISPOSE | DISPOSE_AT_ONCE | DISPOSE_READ_ONLY;
@@ -512,7 +523,8 @@ int unlinkat(int folder, const char *name, int flags)
     return result;
 }
 
-/* Renames also where another program has the target open: it keeps the former file. */
+/* Renames a file even if another program has the target open; that program keeps the former file.
+ */
 static bool rename_at_once(const WCHAR *from, const WCHAR *to)
 {
     size_t bytes = wcslen(to) * sizeof *to;
@@ -591,7 +603,7 @@ int mkdirat(int folder, const char *name, mode_t mode)
     return result;
 }
 
-/* Replaces the six X at the end of a pattern by letters that are not in use, as far as is known. */
+/* Replaces the six X at the end of a pattern by letters that are probably not in use. */
 static void choose_letters(char *pattern)
 {
     static atomic_uint number;
@@ -633,22 +645,23 @@ int mkostemp(char *pattern, int flags)
 ssize_t pread(int fd, void *data, size_t bytes, off_t at)
 {
     OVERLAPPED where = { .Offset = (DWORD)at, .OffsetHigh = (DWORD)((uint64_t)at >> 32) };
-    DWORD got = 0;
-    if (ReadFile(handle_of(fd), data, bytes < INT_MAX ? (DWORD)bytes : INT_MAX, &got, &where))
-        return (ssize_t)got;
+    DWORD received = 0;
+    if (ReadFile(handle_of(fd), data, bytes < INT_MAX ? (DWORD)bytes : INT_MAX, &received, &where))
+        return (ssize_t)received;
     return GetLastError() == ERROR_HANDLE_EOF ? 0 : ebpo_windows_fail();
 }
 
 ssize_t pwrite(int fd, const void *data, size_t bytes, off_t at)
 {
     OVERLAPPED where = { .Offset = (DWORD)at, .OffsetHigh = (DWORD)((uint64_t)at >> 32) };
-    DWORD put = 0;
-    if (WriteFile(handle_of(fd), data, bytes < INT_MAX ? (DWORD)bytes : INT_MAX, &put, &where))
-        return (ssize_t)put;
+    DWORD written = 0;
+    if (WriteFile(handle_of(fd), data, bytes < INT_MAX ? (DWORD)bytes : INT_MAX, &written, &where))
+        return (ssize_t)written;
     return ebpo_windows_fail();
 }
 
-/* Locks a byte far behind the content: locks of Windows would keep others from reading. */
+/* Locks a byte far behind the content, because a lock of Windows keeps other processes from reading
+ * the locked bytes. */
 int flock(int fd, int how)
 {
     OVERLAPPED where = { .OffsetHigh = 0x40000000 };
@@ -661,8 +674,8 @@ int flock(int fd, int how)
     return GetLastError() == ERROR_IO_PENDING ? fail_with(EWOULDBLOCK) : ebpo_windows_fail();
 }
 
-/* Flushes a file, also one that was opened for reading. Folders are not flushed, as NTFS writes
- * names to its journal. */
+/* Flushes a file, even if it was opened only for reading. Does not flush folders, because NTFS
+ * writes names to its journal. */
 int fsync(int fd)
 {
     struct stat facts;
@@ -684,7 +697,7 @@ int fsync(int fd)
 
 int fcntl(int fd, int what, ...)
 {
-    if (what == F_DUPFD_CLOEXEC) { /* descriptors 0 to 2 are in use */
+    if (what == F_DUPFD_CLOEXEC) { /* the least descriptor is ignored: 0 to 2 are in use */
         int copy = _dup(fd);
         return copy;
     }

@@ -1,5 +1,5 @@
-/* Starts a program on Windows: passes its arguments to `main` as UTF-8, and sets standard input,
- * output and error to bytes without conversion. */
+/* Starts a program on Windows: passes its arguments to `main` as UTF-8, and switches off the
+ * conversion of line ends in standard input, output and error. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
@@ -9,7 +9,7 @@
 int main(int argc, char **argv);
 int wmain(int argc, wchar_t **argv);
 
-/* Writes '/' for '\' in a path: an argument whose folder, or which itself, exists. */
+/* Replaces '\' by '/' in an argument if it is a path: if the folder before its last '\' exists. */
 static void use_slashes(const wchar_t *wide, char *text)
 {
     wchar_t folder[PATH_MAX];

@@ -1,5 +1,5 @@
-/* Implements the functions of POSIX for memory (os_windows.h) with those of Windows: pages, files
- * as memory, aligned blocks, and what the machine has. */
+/* Implements the functions of POSIX for memory (os_windows.h) with functions of Windows: pages,
+ * mapped files, aligned blocks, and the machine's memory and cores. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
@@ -8,13 +8,12 @@
 #include "core/os.h"
 #include "core/os_windows_parts.h"
 
-#undef free /* this file frees no blocks of aligned_alloc except by ebpo_windows_free */
+#undef free /* here, `free` is that of the C library */
 
 /* --- pages --- */
 
-/* A file that is mapped. Its handle stays open, as a temporary file is removed with its last
- * handle.
- */
+/* A mapped file. Its handle stays open, because a temporary file is removed when its last handle is
+ * closed. */
 typedef struct mapped_file {
     void *at;
     HANDLE file;
@@ -80,8 +79,8 @@ int munmap(void *at, size_t bytes)
     return 0;
 }
 
-/* Gives the pages of a mapped file back: unlocking pages that are not locked removes them from the
- * working set, and Windows writes them when memory is short. */
+/* Returns the pages of a mapped file to the system: VirtualUnlock removes pages that are not locked
+ * from the working set, and Windows writes them to the file when memory is short. */
 int msync(void *at, size_t bytes, int flags)
 {
     (void)flags;
@@ -111,8 +110,10 @@ int munlockall(void) { return not_provided(); }
 
 /* --- aligned blocks --- */
 
-/* A table of the blocks of aligned_alloc by their addresses: open addressing with linear probing.
- * Each entry has the address to use and the address to free. There are some thousands at most. */
+/* A block of aligned_alloc: `at` is the address that the caller uses, and `from` is the address to
+ * free. All blocks are in a hash table by `at`, with linear probing; there are some thousands at
+ * most.
+ */
 typedef struct aligned_block {
     void *at, *from;
 } aligned_block;
@@ -121,6 +122,7 @@ static pthread_mutex_t aligned_lock = PTHREAD_MUTEX_INITIALIZER;
 static aligned_block *aligned;
 static size_t aligned_count, aligned_capacity; /* capacity: a power of two */
 
+/* Returns the entry at which the search for a block begins. */
 static size_t home_of(const void *at)
 {
     return (size_t)((uint64_t)(uintptr_t)at * UINT64_C(0x9e3779b97f4a7c15) >> 20) &
@@ -152,7 +154,8 @@ static bool reserve_entry(void)
     return true;
 }
 
-/* Removes a block from the table; returns the address to free, NULL if there is none. */
+/* Removes a block from the table. Returns the address to free, or NULL if `at` is no block of
+ * aligned_alloc. */
 static void *take_block(const void *at)
 {
     size_t i = aligned_capacity ? home_of(at) : 0, mask = aligned_capacity - 1;
@@ -163,7 +166,7 @@ static void *take_block(const void *at)
     void *from = aligned[i].from;
     aligned[i].at = NULL;
     aligned_count--;
-    /* entries behind the gap move to where a search finds them */
+    /* entries after the gap are put again, so that a search still finds them */
     for (size_t j = (i + 1) & mask; aligned[j].at; j = (j + 1) & mask) {
         aligned_block moved = aligned[j];
         aligned[j].at = NULL;
@@ -179,17 +182,18 @@ void *aligned_alloc(size_t alignment, size_t bytes)
         return NULL;
     void *at = (void *)(((uintptr_t)from + alignment - 1) & ~(uintptr_t)(alignment - 1));
     pthread_mutex_lock(&aligned_lock);
-    bool noted = reserve_entry();
-    if (noted)
+    bool recorded = reserve_entry();
+    if (recorded)
         put_block((aligned_block){ at, from });
-    aligned_count += noted;
+    aligned_count += recorded;
     pthread_mutex_unlock(&aligned_lock);
-    if (!noted)
+    if (!recorded)
         free(from);
-    return noted ? at : NULL;
+    return recorded ? at : NULL;
 }
 
-/* Blocks of aligned_alloc have addresses that are multiples of 64: others are not looked up. */
+/* Only addresses that are multiples of 64 are looked up, because all blocks of aligned_alloc have
+ * such addresses. */
 void ebpo_windows_free(void *block)
 {
     void *from = NULL;

@@ -1,11 +1,12 @@
-/* Implements the other functions of POSIX (os_windows.h) with those of Windows: processes, signals,
- * limits, waiting for input, the environment and texts. */
+/* Implements functions of POSIX (os_windows.h) with functions of Windows: processes, signals,
+ * limits, waiting for input, libraries, the environment and texts. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
 #include "core/os.h"
 #include "core/os_windows_parts.h"
 
+/* Fails with ENOSYS. */
 static int not_provided(void)
 {
     errno = ENOSYS;
@@ -25,7 +26,7 @@ pid_t waitpid(pid_t process, int *state, int flags)
     return not_provided();
 }
 
-/* Finds out whether a process exists: the only use of signal 0. */
+/* Returns 0 if a process exists. Sends no signal: callers only use signal 0. */
 int kill(pid_t process, int number)
 {
     DWORD code = STILL_ACTIVE;
@@ -58,7 +59,7 @@ void (*ebpo_windows_signal(int number, void (*handler)(int)))(int)
     return is_known(number) ? signal(number, handler) : SIG_DFL;
 }
 
-/* The C library restores the default action when a signal arrives, as SA_RESETHAND asks. */
+/* Supports only SA_RESETHAND: the C library restores the default action when a signal arrives. */
 int sigaction(int number, const struct sigaction *action, struct sigaction *before)
 {
     if (!is_known(number)) {
@@ -78,9 +79,9 @@ int sigaction(int number, const struct sigaction *action, struct sigaction *befo
 int getrlimit(int what, struct rlimit *out)
 {
     enum {
-        DESCRIPTORS = 2048,
-        MAIN_STACK = 2 << 20
-    }; /* of the C library; of a program's main thread */
+        DESCRIPTORS = 2048,  /* of the C library */
+        MAIN_STACK = 2 << 20 /* of a program's main thread */
+    };
     rlim_t most = what == RLIMIT_NOFILE  ? DESCRIPTORS
                   : what == RLIMIT_STACK ? MAIN_STACK
                                          : RLIM_INFINITY;
@@ -96,6 +97,7 @@ int setrlimit(int what, const struct rlimit *limit)
 
 /* --- waiting for input --- */
 
+/* Returns true if a read from the descriptor would not wait. */
 static bool is_ready(int fd)
 {
     DWORD bytes = 0;
@@ -226,7 +228,7 @@ int dladdr(const void *address, Dl_info *out)
 
 static char temporary_folder[PATH_MAX];
 
-/* Notes TMPDIR, or the folder that Windows names; "" if it is not known. */
+/* Sets temporary_folder to TMPDIR, or to the folder that Windows names; "" if it is not known. */
 static void find_temporary_folder(void)
 {
     WCHAR wide[PATH_MAX];
@@ -301,8 +303,8 @@ ssize_t getline(char **line, size_t *space, FILE *in)
     return (ssize_t)size;
 }
 
-/* A stream of open_memstream: a temporary file, whose content becomes the text when the stream is
- * flushed or closed. */
+/* A stream of open_memstream: a temporary file, whose content is copied to the text when the stream
+ * is flushed or closed. */
 typedef struct memory_stream {
     FILE *file;
     char **text;
@@ -335,7 +337,8 @@ FILE *open_memstream(char **text, size_t *size)
     return file;
 }
 
-/* Returns the stream in memory of a file, NULL if it is another one; `closes`: removes it. */
+/* Returns the stream of open_memstream that has this file, or NULL. `closes`: removes the stream
+ * from the list. */
 static memory_stream *find_stream(const FILE *file, bool closes)
 {
     pthread_mutex_lock(&streams_lock);
@@ -360,8 +363,9 @@ static bool take_text(const memory_stream *s)
     if (!text)
         return false;
     *s->text = text;
-    for (ssize_t got = 1; done < size && got > 0; done += got > 0 ? (size_t)got : 0)
-        got = pread(fd, text + done, size - done, (off_t)done);
+    for (ssize_t received = 1; done < size && received > 0;
+         done += received > 0 ? (size_t)received : 0)
+        received = pread(fd, text + done, size - done, (off_t)done);
     text[done] = 0;
     *s->size = done;
     off_t end = (off_t)size;

@@ -1,8 +1,9 @@
 /* Runs independent pieces of work on several threads, which take the pieces in ascending order. The
- * calling thread is one of these threads, and only it reports progress. Which thread runs a piece
- * is not determined, so results must not depend on the thread. Of several failures, the failure of
- * the lowest piece is returned. All threads of the library are started here, with a fixed stack
- * size and the floating-point environment of the call. */
+ * calling thread is one of these threads, and only the calling thread reports progress. Which
+ * thread runs a piece is not determined, so results must not depend on the thread. If several
+ * pieces fail, the failure of the lowest piece is returned. All threads of the library are started
+ * here, with a fixed stack size. They compute with the default floating-point environment
+ * (fp_env.h). */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
@@ -15,6 +16,7 @@
 /* The library uses less than a quarter of this stack; sanitizers use several times as much. */
 enum { MAX_THREADS = 256, STACK_BYTES = 4 << 20 };
 
+/* State of ebpo_parallel_for. */
 typedef struct run {
     ebpo_workspace *workspace;
     uint64_t count, grain;
@@ -23,10 +25,10 @@ typedef struct run {
     const ebpo_progress *progress;
     const char *stage;
     _Atomic uint64_t next; /* first item of the next piece */
-    _Atomic uint64_t done; /* number of items done */
-    atomic_bool stop;
-    pthread_mutex_t lock; /* guards the three fields below */
-    uint64_t failed_at;   /* first item of the lowest piece that failed */
+    _Atomic uint64_t done; /* number of finished items */
+    atomic_bool stop;      /* true: begin no further pieces */
+    pthread_mutex_t lock;  /* protects the three members below */
+    uint64_t failed_at;    /* first item of the lowest piece that failed */
     ebpo_status status;
     ebpo_error error;
 } run;
@@ -58,6 +60,8 @@ unsigned ebpo_thread_count(unsigned requested)
     return cores < 1 ? 1 : cores > MAX_THREADS ? MAX_THREADS : (unsigned)cores;
 }
 
+/* Records the failure of the piece that begins at item `at`, unless a lower piece has failed, and
+ * stops the run. */
 static void record_failure(run *r, uint64_t at, ebpo_status status, const ebpo_error *error)
 {
     pthread_mutex_lock(&r->lock);
@@ -144,7 +148,7 @@ ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint6
               .stage = stage,
               .lock = PTHREAD_MUTEX_INITIALIZER,
               .status = EBPO_OK };
-    /* Every stage reports its beginning, however short it is: callers sum times by stage. */
+    /* even a short stage reports its beginning, because callers measure the times of stages */
     if (!ebpo_progress_step(progress, stage, 0, count, error))
         return EBPO_E_CANCELLED;
     threads = ebpo_thread_count(threads);

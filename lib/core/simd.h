@@ -1,7 +1,12 @@
-/* Named vector types for kernels (core/cpu.h): eight floats, four doubles, and three doubles, one
- * for each axis. Eight floats are one register with AVX2, otherwise two of 16 bytes (gcc 12
- * generates poor code for 32-byte vectors without AVX2). Masks are all ones or all zeros in a lane.
- */
+/* Provides vector types for kernels (core/cpu.h): f8 is eight floats, v4d is four doubles, and d3
+ * is three doubles, one for each axis. A lane is one of these numbers. An f8 is one register with
+ * AVX2, otherwise two vectors of 16 bytes (gcc 12 generates poor code for 32-byte vectors without
+ * AVX2). A mask has all bits of a lane set (true) or clear (false).
+ *
+ * f8_all(x): x in all lanes. f8_load_twice(x): x[0] to x[3] in lanes 0 to 3 and 4 to 7; f8_spread0
+ * to f8_spread3 of this vector: one of these four floats in all lanes. f8_pick(mask, yes, no):
+ * `yes` in the lanes where the mask is set, else `no`. f8_bits(mask): bit i is set if lane i of the
+ * mask is set. f8_about_inverse(a): a rough approximation of 1 / a. */
 #ifndef EBPO_CORE_SIMD_H
 #define EBPO_CORE_SIMD_H
 
@@ -58,7 +63,7 @@ EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
 {
     return _mm256_permutevar8x32_ps(_mm256_loadu_ps(x), _mm256_loadu_si256((const __m256i *)from));
 }
-/* Returns all ones in the lanes whose bits are set, zeros in the others. */
+/* Returns a mask with the lanes set whose bits in `lanes` are set. */
 EBPO_EIGHT f8 f8_mask(unsigned lanes)
 {
     __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128),
@@ -69,10 +74,10 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 {
     return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
 }
-/* Eight numbers below 16, which select from 16 floats. */
+/* Eight numbers below 16, which select from the 16 floats of an f8_table (f8_look_up). */
 typedef struct n8 {
-    /* low: the numbers, of which the lower three bits are used; high: all ones for numbers from 8
-     * on */
+    /* low: the numbers, of which the lower three bits are used; high: mask of the numbers from 8 on
+     */
     __m256i low, high;
 } n8;
 typedef struct f8_table {
@@ -157,9 +162,9 @@ EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
     EBPO_BOTH(((i4)yes.half[h] & (i4)mask.half[h]) | ((i4)no.half[h] & ~(i4)mask.half[h]));
 }
 
-/* Eight numbers below 16, which select from 16 floats. */
+/* Eight numbers below 16, which select from the 16 floats of an f8_table (f8_look_up). */
 typedef struct n8 {
-    uint32_t bits;
+    uint32_t bits; /* four bits for each number */
 } n8;
 typedef struct f8_table {
     const float *x;
@@ -298,13 +303,11 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 #endif
 #endif
 
-/* f8_load_twice loads four floats into both halves; f8_spread0 to f8_spread3 copy one of these four
- * to all lanes. */
 EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
 EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
 
-/* Returns 1 / a to about 2^-22; results differ between processors, so only for filters. NaN for 0.
- */
+/* Returns 1 / a with a relative error of about 2^-22; NaN if a is 0. Results differ between
+ * processors, so use this function only for filters. */
 EBPO_EIGHT f8 f8_inverse(f8 a)
 {
     f8 x = f8_about_inverse(a);
@@ -344,6 +347,8 @@ typedef double v4d __attribute__((vector_size(32)));
 typedef int64_t v4l __attribute__((vector_size(32)));
 
 static inline v4d v4d_all(double x) { return (v4d){ x, x, x, x }; }
+
+/* v4l_mask returns bit i set if lane i of a mask is set. */
 
 #if defined(EBPO_SIMD_AVX2)
 static inline unsigned v4l_mask(v4l m) { return (unsigned)_mm256_movemask_pd((__m256d)m); }
@@ -395,11 +400,11 @@ static inline unsigned v4l_mask(v4l m)
 
 #if defined(EBPO_SIMD_AVX2)
 
-typedef __m256d d3; /* the fourth is unused */
+typedef __m256d d3; /* the fourth lane is unused */
 
 EBPO_EIGHT d3 d3_all(double x) { return _mm256_set1_pd(x); }
-/* Loads one by one, because values that were just stored one by one cannot be forwarded as a
- * vector. */
+/* Loads the doubles one by one, because the processor cannot forward values that were just stored
+ * one by one as a vector. */
 EBPO_EIGHT d3 d3_load(const double x[3]) { return _mm256_setr_pd(x[0], x[1], x[2], 0); }
 EBPO_EIGHT d3 d3_add(d3 a, d3 b) { return _mm256_add_pd(a, b); }
 EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { return _mm256_sub_pd(a, b); }
@@ -407,7 +412,7 @@ EBPO_EIGHT d3 d3_mul(d3 a, d3 b) { return _mm256_mul_pd(a, b); }
 EBPO_EIGHT d3 d3_div(d3 a, d3 b) { return _mm256_div_pd(a, b); }
 EBPO_EIGHT d3 d3_max(d3 a, d3 b) { return _mm256_max_pd(a, b); }
 EBPO_EIGHT d3 d3_abs(d3 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
-/* Returns a, not negative, with the signs of b. */
+/* Returns a with the signs of b; no component of a may be negative. */
 EBPO_EIGHT d3 d3_signed(d3 a, d3 b)
 {
     return _mm256_or_pd(a, _mm256_and_pd(b, _mm256_set1_pd(-0.0)));
@@ -415,15 +420,15 @@ EBPO_EIGHT d3 d3_signed(d3 a, d3 b)
 /* Returns a bit for each component with its sign bit set. */
 EBPO_EIGHT unsigned d3_signs(d3 a) { return (unsigned)_mm256_movemask_pd(a) & 7; }
 EBPO_EIGHT void d3_store(double x[4], d3 a) { _mm256_storeu_pd(x, a); }
-/* Stores as floats, rounded to nearest; the fourth is unused. */
+/* Stores as floats, rounded to nearest, to x[0] .. x[2]; also overwrites x[3]. */
 EBPO_EIGHT void d3_store_floats(float x[4], d3 a) { _mm_storeu_ps(x, _mm256_cvtpd_ps(a)); }
-/* Stores as d3_store_floats does, to x[1] .. x[3]. */
+/* Stores as d3_store_floats does, but to x[1] .. x[3]; also overwrites x[0]. */
 EBPO_EIGHT void d3_store_floats_after(float x[4], d3 a)
 {
     __m128 y = _mm256_cvtpd_ps(a);
     _mm_storeu_ps(x, _mm_shuffle_ps(y, y, _MM_SHUFFLE(2, 1, 0, 3)));
 }
-/* Returns the error of rounding to floats. */
+/* Returns the rounding error: a minus its value as floats. */
 EBPO_EIGHT d3 d3_beyond_floats(d3 a) { return d3_sub(a, _mm256_cvtps_pd(_mm256_cvtpd_ps(a))); }
 
 #else

@@ -1,8 +1,8 @@
-/* Sorts records that do not fit into memory, in three passes. The first pass makes the records.
+/* Sorts records that may take more than memory, in three passes. The first pass makes the records.
  * The second pass distributes the records to groups by the leading bits of their keys. The third
- * pass sorts each group in memory, by the digits of the keys; the comparison orders records with
- * equal keys. Each pass reads and writes arrays in order, or at one position for each group. A
- * workspace may therefore keep the arrays in files. The result depends neither on the number of
+ * pass sorts each group in memory, by the digits of the keys; the caller's comparison orders
+ * records with equal keys. Each pass reads and writes arrays in order, or at one position for each
+ * group, so a workspace can keep the arrays in files. The result depends neither on the number of
  * threads nor on memory. */
 #include "core/sort.h"
 
@@ -17,12 +17,13 @@ enum {
     GROUP = 1 << 16,         /* least number of records in a group: fits a core's cache */
     LARGE_GROUP = 4 * GROUP, /* a group with more records is sorted in the workspace */
     GROUPS_MAX = 1024,       /* limited, because all groups are written to at the same time */
-    GRAIN = 1 << 14,         /* number of records for each call of a thread's function */
+    GRAIN = 1 << 14,         /* number of records that a thread takes at a time */
     DIGIT = 256,             /* values of a digit of a key */
     ALONE_MAX = 1 << 12,     /* at most this number of records is sorted as one group */
     RELEASE_EVERY = 4        /* pages are released after this number of copies to groups */
 };
 
+/* State of a sort. A bin is a value of the leading bits of a key. */
 typedef struct sorting {
     const ebpo_sort *s;
     uint8_t *made;      /* records in the order in which they were made */
@@ -55,7 +56,7 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
 }
 
 /* Forms groups of neighbouring bins. Each group has at least `enough` records, except the last
- * group. */
+ * group. Returns false when memory is short. */
 static bool form_groups(sorting *t)
 {
     uint64_t enough = t->s->count / GROUPS_MAX > GROUP ? t->s->count / GROUPS_MAX : GROUP,
@@ -88,9 +89,9 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    /* For each group: number of records in this range, then the begin of these records in
-     * `grouped`, and after the copying their end. The number of groups can be slightly above
-     * GROUPS_MAX, because form_groups rounds the size of groups down. */
+    /* For each group: first the number of its records in this range, then the begin of these
+     * records in `grouped`, and after the copying their end. There can be slightly more than
+     * GROUPS_MAX groups, because form_groups rounds the size of groups down. */
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);
@@ -125,13 +126,15 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
 
 /* --- groups --- */
 
+/* The key of a record, and the record's index in its group. */
 typedef struct keyed {
     uint64_t key;
-    uint64_t at; /* index in the group */
+    uint64_t at;
 } keyed;
 
-/* Sorts by the bytes of the keys, from the lowest byte, and keeps the order of equal keys. Skips a
- * byte that is equal in all keys. Returns the sorted array: `from` or `to`. */
+/* Sorts by the bytes of the keys, from the lowest byte to the highest. Keeps the order of equal
+ * keys. Skips a byte position if all keys have the same byte there. `to`: memory for `count` items.
+ * Returns the sorted array: `from` or `to`. */
 static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
 {
     uint64_t all = ~UINT64_C(0), any = 0;
@@ -177,6 +180,7 @@ static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uin
     }
 }
 
+/* Sorts the records of group g, and passes them to the caller. */
 static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
 {
     const ebpo_sort *s = t->s;
@@ -239,8 +243,8 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
     return status;
 }
 
-/* Returns the number of threads that sort groups. Each thread holds one group. All threads
- * together use at most an eighth of the budget, unless one group needs more. */
+/* Returns the number of threads that sort groups. Each thread has one group in memory; all threads
+ * together use at most an eighth of the budget, unless one group takes more. */
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;

@@ -1,7 +1,7 @@
-/* Sorting: more records than memory holds, qsort with a context, and heaps. Records are distributed
- * to groups by the leading bits of their keys; each group is a contiguous part of the result and is
- * sorted separately. Arrays are read and written in order, or at as many positions at once as there
- * are groups. */
+/* Sorts more records than memory holds. Also provides qsort with a context, and heaps. Records are
+ * distributed to groups by the leading bits of their keys; each group is a contiguous part of the
+ * result and is sorted separately. Arrays are read and written in order, or at one position for
+ * each group. */
 #ifndef EBPO_CORE_SORT_H
 #define EBPO_CORE_SORT_H
 
@@ -10,38 +10,43 @@
 
 #include "core/workspace.h"
 
-enum { EBPO_SORT_BINS = 1 << 18, EBPO_SORT_PASSES = 3, EBPO_SORT_RECORD_MAX = 64 };
+enum {
+    EBPO_SORT_BINS = 1 << 18, /* number of values of the leading bits of a key */
+    EBPO_SORT_PASSES = 3,     /* passes of a sort, for the progress */
+    EBPO_SORT_RECORD_MAX = 64 /* greatest size of a record in bytes */
+};
 
+/* A sort of `count` records. The caller makes the records and receives the sorted records through
+ * callbacks. */
 typedef struct ebpo_sort {
-    ebpo_workspace *workspace;
+    ebpo_workspace *workspace; /* for arrays of records; NULL: memory */
     unsigned threads;
-    const ebpo_progress *progress;
-    const char *stage;
-    /* for the progress: passes of this stage before the sort, which has EBPO_SORT_PASSES passes */
-    uint64_t passes_before;
+    const ebpo_progress *progress; /* may be NULL */
+    const char *stage;             /* name of the stage, for the progress */
+    uint64_t passes_before;        /* passes of this stage before the sort, for the progress */
     uint64_t count;
-    size_t record;  /* bytes of a record, at most EBPO_SORT_RECORD_MAX; each begins with its key, 8
-                     * bytes */
+    size_t record;  /* bytes of a record; its first 8 bytes are its key, a uint64_t */
     unsigned shift; /* key >> shift is below EBPO_SORT_BINS for all keys */
     void *context;
-    /* Writes the records of the items [begin, end). Called from any thread. */
+    /* Writes the records [begin, end), before sorting. Called from any thread. */
     ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
                         ebpo_error *error);
-    /* Orders two different records with equal keys: less than 0 when `a` comes first. */
+    /* Compares two different records with equal keys. Returns a number below 0 if `a` comes first,
+     * above 0 if `b` comes first. */
     int (*compare)(const void *a, const void *b);
-    /* Receives the sorted records of a group. Called from any thread. The first record is number
-     * `place` of the whole result. */
+    /* Receives the sorted records of a group. Called from any thread. `place`: index of the first
+     * of these records among all sorted records. */
     void (*take)(void *context, uint64_t place, const void *records, uint64_t count);
 } ebpo_sort;
 
-/* Sorts; the result does not depend on threads or memory. */
+/* Runs the sort. The result does not depend on the number of threads or on memory. */
 EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error);
 
 /* Sorts an array of numbers in ascending order; fast for short arrays. */
 void ebpo_sort_numbers(uint64_t *numbers, uint64_t count);
 
-/* qsort with a context for the comparison; systems declare such a qsort differently or have none.
- */
+/* A qsort with a context for the comparison, because systems declare such a function differently or
+ * do not have it. */
 
 typedef int (*ebpo_compare_with)(const void *a, const void *b, void *context);
 
@@ -52,7 +57,7 @@ static inline void ebpo_sort_with(void *items, size_t count, size_t size, ebpo_c
     qsort_r(items, count, size, compare, context);
 }
 #else
-/* qsort calls the comparison on the thread that called qsort. */
+/* The sort that this thread runs. qsort calls the comparison on the thread that called qsort. */
 static _Thread_local struct {
     ebpo_compare_with compare;
     void *context;
@@ -74,12 +79,12 @@ static inline void ebpo_sort_with(void *items, size_t count, size_t size, ebpo_c
 }
 #endif
 
-/* Binary heaps in arrays that the caller enlarges; the first item is the one that comes before all
- * others. For one thread. */
+/* Binary heaps in arrays, for one thread. The first item of a heap comes before all other items. */
 
-/* Defines two functions for items of a type; `before(a, b)` takes const pointers. NAME_add adds an
- * item to a heap of `count` others, which has capacity for it. NAME_take removes the first of
- * `count` items, 1 or more. The order of equal items depends only on the order of calls. */
+/* Defines two functions for a heap of items of type `type`. `before(a, b)` takes const pointers and
+ * returns true if *a comes before *b. NAME_add adds an item to a heap of `count` items; the array
+ * must have capacity for this item. NAME_take removes and returns the first item of a heap of
+ * `count` items (at least 1). The order of equal items depends only on the order of calls. */
 #define EBPO_HEAP(name, type, before)                                                 \
     static void name##_add(type *heap, uint64_t count, const type *added)             \
     {                                                                                 \

@@ -1,8 +1,9 @@
-/* Included first by files whose results depend on IEEE double arithmetic with one rounding to
- * nearest for each operation. Rejects compilers and flags that do not guarantee this. Disables
- * contraction into FMA even if the flags request it. With gcc, disables the SLP vectoriser, which
- * drops the rounding of neighbouring (double)(float) casts (gcc 12).
- * tests/lint/flags/test_strict_fp.py checks the sources and this file. */
+/* Guarantees IEEE double arithmetic with one rounding to nearest for each operation. Files whose
+ * results depend on this include this header first. Rejects compilers and flags that do not
+ * guarantee this arithmetic. Disables contraction into FMA (fused multiply-add) even if the flags
+ * request it. With gcc, disables the SLP vectoriser, which drops the rounding of neighbouring
+ * (double)(float) casts (gcc 12). tests/lint/flags/test_strict_fp.py checks the sources and this
+ * file. */
 #ifndef EBPO_CORE_STRICT_FP_H
 #define EBPO_CORE_STRICT_FP_H
 
@@ -16,7 +17,7 @@
 #error \
     "exact predicates need strict floating point: build without -funsafe-math-optimizations and its parts (-fassociative-math, -freciprocal-math, -fno-signed-zeros)"
 #endif
-/* For double, the values 16 and 0 mean the same; 16 only changes how compilers treat _Float16. */
+/* 16 is as good as 0: it only changes how compilers treat _Float16, not double. */
 #if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
 #error \
     "exact predicates need FLT_EVAL_METHOD 0, without excess precision: on x86 build with -msse2 -mfpmath=sse"

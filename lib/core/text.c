@@ -1,7 +1,7 @@
 /* Checks that text is valid UTF-8 (RFC 3629) without control characters. Checks dates and times of
- * ISO 8601. Provides streams into memory, by fopencookie, which reports every lack of memory. Where
- * the C library has no fopencookie, open_memstream is used, which does not always report a lack of
- * memory. */
+ * ISO 8601. Provides streams into memory by fopencookie, so that every lack of memory is reported.
+ * If the C library has no fopencookie, open_memstream is used, which does not always report a lack
+ * of memory. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,7 +25,7 @@ bool ebpo_text_is_utf8(const char *text)
             return false;
         if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
             (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90))
-            return false; /* overlong, surrogate, beyond Unicode */
+            return false; /* not the shortest encoding, a surrogate, or beyond Unicode */
         for (p++; more; more--, p++)
             if (*p < 0x80 || *p > 0xbf)
                 return false;
@@ -149,15 +149,15 @@ bool ebpo_text_stream_begin(ebpo_text_stream *s)
 bool ebpo_text_stream_end(ebpo_text_stream *s)
 {
     s->failed = s->failed || ferror(s->file);
-    bool whole = fclose(s->file) == 0 && !s->failed;
+    bool complete = fclose(s->file) == 0 && !s->failed;
     s->file = NULL;
 #ifdef EBPO_HAVE_FOPENCOOKIE
-    whole = whole && ebpo_grow(&s->text, &s->capacity, 1, 1);
+    complete = complete && ebpo_grow(&s->text, &s->capacity, 1, 1);
 #else
-    whole = whole && s->text;
+    complete = complete && s->text;
     s->bytes = s->size;
 #endif
-    if (whole) {
+    if (complete) {
         s->text[s->bytes] = 0;
         return true;
     }

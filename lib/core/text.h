@@ -1,4 +1,4 @@
-/* Text in files: checks of UTF-8 and dates, streams into memory, and named runs of faces. */
+/* Checks texts (UTF-8), provides streams into memory, and declares named runs of triangles. */
 #ifndef EBPO_CORE_TEXT_H
 #define EBPO_CORE_TEXT_H
 
@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+/* Returns true for valid UTF-8. */
 bool ebpo_text_is_utf8(const char *text);
 /* Returns true for UTF-8 without control characters. */
 bool ebpo_text_ok(const char *text);
@@ -15,12 +16,11 @@ bool ebpo_text_ok(const char *text);
 uint64_t ebpo_text_bom_length(const void *text, uint64_t size);
 
 /* A stream into memory that reports a lack of memory. open_memstream of the C library may lose data
- * silently, so it is used only where the C library has no fopencookie. */
-
+ * silently, so open_memstream is used only if the C library has no fopencookie. */
 typedef struct ebpo_text_stream {
-    char *text; /* NUL-terminated after the end; the caller frees it */
-    uint64_t bytes, capacity;
-    FILE *file; /* stream to print to */
+    char *text; /* the written text, with a final zero byte after the end; the caller frees it */
+    uint64_t bytes, capacity; /* length of the text, and allocated bytes */
+    FILE *file;               /* stream to print to */
     bool failed;
     size_t size;       /* for open_memstream */
     char buffer[1024]; /* buffer of the stream, so that it allocates none */
@@ -32,8 +32,7 @@ bool ebpo_text_stream_begin(ebpo_text_stream *s);
 /* Ends a stream. Returns false if data is missing; then there is no text. */
 bool ebpo_text_stream_end(ebpo_text_stream *s);
 
-/* A named run of triangles in a mesh file, from the line that names it to the next name. */
-
+/* A named run of triangles in a mesh file: the triangles between two lines that set a name. */
 typedef struct ebpo_named_run {
     const char *name; /* points into the file's bytes, without surrounding spaces */
     size_t size;

@@ -1,12 +1,12 @@
-/* Integers of 128 bits, modulo 2^128, also for compilers without such a type (on 32-bit machines).
- */
+/* Computes with integers of 128 bits, modulo 2^128, also where the compiler has no such type (on
+ * 32-bit machines). */
 #ifndef EBPO_CORE_WIDE_H
 #define EBPO_CORE_WIDE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Signed values are in two's complement. */
+/* The number 2^64 high + low. Signed numbers are in two's complement. */
 typedef struct ebpo_wide {
     uint64_t high, low;
 } ebpo_wide;
@@ -46,6 +46,7 @@ static inline ebpo_wide ebpo_wide_signed_product(int64_t a, int64_t b)
     return p;
 }
 
+/* Returns a * b modulo 2^128. */
 static inline ebpo_wide ebpo_wide_times(ebpo_wide a, uint64_t b)
 {
     ebpo_wide p = ebpo_wide_product(a.low, b);
@@ -83,7 +84,7 @@ static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
                            (ebpo_wide){ a.high ^ sign, a.low });
 }
 
-/* Returns the remainder of a / m, both unsigned; m in 1 .. 2^63. */
+/* Returns the remainder of the unsigned a divided by m, which is 1 to 2^63. */
 static inline uint64_t ebpo_wide_modulo(ebpo_wide a, uint64_t m)
 {
     uint64_t remainder = a.high % m;

@@ -1,10 +1,11 @@
-/* Manages workspaces, the owners of large arrays. An array is an extent of whole pages, in memory
- * up to half of the budget and then in an unnamed temporary file. Arrays below LEAST_EXTENT are
- * parts of a pool, and those below a page come from malloc. Each extent is a holder of its
- * workspace, so the workspace and the extent may be freed in any order. Pages of a file count
- * towards the budget only while resident: loops release them between pieces of work
- * (ebpo_release_pages), and written data stays in the file. Any thread may allocate and free.
- * docs/develop/building.md describes how a build keeps to a budget. */
+/* Manages workspaces, the owners of large arrays. An array is an extent (a range of whole pages):
+ * in memory until the extents take half of the budget, and then in an unnamed temporary file.
+ * Arrays below LEAST_EXTENT are parts of an extent that they share (a pool), and arrays below a
+ * page come from malloc. Each extent counts as a holder of its workspace, so the workspace and its
+ * extents may be freed in any order. Pages of a file count towards the budget only while they are
+ * in memory (resident): loops release them between pieces of work (ebpo_release_pages), and data
+ * that were written stay in the file. Any thread may allocate and free. docs/develop/building.md
+ * describes how a build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -21,41 +22,45 @@
 #include "core/os.h"
 #include "core/workspace.h"
 
-/* Arrays smaller than a page come from malloc. Arrays smaller than LEAST_EXTENT are parts of a
- * pool, which is one extent, because a build has thousands of such arrays. */
-enum { PAGE_BYTES = 4096, LEAST_EXTENT = 1 << 16, POOL_BYTES = 1 << 20, BUCKET_BITS = 10 };
+enum {
+    PAGE_BYTES = 4096,      /* smaller arrays come from malloc */
+    LEAST_EXTENT = 1 << 16, /* smaller arrays are parts of a pool, because a build has thousands */
+    POOL_BYTES = 1 << 20,   /* size of a pool */
+    BUCKET_BITS = 10        /* the table of extents has 2^BUCKET_BITS buckets */
+};
 
 /* OWN: one array. POOL: several arrays. PART: one array in a pool. */
 typedef enum extent_kind { EXTENT_OWN, EXTENT_POOL, EXTENT_PART } extent_kind;
 
+/* A range of pages, or a part of a pool. */
 typedef struct extent {
-    void *at;
+    void *at; /* address */
     size_t bytes;
     extent_kind kind;
-    bool filed;          /* true if in a file */
+    bool filed;          /* true: in a file; false: in memory */
     struct extent *pool; /* of a part: its pool */
-    size_t used;         /* of a pool: bytes given out */
+    size_t used;         /* of a pool: bytes of all parts, including freed parts */
     uint64_t parts;      /* of a pool: number of parts that are not freed */
     struct extent *next; /* next in the bucket of the table */
 } extent;
 
 struct ebpo_workspace {
-    pthread_mutex_t lock; /* guards the statistics */
-    pthread_mutex_t pool_lock;
+    pthread_mutex_t lock;      /* protects `usage` and `holders` */
+    pthread_mutex_t pool_lock; /* protects `pool` */
     ebpo_workspace_stats usage;
-    uint64_t holders;   /* number of holders, including the owner */
+    uint64_t holders;   /* number of holders: the owner and the extents */
     extent *pool;       /* pool for the next part; NULL: none */
-    _Atomic int failed; /* errno of the last failed allocation in a file, 0: memory */
-    int statm;          /* /proc/self/statm */
-    /* bytes of files, including libraries, that stayed resident when pages were released */
+    _Atomic int failed; /* reason of the last failure: errno for a file; 0: memory was short */
+    int statm;          /* descriptor of /proc/self/statm; -1: the system does not have this file */
+    /* bytes of files, including libraries, that stay resident after pages are released */
     uint64_t floor;
-    size_t page;
-    char folder[EBPO_FOLDER_BYTES];
-    /* extents by address; there are thousands at most */
-    pthread_mutex_t table_lock;
-    extent *table[1 << BUCKET_BITS];
+    size_t page;                     /* size of the system's pages */
+    char folder[EBPO_FOLDER_BYTES];  /* folder of the temporary files */
+    pthread_mutex_t table_lock;      /* protects `table`, `floor` */
+    extent *table[1 << BUCKET_BITS]; /* extents by address; there are thousands at most */
 };
 
+/* Returns the bucket of the table for an address. */
 static inline extent **extent_bucket(ebpo_workspace *w, const void *at)
 {
     uint64_t page = (uint64_t)((uintptr_t)at / PAGE_BYTES);
@@ -93,7 +98,7 @@ ebpo_status ebpo_workspace_new(const ebpo_workspace_options *options, ebpo_works
     uint64_t memory = wanted.memory ? wanted.memory : ebpo_machine_memory() / 2;
     if (memory < EBPO_WORKSPACE_MIN && wanted.memory)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%llu bytes of memory are too few; %d MB are the least",
+                         "a budget of %llu bytes of memory is too small; use at least %d MB",
                          (unsigned long long)memory, EBPO_WORKSPACE_MIN / 1000000);
     if (memory < EBPO_WORKSPACE_MIN)
         memory = EBPO_WORKSPACE_MIN;
@@ -164,8 +169,8 @@ ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes,
     if (!fault)
         return ebpo_fail_memory(error, bytes);
     return ebpo_fail_file(error, EBPO_E_IO, workspace->folder,
-                          "cannot hold %llu bytes of temporary files: %s; name another folder, or "
-                          "allow more memory",
+                          "the folder cannot hold %llu bytes of temporary files: %s; name another "
+                          "folder, or allow more memory",
                           (unsigned long long)bytes, strerror(fault));
 }
 
@@ -177,8 +182,9 @@ ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const cha
         return ebpo_fail(error, EBPO_E_MEMORY, "out of memory %s", what);
     return ebpo_fail_file(
         error, EBPO_E_IO, workspace->folder,
-        "cannot hold the temporary files %s: %s; name another folder, or allow more memory", what,
-        strerror(fault));
+        "the folder cannot hold more temporary files (%s): %s; name another folder, or allow more "
+        "memory",
+        what, strerror(fault));
 }
 
 /* Adds an extent to the table. */
@@ -193,9 +199,8 @@ static void enter_extent(ebpo_workspace *w, extent *b)
 
 static bool is_at(const extent *b, const void *at) { return b->at == at && b->kind != EXTENT_POOL; }
 
-/* Removes the extent that begins at `at` from the table and returns it, or NULL if the workspace
- * has none there. Never returns a pool, but the pool's first part, which begins at the same
- * address. */
+/* Removes the extent that begins at `at` from the table and returns it. Returns NULL if there is
+ * none. Never returns a pool; the pool's first part begins at the same address. */
 static extent *remove_extent(ebpo_workspace *w, const void *at)
 {
     pthread_mutex_lock(&w->table_lock);
@@ -210,7 +215,7 @@ static extent *remove_extent(ebpo_workspace *w, const void *at)
     return found;
 }
 
-/* Chooses memory or a file, and counts the bytes. Returns true for a file. */
+/* Chooses memory or a file for a new extent, and counts its bytes. Returns true for a file. */
 static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 {
     ebpo_workspace_stats *f = &w->usage;
@@ -229,6 +234,7 @@ static bool choose_and_count(ebpo_workspace *w, size_t bytes)
     return filed;
 }
 
+/* Reverses choose_and_count. */
 static void subtract_bytes(ebpo_workspace *w, size_t bytes, bool filed)
 {
     pthread_mutex_lock(&w->lock);
@@ -237,7 +243,7 @@ static void subtract_bytes(ebpo_workspace *w, size_t bytes, bool filed)
     leave_workspace(w);
 }
 
-/* Allocates blocks of a file; returns 0 or an errno value. */
+/* Allocates disk space for a file. Returns 0 or an errno value. */
 static int allocate_blocks(int fd, size_t bytes)
 {
 #ifdef EBPO_HAVE_POSIX_FALLOCATE
@@ -258,7 +264,7 @@ static int allocate_blocks(int fd, size_t bytes)
 #endif
 }
 
-/* Maps a new file and allocates its blocks first, because writing to a mapping on a full disk would
+/* Maps a new file. First allocates disk space, because writing to a mapping on a full disk would
  * raise a signal. */
 static void *map_file(ebpo_workspace *w, size_t bytes)
 {
@@ -283,10 +289,10 @@ static void *map_memory(ebpo_workspace *w, size_t bytes)
     return at;
 }
 
-/* Makes an extent; returns NULL with the reason in the workspace's `failed`. */
+/* Makes an extent. Returns NULL on failure, with the reason in w->failed. */
 static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
 {
-    /* callers that make many extents may not release pages between them */
+    /* released here, because callers may make many extents without releasing pages */
     ebpo_release_pages(w);
     extent *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b) {
@@ -314,7 +320,9 @@ static void unmap_extent(ebpo_workspace *w, extent *b)
 
 /* --- parts of pools --- */
 
-/* Makes a part of the pool. No bytes of a pool are given out twice, so a new part is zero. */
+/* Makes a part of the pool. The bytes of a pool are used only once, so the bytes of a new part are
+ * 0.
+ */
 static extent *make_part(ebpo_workspace *w, size_t bytes)
 {
     extent *part = ebpo_alloc_zero(1, sizeof *part);
@@ -361,8 +369,7 @@ static void leave_pool(ebpo_workspace *w, extent *pool)
     unmap_extent(w, pool);
 }
 
-/* Returns a part's memory, or its blocks in the file, to the system, where the system allows this.
- */
+/* Returns a part's memory, or its space in the file, to the system, if the system allows this. */
 static void discard_pages(const extent *b)
 {
 #ifdef EBPO_HAVE_MADV_REMOVE
@@ -426,7 +433,7 @@ void ebpo_array_free(ebpo_workspace *workspace, void *array)
         free(array);
 }
 
-enum { STEP = 4 << 20 };
+enum { STEP = 4 << 20 }; /* bytes between two releases of pages */
 
 void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes)
 {
@@ -464,15 +471,16 @@ bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity,
 bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                           size_t size)
 {
-    enum { LATE = 1 << 20 };
+    enum { LATE = 1 << 20 }; /* arrays of more bytes are allocated in the workspace */
     if (need <= *capacity)
         return true;
     return workspace && need > LATE / size ? ebpo_array_grow(workspace, array, capacity, need, size)
                                            : ebpo_grow(array, capacity, need, size);
 }
 
+/* Resident memory of this process in bytes: all, and that of files. */
 typedef struct residency {
-    uint64_t all, files; /* bytes */
+    uint64_t all, files;
 } residency;
 
 /* Returns the resident memory of this process. */
@@ -480,8 +488,8 @@ static residency read_residency(const ebpo_workspace *w)
 {
     char text[128], *at = text;
     uint64_t pages[3]; /* size of the process, resident, resident and of files */
-    ssize_t got = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
-    text[got > 0 ? got : 0] = 0;
+    ssize_t size = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
+    text[size > 0 ? size : 0] = 0;
     for (int i = 0; i < 3; i++) {
         char *end;
         pages[i] = strtoull(at, &end, 10);
@@ -492,12 +500,13 @@ static residency read_residency(const ebpo_workspace *w)
     return (residency){ pages[1] * w->page, pages[2] * w->page };
 }
 
+/* Returns the memory of an extent in a file to the system; the data stay in the file. */
 static void release_extent(const extent *b)
 {
 #ifdef EBPO_HAVE_MADVISE
     madvise(b->at, b->bytes, MADV_DONTNEED);
 #else
-    msync(b->at, b->bytes, MS_ASYNC); /* the system then reclaims them when memory is short */
+    msync(b->at, b->bytes, MS_ASYNC); /* the system reclaims the pages when memory is short */
 #endif
 }
 
@@ -516,10 +525,9 @@ void ebpo_release_pages(ebpo_workspace *workspace)
     for (int i = 0; i < 1 << BUCKET_BITS; i++)
         for (extent *b = w->table[i]; b; b = b->next)
             if (b->kind != EXTENT_PART && b->filed)
-                /* for a file: written data stays in it */
                 release_extent(b);
-    /* The floor rises slowly, because pages that other threads bring in meanwhile do not belong to
-     * it. */
+    /* The floor rises slowly, because pages that other threads have brought into memory meanwhile
+     * do not belong to it. */
     uint64_t resident = read_residency(w).files, floor_max = w->floor + w->usage.memory / 64;
     w->floor = resident < floor_max ? resident : floor_max;
     pthread_mutex_unlock(&w->table_lock);

@@ -1,5 +1,6 @@
-/* Workspaces: arrays in memory or, beyond half of the budget, in temporary files; and loops over
- * such arrays, which release pages as they proceed. */
+/* Provides workspaces, whose arrays are in memory or, beyond half of the budget, in temporary
+ * files; and loops over such arrays, which release pages (return memory to the system) as they
+ * proceed. */
 #ifndef EBPO_CORE_WORKSPACE_H
 #define EBPO_CORE_WORKSPACE_H
 
@@ -9,8 +10,8 @@
 EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory,
                                                   const char *temp_dir, ebpo_error *error);
 
-/* Reports why the last allocation of this size failed: EBPO_E_MEMORY, or EBPO_E_IO with the folder.
- */
+/* Reports why the last allocation, of `bytes` bytes, has failed. Returns EBPO_E_MEMORY, or
+ * EBPO_E_IO with the folder in the message. */
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error);
 /* Same as ebpo_workspace_fail, for callers that do not know the size. `what` completes the message,
  * as in "while joining levels". */
@@ -24,20 +25,20 @@ const char *ebpo_workspace_folder(const ebpo_workspace *workspace);
 /* Returns the budget in bytes. */
 uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
 
-/* Releases pages of files when the budget is nearly used up; written data stays in the file. Call
- * this function between pieces of work, on each thread, after every few megabytes visited. A call
- * is cheap, and NULL is allowed. Loops (below) and runs of pieces (core/parallel.h) make these
+/* Releases the pages of arrays in files if more than three quarters of the budget are in use; data
+ * that were written stay in the file. Each thread calls this function whenever it has visited a few
+ * megabytes. A call is cheap, and NULL is allowed. The loops below and ebpo_parallel_for make these
  * calls; other code, such as a recursion, must make them itself. */
 void ebpo_release_pages(ebpo_workspace *workspace);
 
-/* Number of items between two releases, for arrays visited in order, and for loops whose items may
- * each bring in 16 pages. */
+/* Number of items between two calls of ebpo_release_pages: for arrays that are visited in order,
+ * and for loops whose items may each bring 16 pages into memory. */
 enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 
-/* Loops over the items of large arrays. A workspace with a budget keeps arrays in files, whose
- * visited pages stay in memory until released. These loops release the pages, so that the loops'
- * bodies need not. Bodies may `continue`, `break` and return; `end` is evaluated once. With a NULL
- * `workspace` the cost is one test. */
+/* Loops over the items of large arrays. A workspace keeps arrays in files, whose visited pages stay
+ * in memory until they are released. These loops release the pages, so that the loops' bodies need
+ * not. Bodies may `continue`, `break` and return; `end` is evaluated once. If `workspace` is NULL,
+ * a loop only costs one more test. */
 
 /* Releases pages whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two. The
  * bodies of `every` items should visit at most a few megabytes. */
@@ -48,7 +49,7 @@ enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 #define EBPO_FOR_ITEMS(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_IN_ORDER, i, begin, end)
 
-/* A loop with scattered access: each item may bring in 16 pages. */
+/* A loop with scattered access: each item may bring 16 pages into memory. */
 #define EBPO_FOR_ITEMS_SCATTERED(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_SCATTERED, i, begin, end)
 
@@ -66,12 +67,12 @@ static inline void ebpo_items_step(ebpo_workspace *workspace, uint64_t every, ui
 
 /* --- arrays in memory or in temporary files --- */
 
-/* Allocates count * size uninitialised bytes; returns NULL when the product overflows, memory is
- * short or the disk full (ebpo_workspace_fail reports which). A NULL workspace means malloc.
- * ebpo_array_free needs the same workspace, so an object that owns the array also keeps a pointer
- * to the workspace. */
+/* Allocates count * size uninitialised bytes. Returns NULL if the product is too large, memory is
+ * short or the disk is full (ebpo_workspace_fail reports the reason). `workspace` is NULL:
+ * allocates with malloc. ebpo_array_free needs the same workspace, so an object that owns the array
+ * also keeps a pointer to the workspace. */
 void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size);
-/* Same as ebpo_array_alloc, zeroed. */
+/* Same as ebpo_array_alloc, but sets all bytes to 0. */
 void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size);
 /* Same as ebpo_grow, for workspace arrays. */
 bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
