@@ -5,9 +5,9 @@
  * begins with the highest level and skips boxes that are not relevant. The tree is immutable, so
  * any number of threads may query it.
  *
- * No relevant box is skipped: lengths are rounded some ten times here, each time by 2^-53, and only
- * boxes that are farther by a share of 2^-40 are skipped. A query may get boxes that are not
- * relevant; the models in these boxes then find nothing. */
+ * No relevant box is skipped: a length is rounded some ten times here, each time by a share of at
+ * most 2^-53, and a box is skipped only if it is farther away by a share of 2^-40. A query may
+ * return boxes that are not relevant; queries of the models in these boxes then return no face. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,6 +16,7 @@
 #include "catalogue/catalogue_boxes.h"
 #include "core/alloc.h"
 
+/* FAN: number of boxes in a box of the next level. BITS: bits of a Morton code for each axis. */
 enum { FAN = 8, BITS = 21, LEVELS = EBPO_CATALOGUE_LEVELS };
 
 /* --- order --- */
@@ -32,6 +33,7 @@ static int by_code(const void *a, const void *b)
                               : (x->number > y->number) - (x->number < y->number);
 }
 
+/* Returns the Morton code of a point in a box. */
 static uint64_t code_of(const double p[3], const double min[3], const double max[3])
 {
     uint64_t code = 0;
@@ -72,7 +74,7 @@ static ebpo_catalogue_box box_around(const ebpo_catalogue_box *boxes, size_t cou
     return all;
 }
 
-/* Sorts the boxes by their centres. */
+/* Makes level 0: the boxes, sorted along the Morton curve of their centres. */
 static bool make_lowest(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
                         const uint32_t *numbers, size_t count)
 {
@@ -128,36 +130,37 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
 /* --- visits of boxes --- */
 
 typedef struct walk {
-    const ebpo_catalogue_boxes *t;
-    const double *p, *d; /* the point, or the ray's origin and direction */
-    double reach;        /* nearest query: boxes farther away are skipped */
-    double pad;          /* ray: margin, more than the rounding error */
+    const ebpo_catalogue_boxes *t; /* the tree of boxes */
+    const double *p, *d;           /* the point, or the ray's origin and direction */
+    double reach;                  /* for the nearest face: boxes farther away are skipped */
+    double pad; /* for a ray: margin around each box, more than the rounding error */
     uint32_t item;
     ebpo_catalogue_pairs *out; /* NULL: only `reach` is computed */
-    /* returns false if the box, and all boxes below it, are skipped */
-    bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *least);
+    /* returns false if the box, and all boxes below it, are skipped; otherwise may set
+     * *min_distance */
+    bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *min_distance);
     bool failed; /* memory is short */
 } walk;
 
-static void append_pair(walk *w, uint32_t box, double least)
+static void append_pair(walk *w, uint32_t box, double min_distance)
 {
     ebpo_catalogue_pairs *o = w->out;
     if (!ebpo_grow(&o->pair, &o->capacity, o->count + 1, sizeof *o->pair)) {
         w->failed = true;
         return;
     }
-    o->pair[o->count++] = (ebpo_catalogue_pair){ box, w->item, least };
+    o->pair[o->count++] = (ebpo_catalogue_pair){ box, w->item, min_distance };
 }
 
 /* Visits boxes recursively, at most LEVELS deep. */
 static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
 {
-    double least = 0;
-    if (w->failed || !w->keep(w, &w->t->box[level][node], &least))
+    double min_distance = 0;
+    if (w->failed || !w->keep(w, &w->t->box[level][node], &min_distance))
         return;
     if (level == 0) {
         if (w->out)
-            append_pair(w, w->t->number[node], least);
+            append_pair(w, w->t->number[node], min_distance);
         return;
     }
     size_t end = (node + 1) * FAN;
@@ -176,9 +179,9 @@ static bool walk_boxes(walk *w)
 
 /* --- points --- */
 
-static bool holds_point(walk *w, const ebpo_catalogue_box *b, double *least)
+static bool holds_point(walk *w, const ebpo_catalogue_box *b, double *min_distance)
 {
-    (void)least;
+    (void)min_distance;
     for (int k = 0; k < 3; k++)
         if (!(b->min[k] <= w->p[k] && w->p[k] <= b->max[k]))
             return false;
@@ -195,7 +198,7 @@ bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[
 /* Returns the length of a vector, also when squares overflow. */
 static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
-static double least_length(const ebpo_catalogue_box *b, const double p[3])
+static double min_length(const ebpo_catalogue_box *b, const double p[3])
 {
     double v[3];
     for (int k = 0; k < 3; k++)
@@ -203,7 +206,7 @@ static double least_length(const ebpo_catalogue_box *b, const double p[3])
     return vector_length(v);
 }
 
-static double greatest_length(const ebpo_catalogue_box *b, const double p[3])
+static double max_length(const ebpo_catalogue_box *b, const double p[3])
 {
     double v[3];
     for (int k = 0; k < 3; k++)
@@ -211,26 +214,27 @@ static double greatest_length(const ebpo_catalogue_box *b, const double p[3])
     return vector_length(v);
 }
 
-static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *least)
+/* Returns true if a face in the box may be as near as `reach`. */
+static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *min_distance)
 {
-    *least = least_length(b, w->p);
-    return *least * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
+    *min_distance = min_length(b, w->p);
+    return *min_distance * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
 }
 
 /* Lowers `reach` to the distance of the box's farthest corner: the model in the box is not farther
  * away than this corner. */
-static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *least)
+static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *min_distance)
 {
-    if (!may_be_near(w, b, least))
+    if (!may_be_near(w, b, min_distance))
         return false;
-    w->reach = fmin(w->reach, greatest_length(b, w->p));
+    w->reach = fmin(w->reach, max_length(b, w->p));
     return true;
 }
 
-bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3], double most,
-                               uint32_t item, ebpo_catalogue_pairs *out)
+bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3],
+                               double max_distance, uint32_t item, ebpo_catalogue_pairs *out)
 {
-    walk w = { .t = t, .p = p, .reach = most, .item = item, .keep = comes_nearer };
+    walk w = { .t = t, .p = p, .reach = max_distance, .item = item, .keep = comes_nearer };
     (void)walk_boxes(&w);
     w.out = out;
     w.keep = may_be_near;
@@ -239,10 +243,11 @@ bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3],
 
 /* --- rays --- */
 
-static bool may_be_found(walk *w, const ebpo_catalogue_box *b, double *least)
+/* Returns true if the ray may intersect the box with its margin. */
+static bool may_be_hit(walk *w, const ebpo_catalogue_box *b, double *min_distance)
 {
     double near = -INFINITY, far = INFINITY;
-    (void)least;
+    (void)min_distance;
     for (int k = 0; k < 3; k++) {
         double lower = b->min[k] - w->pad - w->p[k], upper = b->max[k] + w->pad - w->p[k];
         if (w->d[k] == 0) {
@@ -260,7 +265,7 @@ static bool may_be_found(walk *w, const ebpo_catalogue_box *b, double *least)
 bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3],
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out)
 {
-    walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_found };
+    walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_hit };
     for (int k = 0; t->levels && k < 3; k++) {
         const ebpo_catalogue_box *all = t->box[t->levels - 1];
         w.pad = fmax(w.pad, fmax(fabs(all->min[k]), fabs(all->max[k])));

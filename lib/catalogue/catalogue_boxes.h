@@ -11,8 +11,8 @@
  * this number of levels is sufficient for 2^33 boxes. */
 enum { EBPO_CATALOGUE_LEVELS = 12 };
 
-/* Boxes are skipped only if they are farther than the limit by at least this share, because lengths
- * are rounded some ten times. */
+/* A box is skipped only if its distance is greater than the limit by at least this share, because
+ * lengths are rounded some ten times. */
 #define EBPO_CATALOGUE_SLACK 0x1p-40
 
 /* A closed box. */
@@ -28,10 +28,10 @@ typedef struct ebpo_catalogue_boxes {
     ebpo_catalogue_box *box[EBPO_CATALOGUE_LEVELS];
 } ebpo_catalogue_boxes;
 
-/* A box, and a point or ray for which it was found. */
+/* A box, and an item (a point or ray) for which it is relevant. */
 typedef struct ebpo_catalogue_pair {
-    uint32_t box, item;
-    double least; /* set by ebpo_catalogue_boxes_near: lower bound of the distance to the box */
+    uint32_t box, item;  /* box: its number in `numbers`; item: index of the point or ray */
+    double min_distance; /* rounded distance of the box, if set by ebpo_catalogue_boxes_near */
 } ebpo_catalogue_pair;
 
 typedef struct ebpo_catalogue_pairs {
@@ -49,17 +49,16 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t);
  * return false when memory is short. */
 bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[3], uint32_t item,
                                   ebpo_catalogue_pairs *out);
-/* Appends pairs for all boxes that may contain the face nearest to the point, at most `most` away.
- */
-bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3], double most,
-                               uint32_t item, ebpo_catalogue_pairs *out);
+/* Appends pairs for all boxes that may contain the face nearest to the point, if the distance of
+ * this face is at most max_distance. */
+bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3],
+                               double max_distance, uint32_t item, ebpo_catalogue_pairs *out);
 /* Appends pairs for all boxes that the ray from o along d may intersect. */
 bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3],
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out);
 
-/* Writes the numbers (from 0) of points[count][3] in the order of the Morton curve of a box. Points
- * outside the box have the position of the nearest point of the box. Returns false when memory is
- * short. */
+/* Writes the indices of points[count][3] in the order of the Morton curve of a box. Points outside
+ * the box have the position of the nearest point of the box. Returns false when memory is short. */
 bool ebpo_catalogue_morton_order(const double *points, size_t count, const double min[3],
                                  const double max[3], uint32_t *numbers);
 

@@ -1,9 +1,9 @@
 /* Makes a catalogue, a list of models with their boxes, from a JSON file or an array.
  *
- * A catalogue file is untrusted input. The kind and range of every used member are checked before
- * the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two corners
- * of three finite numbers each, with min not above max. When a model is opened, open_models.c
- * compares the digest and the box with the model. Unknown members are ignored.
+ * A catalogue file is untrusted input. The kind and range of every member that is used are checked
+ * before the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two
+ * corners of three finite numbers each, with min not above max. When a model is opened,
+ * open_models.c compares the digest and the box with the model. Unknown members are ignored.
  *
  * Entries have the paths by which files are opened: relative paths in a catalogue file are relative
  * to the folder of this file. A catalogue is immutable, and any number of threads may use it.
@@ -29,8 +29,8 @@
 #include "core/hash.h"
 #include "core/os.h"
 
-/* Maximum length of a file. This is sufficient for some millions of models; a larger file would
- * need many times as much memory. */
+/* Maximum length of a file in bytes, because reading needs many times as much memory. The length is
+ * sufficient for some millions of models. */
 enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
@@ -57,8 +57,8 @@ static char *joined_path(const char *folder, const char *path)
     return joined;
 }
 
-/* Makes the tree of the boxes of all models or, with `seen`, of the models that rays and distances
- * use. */
+/* Makes the tree of the boxes of all models or, if `seen` is true, of the models that rays and
+ * distances use. */
 static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, bool seen)
 {
     ebpo_catalogue_box *box = ebpo_alloc(c->count, sizeof *box);
@@ -78,7 +78,7 @@ static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, boo
     return good;
 }
 
-/* Computes the derived data when all entries are set. */
+/* Sets the members of the catalogue that depend on its entries. */
 static ebpo_status finish_catalogue(ebpo_catalogue *c, ebpo_error *error)
 {
     for (uint64_t i = 0; i < c->count && !c->surface; i++)
@@ -138,19 +138,20 @@ static ebpo_status end_making(ebpo_catalogue *c, ebpo_status status, ebpo_catalo
 
 /* --- checks of entries --- */
 
+/* Returns what is wrong with an entry, as the rest of a sentence; NULL if nothing is wrong. */
 static const char *fault_of_entry(const ebpo_catalogue_entry *e)
 {
     if (!e->path || !*e->path)
         return "has no path";
     if (e->surface && (!*e->surface || e->unseen))
-        return "has no surface, but a path of a surface";
+        return "has a path of a surface that is empty or contradicts `unseen`";
     if (e->numbers && !*e->numbers)
-        return "has an empty path for face indices";
+        return "has an empty path of face indices";
     if ((unsigned)e->rule >= RULES)
         return "has an unknown winding rule";
     for (int k = 0; k < 3; k++)
         if (!isfinite(e->min[k]) || !isfinite(e->max[k]) || e->min[k] > e->max[k])
-            return "has no box: min is above max, or a corner is not finite";
+            return "has an invalid box: min is above max, or a corner is not finite";
     return NULL;
 }
 
@@ -289,7 +290,7 @@ static ebpo_status read_digest(const reader *r, const json_t *model, const char 
         return EBPO_OK;
     }
     snprintf(what, sizeof what,
-             "%s is not a digest; without one, another file could be taken for the model", key);
+             "%s is not a digest, which must be 64 digits 0 to 9 or letters a to f", key);
     return bad_model(r, what);
 }
 
@@ -328,7 +329,7 @@ static bool read_rule(const json_t *of, ebpo_rule *out)
     return found;
 }
 
-/* Returns a count that is only informative; 0 if it is invalid. */
+/* Returns a count that no query uses; 0 if it is missing or invalid. */
 static uint64_t read_count(const json_t *model, const char *key)
 {
     double count = json_number_value(json_object_get(model, key));
@@ -354,7 +355,7 @@ static ebpo_status read_entry(const reader *r, const json_t *model, ebpo_catalog
 {
     const json_t *solid = json_object_get(model, "solid");
     if (!json_is_object(model))
-        return bad_model(r, "a model is not an object");
+        return bad_model(r, "not an object");
     ebpo_status status = read_paths(r, model, e);
     if (status == EBPO_OK)
         status = read_digest(r, model, "content_sha256", e->digest);
@@ -401,7 +402,7 @@ static ebpo_status read_root(reader *r, const json_t *root)
         return bad_file(r, "\"format\": \"ebpo-catalogue\" is missing");
     if (json_number_value(version) != 1)
         return ebpo_fail_file(r->error, EBPO_E_VERSION, c->path,
-                              "unsupported catalogue version %g; this program reads 1",
+                              "unsupported catalogue version %g; this program reads version 1",
                               json_number_value(version));
     if (parts && !json_is_boolean(parts))
         return bad_file(r, "parts is not true or false");
@@ -425,7 +426,8 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-/* Reads the file's text, of c->file_bytes bytes; the caller frees it. Does not wait for pipes. */
+/* Reads the file's text, of c->file_bytes bytes; the caller frees it. Does not wait for the writer
+ * of a pipe. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;

@@ -1,5 +1,5 @@
-/* Defines the shared parts of lib/catalogue: the list of entries, and open models that threads
- * share. */
+/* Defines what the files of lib/catalogue share: the catalogue, open models that threads share, and
+ * queries of several models. */
 #ifndef EBPO_CATALOGUE_CATALOGUE_IN_H
 #define EBPO_CATALOGUE_CATALOGUE_IN_H
 
@@ -47,21 +47,21 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
 /* Returns true if the catalogue has a single model, which is open and completely in memory. */
 bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c);
 
-/* Converts the number of a part's face to its number in the whole model, if the catalogue has such
- * numbers; *face may be EBPO_NO_FACE. */
+/* Converts the index of a part's face to its index in the whole model, if the catalogue has such
+ * indices; *face may be EBPO_NO_FACE. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *model, uint64_t *face,
                                                    ebpo_error *error);
 
-/* --- numbers of faces: part_numbers.c --- */
+/* --- face indices of parts: part_numbers.c --- */
 
-/* A .npy file of integers: for each face of a part, the number of this face in the whole model.
- * Numbers are read when they are needed. */
+/* A .npy file of integers: for each face of a part, the index of this face in the whole model.
+ * Indices are read when they are needed. */
 typedef struct ebpo_catalogue_numbers {
     const char *path; /* owned by the caller */
     int fd;           /* -1: not open */
-    int64_t begin;
-    uint64_t count;
-    unsigned bytes; /* bytes of a number: 1, 2, 4 or 8 */
+    int64_t begin;    /* offset of the first index in the file */
+    uint64_t count;   /* number of indices */
+    unsigned bytes;   /* bytes of an index: 1, 2, 4 or 8 */
     bool is_signed, big_endian;
 } ebpo_catalogue_numbers;
 
@@ -71,8 +71,9 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f,
                                                       ebpo_error *error);
 void ebpo_catalogue_numbers_close(ebpo_catalogue_numbers *f);
 
-/* Replaces *face by the number at the index *face. Returns EBPO_E_FORMAT if there is no such
- * number, or if it is negative or beyond 2^63; EBPO_E_IO. May be called by any thread. */
+/* Replaces *face, an index in the part, by the index in the whole model. Returns EBPO_E_FORMAT if
+ * the file has no index for this face, or if the index is negative or beyond 2^63; EBPO_E_IO. May
+ * be called by any thread. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f,
                                                      uint64_t *face, ebpo_error *error);
 
@@ -84,10 +85,10 @@ typedef struct ebpo_catalogue_batch {
     const ebpo_catalogue_query_options *options;
 } ebpo_catalogue_batch;
 
-/* Maximum number of pairs in memory; the pairs of one query may be more. */
+/* No further query is added when this number of pairs is in memory. */
 enum { EBPO_CATALOGUE_PAIRS = 1 << 21 };
 
-/* Input for one model: rows[count][width]; pair[i].item is the query of row i. */
+/* Input for one model: rows[count][width]; pair[i].item is the index of the query of row i. */
 typedef struct ebpo_catalogue_run {
     uint32_t model;
     const ebpo_catalogue_pair *pair;
@@ -104,7 +105,8 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_batch *
                                                     ebpo_catalogue_query run_query, void *user,
                                                     ebpo_error *error);
 
-/* Appends the pairs of an item, given the item's row. Returns false when memory is short. */
+/* Appends a pair for each box that is relevant for an item, given the item's row. Returns false
+ * when memory is short. */
 typedef bool (*ebpo_catalogue_find)(const ebpo_catalogue_boxes *boxes, const double *row,
                                     uint32_t item, ebpo_catalogue_pairs *out);
 bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
@@ -112,7 +114,7 @@ bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *
 bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
                              ebpo_catalogue_pairs *out);
 
-/* Same as ebpo_catalogue_query_runs, for rows[count]: `find` returns the boxes for each row. With
+/* Same as ebpo_catalogue_query_runs, for rows[count]: `find` appends the pairs of each row. With
  * `surface`, only models that rays and distances use are queried. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a,
                                                    const double *rows, uint32_t count, size_t width,
@@ -120,7 +122,8 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a
                                                    ebpo_catalogue_query run_query, void *user,
                                                    ebpo_error *error);
 
-/* Returns EBPO_E_ABSENT if the catalogue contains caps only. */
+/* Returns EBPO_E_ABSENT if no model of the catalogue has a surface for rays and distances: all are
+ * caps. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error);
 
 /* --- queries of many rows, by any number of threads: catalogue_query.c --- */
@@ -136,10 +139,10 @@ typedef struct ebpo_catalogue_job {
     const char *stage;
     size_t width, result; /* numbers in a row; bytes of a result */
     bool ordered; /* true if rows are points, which may be processed along the Morton curve */
-    /* rows of the remaining queries; the next two members begin at the same query */
+    /* rows and results of the remaining queries */
     const double *rows;
     char *out;
-    uint64_t *model; /* model of each result; or NULL */
+    uint64_t *model; /* the model of each result; or NULL */
     /* order of the rows of the current lap; set while the rows are processed */
     const uint32_t *order;
 } ebpo_catalogue_job;

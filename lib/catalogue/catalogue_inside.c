@@ -8,10 +8,10 @@
  * of the whole model. A point on a face or cap of a part is *doubtful*. The point is on the surface
  * of the whole model if a face that is not a cap contains it; a box query for the point decides
  * this exactly. Otherwise the point is on a cap. Then the point's winding number is counted along a
- * ray through the surfaces, which have no caps: the number of faces where the ray leaves the solid,
- * minus the number of faces where the ray enters the solid. If a ray hits an edge or runs along a
- * face, its crossings are not counted, and another ray is cast. The directions are the same in all
- * queries. Every ray whose crossings are counted gives the same winding number.
+ * ray through the surfaces, which have no caps. The winding number is the number of faces where the
+ * ray leaves the solid, minus the number of faces where the ray enters the solid. If a ray hits an
+ * edge or runs along a face, its crossings are not counted, and another ray is cast. The directions
+ * are the same in all queries. Every ray whose crossings are counted gives the same winding number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -31,23 +31,24 @@
 enum { DIRECTIONS = 64 };
 
 /* Result for a point from the models that were queried so far. */
-typedef struct found {
+typedef struct point_result {
     int64_t winding; /* sum of the winding numbers */
     bool in, on;     /* the point is inside a model; on a face of a model */
-} found;
+} point_result;
 
+/* Adds the winding numbers of the points in one model to their results. */
 static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_held *model,
                                   void *user, ebpo_error *error)
 {
     const ebpo_catalogue_run *run = user;
-    found *all = run->user;
+    point_result *all = run->user;
     ebpo_inside_result *reported = ebpo_alloc(run->count, sizeof *reported);
     (void)model;
     if (!reported)
         return ebpo_fail_memory(error, run->count * sizeof *reported);
     ebpo_status status = ebpo_inside_many(context, run->rows, run->count, NULL, reported, error);
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
-        found *f = &all[run->pair[i].item];
+        point_result *f = &all[run->pair[i].item];
         f->winding += reported[i].winding;
         f->in |= reported[i].where == EBPO_IN;
         f->on |= reported[i].where == EBPO_ON;
@@ -68,6 +69,7 @@ typedef struct doubtful {
     bool *decided;    /* [count] true: the last ray gives the winding number */
 } doubtful;
 
+/* Sets on_surface for the points on a face of one model. */
 static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                              ebpo_error *error)
 {
@@ -87,9 +89,9 @@ static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *m
     return status;
 }
 
-/* Writes the results of the points with known[i] to `all`, and keeps the other points in `d`. `on`:
- * the known points are on the surface; otherwise d->sum has their winding numbers. */
-static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
+/* Writes the results of the points with known[i] to `all`, and keeps the other points in `d`. `on`
+ * true: the known points are on the surface; `on` false: d->sum has their winding numbers. */
+static void keep_unknown(doubtful *d, const bool *known, bool on, point_result *all)
 {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < d->count; i++) {
@@ -106,6 +108,7 @@ static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
 
 /* --- doubtful points of parts: on caps --- */
 
+/* Counts the crossings of the rays with the surface of one model. */
 static ebpo_status query_crossings(ebpo_context *context, const ebpo_catalogue_held *model,
                                    void *user, ebpo_error *error)
 {
@@ -146,7 +149,7 @@ static ebpo_status cast_rays(const ebpo_catalogue_batch *a, doubtful *d, uint64_
 
 /* Classifies the doubtful points: first points on the whole model's surface, then points on caps.
  */
-static ebpo_status classify_doubtful(const ebpo_catalogue_batch *a, doubtful *d, found *all,
+static ebpo_status classify_doubtful(const ebpo_catalogue_batch *a, doubtful *d, point_result *all,
                                      ebpo_error *error)
 {
     uint64_t state = 20;
@@ -170,21 +173,21 @@ static ebpo_status classify_doubtful(const ebpo_catalogue_batch *a, doubtful *d,
 
 /* --- parts together --- */
 
-/* Finds the doubtful points, and corrects their results. */
+/* Finds the doubtful points, and replaces their results. */
 static ebpo_status correct_doubtful(const ebpo_catalogue_batch *a, const double *points,
-                                    uint32_t count, found *all, ebpo_error *error)
+                                    uint32_t count, point_result *all, ebpo_error *error)
 {
-    uint32_t most = 0;
+    uint32_t doubtful_count = 0;
     for (uint32_t i = 0; i < count; i++)
-        most += all[i].on;
-    if (most == 0)
+        doubtful_count += all[i].on;
+    if (doubtful_count == 0)
         return EBPO_OK;
     doubtful d = { 0,
-                   ebpo_alloc(most, sizeof *d.number),
-                   ebpo_alloc(most, 7 * sizeof *d.rows),
-                   ebpo_alloc_zero(most, sizeof *d.on_surface),
-                   ebpo_alloc_zero(most, sizeof *d.sum),
-                   ebpo_alloc(most, sizeof *d.decided) };
+                   ebpo_alloc(doubtful_count, sizeof *d.number),
+                   ebpo_alloc(doubtful_count, 7 * sizeof *d.rows),
+                   ebpo_alloc_zero(doubtful_count, sizeof *d.on_surface),
+                   ebpo_alloc_zero(doubtful_count, sizeof *d.sum),
+                   ebpo_alloc(doubtful_count, sizeof *d.decided) };
     bool good = d.number && d.rows && d.on_surface && d.sum && d.decided;
     for (uint32_t i = 0; i < count && good; i++)
         if (all[i].on) {
@@ -193,7 +196,7 @@ static ebpo_status correct_doubtful(const ebpo_catalogue_batch *a, const double 
             d.number[d.count++] = i;
         }
     ebpo_status status = good ? classify_doubtful(a, &d, all, error)
-                              : ebpo_fail_memory(error, most * 8 * sizeof *d.rows);
+                              : ebpo_fail_memory(error, doubtful_count * 8 * sizeof *d.rows);
     free(d.number);
     free(d.rows);
     free(d.on_surface);
@@ -215,7 +218,7 @@ ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_batch *a, const dou
 {
     ebpo_inside_result *reported = out;
     const ebpo_catalogue_options *how = &a->c->how;
-    found *all = ebpo_alloc_zero(count, sizeof *all);
+    point_result *all = ebpo_alloc_zero(count, sizeof *all);
     (void)model;
     if (!all)
         return ebpo_fail_memory(error, count * sizeof *all);
@@ -224,7 +227,7 @@ ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_batch *a, const dou
     if (status == EBPO_OK && how->parts)
         status = correct_doubtful(a, rows, count, all, error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
-        const found *f = &all[i];
+        const point_result *f = &all[i];
         bool in = how->parts ? !f->on && is_inside(how->rule, f->winding) : f->in;
         reported[i] = (ebpo_inside_result){ .where = in      ? EBPO_IN
                                                      : f->on ? EBPO_ON

@@ -1,11 +1,11 @@
 /* Finds the nearest face of all models to a point, and the first face that a ray hits.
  *
- * For a point, the models are queried in the order of the distance of their boxes, while the next
- * box may contain a face that is nearer than the nearest face found. Many points are processed
+ * For a point, the models are queried in the order of the distance of their boxes, until no other
+ * box may contain a face that is nearer than the nearest face so far. Many points are processed
  * together: in each step, the next model of each point is queried, and a model is queried for all
  * its points at once. If several models have the same rounded distance, the result is from the
  * first of these models in the catalogue, independent of the order of queries. Therefore a box is
- * skipped only if it is farther by more than the rounding error (catalogue_boxes.c).
+ * skipped only if it is farther away by more than the rounding error (catalogue_boxes.c).
  *
  * For a ray, the models whose boxes it may intersect are queried in the order of the catalogue,
  * each only up to the nearest hit so far. If t overflows for several hits, a ray with an exactly
@@ -24,7 +24,7 @@
 
 /* --- distances --- */
 
-/* Points of a range, and their results so far. */
+/* Points of a range, and their results from the models that were queried so far. */
 typedef struct search {
     const ebpo_catalogue_batch *a;
     const double *points;
@@ -32,17 +32,19 @@ typedef struct search {
     double max_distance;
     ebpo_distance_result *out;
     uint64_t *model;
-    ebpo_catalogue_pairs near; /* boxes of each point, the nearest first */
-    ebpo_catalogue_pairs queries;
+    ebpo_catalogue_pairs near;    /* boxes of each point, the nearest first */
+    ebpo_catalogue_pairs queries; /* boxes of this step, at most one for each point */
 } search;
 
 static int nearest_first(const void *a, const void *b)
 {
     const ebpo_catalogue_pair *x = a, *y = b;
-    return x->least != y->least ? (x->least < y->least ? -1 : 1)
-                                : (x->box > y->box) - (x->box < y->box);
+    return x->min_distance != y->min_distance ? (x->min_distance < y->min_distance ? -1 : 1)
+                                              : (x->box > y->box) - (x->box < y->box);
 }
 
+/* Keeps the nearer face of each point. If distances are equal, keeps the face of the first model in
+ * the catalogue. */
 static ebpo_status merge_nearest(const search *s, const ebpo_catalogue_run *run,
                                  const ebpo_catalogue_held *model, ebpo_distance_result *reported,
                                  ebpo_error *error)
@@ -96,7 +98,7 @@ static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *ne
             const ebpo_catalogue_pair *next = s->near.pair + next_box[i];
             if (next_box[i] == begin[i + 1])
                 continue;
-            if (next->least * (1 - EBPO_CATALOGUE_SLACK) <=
+            if (next->min_distance * (1 - EBPO_CATALOGUE_SLACK) <=
                 fmin(s->out[next->item].distance, s->max_distance)) {
                 s->queries.pair[s->queries.count++] = *next;
                 next_box[i]++;
@@ -110,7 +112,8 @@ static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *ne
     return status;
 }
 
-/* Processes as many points from *at on as fit in memory, and sets *at to the next point. */
+/* Processes points from *at on, as many as EBPO_CATALOGUE_PAIRS allows, and sets *at to the next
+ * point. */
 static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *next_box,
                               ebpo_error *error)
 {
@@ -208,12 +211,12 @@ ebpo_status ebpo_catalogue_distance(const ebpo_catalogue *c, ebpo_catalogue_mode
 
 _Static_assert(sizeof(ebpo_ray) == 7 * sizeof(double), "a ray is a row of seven numbers");
 
-typedef struct shot {
+typedef struct ray_search {
     ebpo_ray_sides sides;
     ebpo_ray_hit *out;
     uint64_t *model;
-    double *longer_t; /* t with the longer direction, for hits whose t is INFINITY */
-} shot;
+    double *longer_t; /* t along the ray with a longer direction, for hits whose t is INFINITY */
+} ray_search;
 
 /* Returns the ray with a longer direction, exactly scaled by a power of two, so that the t of every
  * hit is finite. */
@@ -230,9 +233,9 @@ static ebpo_ray longer_ray(const ebpo_ray *ray)
     return out;
 }
 
-/* Sets *nearer to true if a hit comes before the kept hit. If t is INFINITY for both, the hits are
- * compared with a longer direction. */
-static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ray *ray,
+/* Sets *nearer to true if a hit comes before the hit that is kept so far. If t is INFINITY for
+ * both, their t along the ray with a longer direction are compared. */
+static ebpo_status is_nearer(const ray_search *s, ebpo_context *context, const ebpo_ray *ray,
                              const ebpo_ray_hit *hit, uint32_t item, bool *nearer,
                              ebpo_error *error)
 {
@@ -253,9 +256,10 @@ static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ra
     return status;
 }
 
-static ebpo_status merge_hits(const shot *s, const ebpo_catalogue_run *run, const ebpo_ray *rays,
-                              ebpo_context *context, const ebpo_catalogue_held *model,
-                              ebpo_ray_hit *reported, ebpo_error *error)
+static ebpo_status merge_hits(const ray_search *s, const ebpo_catalogue_run *run,
+                              const ebpo_ray *rays, ebpo_context *context,
+                              const ebpo_catalogue_held *model, ebpo_ray_hit *reported,
+                              ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
@@ -271,13 +275,13 @@ static ebpo_status merge_hits(const shot *s, const ebpo_catalogue_run *run, cons
     return status;
 }
 
-/* Queries one model, but no faces beyond the hits found so far. Models are queried in the order of
- * the catalogue, so the hit of the first model is kept if others have an equal t. */
+/* Queries one model, for faces that are not beyond the hits so far. Models are queried in the order
+ * of the catalogue, so the hit of the first model is kept if others have an equal t. */
 static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                               ebpo_error *error)
 {
     const ebpo_catalogue_run *run = user;
-    const shot *s = run->user;
+    const ray_search *s = run->user;
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
     ebpo_ray_hit *reported = ebpo_alloc(run->count, sizeof *reported);
     ebpo_ray *rays = ebpo_alloc(run->count, sizeof *rays);
@@ -301,7 +305,7 @@ static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *
 static ebpo_status query_rays(const ebpo_catalogue_batch *a, const double *rows, uint32_t count,
                               void *out, uint64_t *model, ebpo_error *error)
 {
-    shot s = { a->options->sides, out, model, ebpo_alloc(count, sizeof *s.longer_t) };
+    ray_search s = { a->options->sides, out, model, ebpo_alloc(count, sizeof *s.longer_t) };
     if (!s.longer_t)
         return ebpo_fail_memory(error, count * sizeof *s.longer_t);
     for (uint32_t i = 0; i < count; i++) {

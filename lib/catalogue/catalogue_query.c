@@ -21,10 +21,11 @@
 #include "core/parallel.h"
 #include "query/query_model.h"
 
-/* Least and greatest number of rows in a range; number of rows in a lap; number of rows for which
- * sorting takes more time than it saves. */
+/* Minimum and maximum number of rows in a range; maximum number of rows in a lap; maximum number of
+ * points that are not sorted, because sorting them takes more time than it saves. */
 enum { STRETCH_LEAST = 1 << 10, STRETCH_MAX = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
-/* Number of ranges for each thread: several, so that no thread waits long for the last range. */
+/* Number of ranges for each thread. There are several, so that no thread waits long for the last
+ * range of another thread. */
 enum { STRETCHES_EACH = 4 };
 
 ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)
@@ -44,7 +45,7 @@ static int by_model(const void *a, const void *b)
                             : (x->item > y->item) - (x->item < y->item);
 }
 
-/* Returns the largest number of pairs with the same model. The pairs must be sorted. */
+/* Returns the largest number of pairs with the same model. The pairs must be sorted by model. */
 static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
 {
     uint64_t longest = 0;
@@ -211,9 +212,7 @@ ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_query_options *own,
     *own = (ebpo_catalogue_query_options)EBPO_CATALOGUE_QUERY_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_catalogue_query_options, own, given, error);
     if (status == EBPO_OK && !(own->max_distance >= 0))
-        status = ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "maximum distance %g is invalid; give 0 or "
-                           "more",
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g is invalid; give 0 or more",
                            own->max_distance);
     if (status == EBPO_OK && (unsigned)own->sides > EBPO_RAY_BACK)
         status = ebpo_fail_value(error);

@@ -38,14 +38,14 @@ static void write_text(FILE *to, const char *text)
     fputc('"', to);
 }
 
-/* Finds the fewest digits from which the same double is read, in any locale. Returns the number of
- * digits, and sets `digits` and the exponent of ten of the first digit. */
+/* Finds the fewest digits of |x| from which the same double is read, in any locale. Returns the
+ * number of digits, and sets `digits` and the exponent of ten of the first digit. */
 static int fewest_digits(double x, char digits[20], int *exponent)
 {
     char text[40];
     int count = 0;
-    for (int more = fabs(x) < DBL_MIN ? 0 : 14; more <= 16; more++) {
-        snprintf(text, sizeof text, "%.*e", more, fabs(x));
+    for (int decimals = fabs(x) < DBL_MIN ? 0 : 14; decimals <= 16; decimals++) {
+        snprintf(text, sizeof text, "%.*e", decimals, fabs(x));
         if (strtod(text, NULL) == fabs(x))
             break;
     }
@@ -101,10 +101,10 @@ static void write_path(FILE *to, const char *before, const char *key, const char
                        const char *folder)
 {
     size_t length = strlen(folder);
-    bool below = length && strncmp(path, folder, length) == 0 && path[length] != '/' &&
-                 path[length] && !strstr(path + length, "://");
+    bool in_folder = length && strncmp(path, folder, length) == 0 && path[length] != '/' &&
+                     path[length] && !strstr(path + length, "://");
     fprintf(to, "%s\n      \"%s\": ", before, key);
-    write_text(to, path + (below ? length : 0));
+    write_text(to, path + (in_folder ? length : 0));
 }
 
 static void write_flag(FILE *to, const char *key, bool value)

@@ -1,18 +1,19 @@
 /* Keeps open models of any number of catalogues, all within one memory budget.
  *
- * A model is identified by the path and digest of its file, the options of opening, its face
- * numbers, and the share of the budget. All models of a catalogue have equal shares, of at least an
- * eighth of the budget. A model is opened by the first query that needs it. A thread that queries a
- * model holds the model, and the share is reserved while any thread holds the model. When memory is
- * short, models that no thread holds are closed, the least recently used first. If memory is still
- * short, the query waits until other queries end. A thread holds one model at a time, so that no
- * thread waits for itself.
+ * A model is identified by the path and digest of its file, the options of opening, the path of its
+ * face indices, and its share of the budget. All models of a catalogue have equal shares, of at
+ * least an eighth of the budget. A model is opened by the first query that needs it. A thread that
+ * queries a model holds the model, and the model's share is reserved while any thread holds the
+ * model. When memory is short, models that no thread holds are closed, the least recently used
+ * first. If memory is still short, the query waits until other queries end. A thread holds one
+ * model at a time, so that no thread waits for itself.
  *
  * The file is compared with its catalogue: the digest when the file is opened, and the box whenever
  * the model is lent, because two entries may describe one file differently.
  *
- * Locks: one lock is for the list and its sums. It is held while a file is closed, but never during
- * a query or while a file is opened. Each model has a lock for opening and a lock for queries. */
+ * Locks: one lock protects the list of models and the sums over the models. It is held while a file
+ * is closed, but never during a query or while a file is opened. Each model has a lock for opening
+ * and a lock for queries. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>
@@ -23,33 +24,35 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-/* Maximum number of models that are queried at a time, if there are many; maximum number of open
- * models. The system may allow fewer open models, because each model has one or two open files. */
+/* SHARES: number of shares of the budget, if the catalogue has that many models. OPEN_MAX: maximum
+ * number of open models, if the system allows that many open files. DESCRIPTORS_EACH: number of
+ * file descriptors that are counted for each model. CONTEXTS_KEPT: maximum number of idle contexts
+ * of a model. */
 enum { SHARES = 8, OPEN_MAX = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
 
 /* Identity of a requested model. */
-typedef struct wanted {
-    const char *path, *numbers; /* path of the model; path of its face numbers, or NULL */
+typedef struct model_key {
+    const char *path, *numbers; /* path of the model; path of its face indices, or NULL */
     uint8_t digest[32];
     uint64_t share; /* maximum bytes; 0: no limit */
     ebpo_catalogue_open_fn open_file;
     ebpo_catalogue_close_fn close_file;
     void *user;
-} wanted;
+} model_key;
 
 struct ebpo_catalogue_held {
-    ebpo_catalogue_held *before,
-        *behind;             /* in the list of models, with the last used model first */
-    wanted key;              /* the model owns the texts of its key */
-    unsigned users;          /* `users` and the next fields are protected by the lock
-                              * of all models */
+    /* neighbours in the list of models, whose first model is the last used one */
+    ebpo_catalogue_held *before, *behind;
+    model_key key; /* the model owns the texts of its key */
+    /* the lock of all models protects `users` and `bytes` */
+    unsigned users;          /* number of threads that hold the model */
     uint64_t bytes;          /* bytes that are counted for the model */
     pthread_mutex_t opening; /* protects the contexts, and the next fields until `model` is set */
     pthread_rwlock_t query_lock; /* held exclusively by a query that must run alone */
     ebpo_file *file;
-    ebpo_model *_Atomic model; /* for sums, `model` is read without the lock for opening */
+    ebpo_model *_Atomic model; /* statistics are read from it without the lock for opening */
     ebpo_catalogue_numbers numbers;
-    ebpo_context *idle[CONTEXTS_KEPT];
+    ebpo_context *idle[CONTEXTS_KEPT]; /* [idle_count] contexts that no thread uses */
     unsigned idle_count;
 };
 
@@ -60,9 +63,9 @@ struct ebpo_catalogue_models {
     uint64_t memory;                   /* budget in bytes; 0: no limit */
     ebpo_catalogue_held *first, *last; /* list of all models */
     unsigned held, busy;           /* number of models in the list; number of models with users */
-    uint64_t taken;                /* sum of the models' bytes */
+    uint64_t taken;                /* sum of the bytes of all models */
     uint64_t closed;               /* number of closed models */
-    ebpo_model_stats closed_stats; /* sums of the closed models */
+    ebpo_model_stats closed_stats; /* sums of the statistics of the closed models */
 };
 
 /* --- one model --- */
@@ -74,8 +77,8 @@ static ebpo_status check_digest(const ebpo_catalogue *c, const ebpo_catalogue_he
     if (memcmp(info->content_sha256, m->key.digest, sizeof m->key.digest) == 0)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, m->key.path,
-                          "does not match the content_sha256 of %.150s: it has changed; make the "
-                          "catalogue again",
+                          "does not match the content_sha256 of %.150s: the file has changed; make "
+                          "the catalogue again",
                           ebpo_catalogue_shown(c));
 }
 
@@ -100,8 +103,7 @@ static ebpo_status open_numbers(ebpo_catalogue_held *m, ebpo_error *error)
     ebpo_status status = ebpo_catalogue_numbers_open(&m->numbers, m->key.numbers, error);
     if (status == EBPO_OK && m->numbers.count != faces)
         status = ebpo_fail_file(error, EBPO_E_FORMAT, m->key.numbers,
-                                "expected an index for each face: %llu "
-                                "indices for %llu faces",
+                                "expected an index for each face: %llu indices for %llu faces",
                                 (unsigned long long)m->numbers.count, (unsigned long long)faces);
     return status;
 }
@@ -122,14 +124,14 @@ static void close_model(ebpo_catalogue_held *m)
 
 static ebpo_status open_file(ebpo_catalogue_held *m, ebpo_error *error)
 {
-    const wanted *key = &m->key;
+    const model_key *key = &m->key;
     m->file = NULL;
     if (!key->open_file)
         return ebpo_open(key->path, &m->file, error);
     ebpo_status status = key->open_file(key->user, key->path, &m->file, error);
     return status == EBPO_OK && !m->file ? ebpo_fail_file(error, EBPO_E_ARGUMENT, key->path,
                                                           "the function that opens files returned "
-                                                          "none")
+                                                          "no file")
                                          : status;
 }
 
@@ -155,15 +157,15 @@ static ebpo_status open_model(const ebpo_catalogue_models *models, const ebpo_ca
     close_model(m);
     if (status == EBPO_E_LIMIT && c->count > 1)
         return ebpo_fail_file(error, status, m->key.path,
-                              "%.380s (each model may take one part in %d of the memory)",
+                              "%.380s (each model may use one part in %d of the memory budget)",
                               why.message, c->count < SHARES ? (int)c->count : SHARES);
     why.status = status;
     return ebpo_fail_with(error, &why);
 }
 
-/* Opens the model once, by the first thread that needs it. */
-static ebpo_status ready_model(const ebpo_catalogue_models *models, const ebpo_catalogue *c,
-                               ebpo_catalogue_held *m, ebpo_context **context, ebpo_error *error)
+/* Opens the model if it is not open, and sets *context to a context that no other thread uses. */
+static ebpo_status prepare_model(const ebpo_catalogue_models *models, const ebpo_catalogue *c,
+                                 ebpo_catalogue_held *m, ebpo_context **context, ebpo_error *error)
 {
     pthread_mutex_lock(&m->opening);
     ebpo_status status = m->model ? EBPO_OK : open_model(models, c, m, error);
@@ -172,7 +174,8 @@ static ebpo_status ready_model(const ebpo_catalogue_models *models, const ebpo_c
     return status == EBPO_OK && !*context ? ebpo_context_new(m->model, context, error) : status;
 }
 
-static void put_by(ebpo_catalogue_held *m, ebpo_context *context)
+/* Keeps a context for later queries, or frees it if there are too many. */
+static void keep_context(ebpo_catalogue_held *m, ebpo_context *context)
 {
     pthread_mutex_lock(&m->opening);
     bool kept = context && m->idle_count < CONTEXTS_KEPT;
@@ -193,7 +196,7 @@ static void held_free(ebpo_catalogue_held *m)
     free(m);
 }
 
-static ebpo_catalogue_held *held_new(const wanted *key)
+static ebpo_catalogue_held *held_new(const model_key *key)
 {
     ebpo_catalogue_held *m = calloc(1, sizeof *m);
     if (!m)
@@ -212,7 +215,7 @@ static ebpo_catalogue_held *held_new(const wanted *key)
 
 /* --- all models, under the lock --- */
 
-static bool same_key(const wanted *a, const wanted *b)
+static bool same_key(const model_key *a, const model_key *b)
 {
     return memcmp(a->digest, b->digest, sizeof a->digest) == 0 && a->share == b->share &&
            a->user == b->user && a->open_file == b->open_file && a->close_file == b->close_file &&
@@ -234,7 +237,8 @@ static void link_first(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
     h->first = m;
 }
 
-static void add_up(const ebpo_catalogue_held *m, ebpo_model_stats *sums)
+/* Adds the statistics of a model, if it is open. */
+static void add_stats(const ebpo_catalogue_held *m, ebpo_model_stats *sums)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
     if (!m->model || ebpo_model_get_stats(m->model, &s) != EBPO_OK)
@@ -252,10 +256,11 @@ static void add_up(const ebpo_catalogue_held *m, ebpo_model_stats *sums)
     sums->distance_loads += s.distance_loads;
 }
 
+/* Closes and removes a model that no thread holds. */
 static void drop_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 {
     if (m->model) {
-        add_up(m, &h->closed_stats);
+        add_stats(m, &h->closed_stats);
         h->closed_stats.memory = 0;
         h->closed++;
     }
@@ -270,20 +275,21 @@ static bool has_capacity(const ebpo_catalogue_models *h, uint64_t size, unsigned
     return h->held + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
 }
 
-/* Closes idle models until `size` more bytes are available. Returns true if these bytes are
- * available, or if no other model is used, so that waiting would not make memory available. */
-static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *but)
+/* Closes models that no thread holds, but not `kept`, until `size` more bytes are available.
+ * Returns true if these bytes are available, or if no model is held, so that waiting would not make
+ * memory available. */
+static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *kept)
 {
-    unsigned more = but == NULL;
+    unsigned more = kept == NULL;
     for (ebpo_catalogue_held *m = h->last, *next; m && !has_capacity(h, size, more); m = next) {
         next = m->before;
-        if (!m->users && m != but)
+        if (!m->users && m != kept)
             drop_model(h, m);
     }
     return has_capacity(h, size, more) || !h->busy;
 }
 
-static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const wanted *key)
+static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const model_key *key)
 {
     ebpo_catalogue_held *m = h->first;
     while (m && !same_key(&m->key, key))
@@ -294,13 +300,13 @@ static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const wan
 static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c)
 {
     uint64_t share = h->memory / (c->count < SHARES ? c->count : SHARES);
-    return h->memory && !share ? 1 : share; /* 0 would mean no limit */
+    return h->memory && !share ? 1 : share; /* because 0 means no limit */
 }
 
 /* Returns the model with this key, which may be new, and counts the calling thread as its user.
  * Returns NULL when memory is short. */
 static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
-                                          wanted *key)
+                                          model_key *key)
 {
     ebpo_catalogue_held *m;
     pthread_mutex_lock(&h->lock);
@@ -322,9 +328,8 @@ static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_c
         link_first(h, m);
         if (!m->users++) {
             h->busy++;
-            h->taken +=
-                key->share -
-                m->bytes; /* while the model is used, it may need any memory up to its share */
+            /* while the model is used, it may use any memory up to its share */
+            h->taken += key->share - m->bytes;
             m->bytes = key->share;
         }
     }
@@ -333,7 +338,7 @@ static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_c
 }
 
 /* Ends the calling thread's use of a model; removes a model that could not be opened. */
-static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
+static void release_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
     pthread_mutex_lock(&h->lock);
@@ -352,8 +357,8 @@ static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 
 /* --- lending --- */
 
-/* Runs a query while no other query of the model runs. Contexts hold the last used subtrees. Idle
- * contexts are freed first, so that their memory is available for this query. */
+/* Runs a query while no other query of the model runs. Idle contexts, which keep the last used
+ * subtrees in memory, are freed first, so that their memory is available for this query. */
 static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_query, void *user,
                                ebpo_error *error)
 {
@@ -364,18 +369,18 @@ static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_
     ebpo_status status = ebpo_context_new(m->model, &context, error);
     if (status == EBPO_OK)
         status = run_query(context, m, user, error);
-    put_by(m, context);
+    keep_context(m, context);
     pthread_rwlock_unlock(&m->query_lock);
     return status;
 }
 
-static wanted key_of(const ebpo_catalogue *c, const ebpo_catalogue_entry *e, bool surface)
+static model_key key_of(const ebpo_catalogue *c, const ebpo_catalogue_entry *e, bool surface)
 {
-    wanted key = { .path = surface ? e->surface : e->path,
-                   .numbers = surface || !e->surface ? e->numbers : NULL,
-                   .open_file = c->how.open_file,
-                   .close_file = c->how.close_file,
-                   .user = c->how.user };
+    model_key key = { .path = surface ? e->surface : e->path,
+                      .numbers = surface || !e->surface ? e->numbers : NULL,
+                      .open_file = c->how.open_file,
+                      .close_file = c->how.close_file,
+                      .user = c->how.user };
     memcpy(key.digest, surface ? e->surface_digest : e->digest, sizeof key.digest);
     return key;
 }
@@ -386,35 +391,35 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
 {
     ebpo_context *context = NULL;
     const ebpo_catalogue_entry *e = &c->entry[number];
-    wanted key = key_of(c, e, surface && e->surface);
+    model_key key = key_of(c, e, surface && e->surface);
     ebpo_catalogue_held *m = acquire_model(models, c, &key);
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
     pthread_rwlock_rdlock(&m->query_lock);
-    ebpo_status status = ready_model(models, c, m, &context, error);
+    ebpo_status status = prepare_model(models, c, m, &context, error);
     if (status == EBPO_OK)
         status = check_box(c, e, m, error);
     if (status == EBPO_OK)
         status = run_query(context, m, user, error);
     bool run_alone = status == EBPO_E_LIMIT && context;
-    put_by(m, context);
+    keep_context(m, context);
     pthread_rwlock_unlock(&m->query_lock);
     if (run_alone)
         status = query_alone(m, run_query, user, error);
-    give_back(models, m);
+    release_model(models, m);
     return status;
 }
 
 bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
-    wanted key = key_of(c, c->entry, false);
+    model_key key = key_of(c, c->entry, false);
     pthread_mutex_lock(&models->lock);
     key.share = share_of(models, c);
     const ebpo_catalogue_held *m = c->count == 1 ? find_model(models, &key) : NULL;
-    bool whole = m && m->model && ebpo_model_get_stats(m->model, &s) == EBPO_OK && s.resident;
+    bool in_memory = m && m->model && ebpo_model_get_stats(m->model, &s) == EBPO_OK && s.resident;
     pthread_mutex_unlock(&models->lock);
-    return whole;
+    return in_memory;
 }
 
 ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *face,
@@ -427,14 +432,15 @@ ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *fac
 
 /* --- creating and freeing --- */
 
-/* Returns the maximum number of open models. They may use half of the files that the system allows
- * to be open. */
-static unsigned may_be_open(void)
+/* Returns the maximum number of open models. They may use half of the file descriptors that the
+ * system allows. */
+static unsigned max_open_models(void)
 {
-    struct rlimit most;
-    if (getrlimit(RLIMIT_NOFILE, &most) != 0 || most.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MAX)
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0 ||
+        limit.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MAX)
         return OPEN_MAX;
-    unsigned fit = (unsigned)most.rlim_cur / (2 * DESCRIPTORS_EACH);
+    unsigned fit = (unsigned)limit.rlim_cur / (2 * DESCRIPTORS_EACH);
     return fit ? fit : 1;
 }
 
@@ -452,7 +458,7 @@ ebpo_status ebpo_catalogue_models_new(const ebpo_catalogue_models_options *optio
     h->memory = own.memory;
     h->threads = own.threads;
     h->closed_stats = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
-    h->open_max = may_be_open();
+    h->open_max = max_open_models();
     pthread_mutex_init(&h->lock, NULL);
     pthread_cond_init(&h->changed, NULL);
     *out = h;
@@ -499,7 +505,7 @@ ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *h,
     ebpo_model_stats all = h->closed_stats;
     n.closed = h->closed;
     for (const ebpo_catalogue_held *m = h->first; m; m = m->behind) {
-        add_up(m, &all);
+        add_stats(m, &all);
         n.open += m->model != NULL;
     }
     all.budget = h->memory;

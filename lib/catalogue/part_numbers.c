@@ -1,10 +1,10 @@
-/* Reads the index in the whole model of each face of a part. The file is a .npy file of integers
- * with one dimension (NumPy's format, versions 1 to 3). Any thread may read single numbers when
- * they are needed.
+/* Reads the index of a part's face in the whole model. The file is a .npy file of integers with one
+ * dimension (NumPy's format, versions 1 to 3). Any thread may read single indices when they are
+ * needed.
  *
  * The file is untrusted input, as is the catalogue that refers to it. Its header is read once: the
- * type, the byte order, and the count of numbers, which must match the file's size. A number that
- * is negative or beyond 2^63 is refused when it is read. */
+ * type, the byte order, and the number of indices, for which the file must be long enough. An index
+ * that is negative or beyond 2^63 is refused when it is read. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -16,6 +16,7 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
+/* Maximum length in bytes of a header with the bytes before it. */
 enum { HEAD_MAX = 4096 };
 
 static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *error, const char *what)
@@ -61,16 +62,16 @@ static ebpo_status read_head(ebpo_catalogue_numbers *f, ebpo_error *error)
 {
     char text[HEAD_MAX + 1];
     struct stat st;
-    ssize_t got = pread(f->fd, text, HEAD_MAX, 0);
+    ssize_t received = pread(f->fd, text, HEAD_MAX, 0);
     const unsigned char *b = (const unsigned char *)text;
-    if (got < 0)
+    if (received < 0)
         return ebpo_fail_errno(error, f->path, "cannot be read");
-    if (got < 12 || memcmp(text, "\x93NUMPY", 6) != 0 || b[6] < 1 || b[6] > 3)
+    if (received < 12 || memcmp(text, "\x93NUMPY", 6) != 0 || b[6] < 1 || b[6] > 3)
         return bad_numbers(f, error, "invalid start of the file");
     size_t first = b[6] == 1 ? 10 : 12, length = (size_t)b[8] | (size_t)b[9] << 8;
     if (b[6] > 1)
         length |= (size_t)b[10] << 16 | (size_t)b[11] << 24;
-    if (length > (size_t)got - first)
+    if (length > (size_t)received - first)
         return bad_numbers(f, error, "the header is too long");
     text[first + length] = 0;
     if (strlen(text + first) != length || !read_type(f, value_of(text + first, "'descr'")) ||
@@ -92,12 +93,11 @@ ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *p
     if (fd < 0)
         return ebpo_fail_file(error,
                               errno == ENOENT || errno == ENOTDIR ? EBPO_E_FORMAT : EBPO_E_IO, path,
-                              "cannot be read as a .npy: %s", strerror(errno));
+                              "cannot be read as a .npy file: %s", strerror(errno));
     if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
         ebpo_catalogue_numbers_close(f);
         return ebpo_fail_file(error, EBPO_E_FORMAT, path,
-                              "cannot be read as a .npy: not a regular "
-                              "file");
+                              "cannot be read as a .npy file: not a regular file");
     }
     ebpo_status status = read_head(f, error);
     if (status != EBPO_OK)
@@ -118,17 +118,17 @@ ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f, uint64_t
     unsigned char b[8];
     uint64_t number = 0;
     if (*face >= f->count)
-        return ebpo_fail_file(error, EBPO_E_FORMAT, f->path, "has no number of face %" PRIu64,
+        return ebpo_fail_file(error, EBPO_E_FORMAT, f->path, "has no index for face %" PRIu64,
                               *face);
     if (pread(f->fd, b, f->bytes, (off_t)(f->begin + (int64_t)(*face * f->bytes))) !=
         (ssize_t)f->bytes)
-        return ebpo_fail_file(error, EBPO_E_IO, f->path, "cannot be read at number %" PRIu64,
-                              *face);
+        return ebpo_fail_file(error, EBPO_E_IO, f->path,
+                              "the index for face %" PRIu64 " cannot be read", *face);
     for (unsigned i = 0; i < f->bytes; i++)
         number = number << 8 | b[f->big_endian ? i : f->bytes - 1 - i];
     if ((f->is_signed || f->bytes == 8) && number >> (8 * f->bytes - 1))
         return ebpo_fail_file(error, EBPO_E_FORMAT, f->path,
-                              "number %" PRIu64 " is negative or beyond 2^63", *face);
+                              "the index for face %" PRIu64 " is negative or beyond 2^63", *face);
     *face = number;
     return EBPO_OK;
 }
