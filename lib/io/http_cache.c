@@ -368,7 +368,7 @@ struct ebpo_cached_range {
     uint64_t begin, end; /* bytes of the file */
     uint64_t wanted;     /* hinted bytes that are not read yet */
     uint64_t last_hint;  /* number of the last prefetch hint that included the range */
-    uint64_t used;       /* time of the last read, by the clock of ebpo_range_cache */
+    uint64_t used;       /* time of the last read; see `clock` of ebpo_range_cache */
     bool fresh;          /* the range counts the bytes of the current prefetch hint (add_wanted) */
     range_state state;
     unsigned users; /* number of threads that need the range to stay in the list */
