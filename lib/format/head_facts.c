@@ -1,9 +1,9 @@
 /* Writes and reads the HDF5 attributes of a file's root and of its levels: the values of ebpo_info.
  * A fact is one attribute. The tables in the first part have one row for each attribute. Writing
  * and reading loop over these rows, and so agree on names and types. A reader rejects a newer
- * version and unknown required parts before it reads anything else. The functions check_... test
- * ranges, and sums over the levels, before memory is allocated by these values. Source:
- * format-spec/README.md, section 5. */
+ * version and unknown required parts before it reads anything else. Then the functions check_...
+ * test ranges of values, and sums over the levels, before memory of these sizes is allocated.
+ * Source: format-spec/README.md, section 5. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -46,7 +46,6 @@ typedef struct fact {
 
 #define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
 
-enum { WELD_FACTS = 3 };
 /* A word in the attributes required_parts and optional_parts. A reader may ignore an unknown
  * optional part, but without a required part it would return wrong results. */
 typedef struct part_word {
@@ -170,6 +169,8 @@ static const int selection_fact_count = sizeof selection_facts / sizeof selectio
 static const fact dropped_faces_fact = { "mend_dropped_faces", FACT_COUNT,
                                          FACT_AT(repair_record.dropped_faces) };
 
+enum { WELD_FACTS = 3 };
+
 /* Attributes of files whose vertices were welded within a distance. */
 static const fact weld_facts[WELD_FACTS] = {
     { "mend_weld_distance", FACT_REAL, FACT_AT(repair_record.weld_distance) },
@@ -267,13 +268,13 @@ static const char *check_border(const ebpo_info *info)
 
 static const char *check_surface(const ebpo_info *info)
 {
-    const uint64_t most = UINT64_C(1) << 40; /* format-spec/surface.md, RL.1 */
+    const uint64_t limit = UINT64_C(1) << 40; /* format-spec/surface.md, RL.1 */
     if (!(info->parts & EBPO_PART_SURFACE))
         return NULL;
     bool possible = info->surface_patches > 0 && info->surface_patches <= info->surface_triangles &&
                     info->surface_triangles <= info->surface_code_bytes &&
-                    info->surface_code_bytes <= most && info->surface_vertices >= 3 &&
-                    info->surface_vertices <= most &&
+                    info->surface_code_bytes <= limit && info->surface_vertices >= 3 &&
+                    info->surface_vertices <= limit &&
                     (info->surface_colours == 0 || info->surface_colours == info->surface_vertices);
     return possible ? NULL : "the counts of the simplified surface are impossible";
 }
@@ -322,8 +323,7 @@ static const char *check_level_counts(const ebpo_info *info, int level)
     if (info->pruned ? s->pruned_count > s->gray_count || (s->pruned_count == s->gray_count) < last
                      : s->pruned_count != 0)
         return "a level has more pruned nodes than gray nodes, or the deepest level has a gray "
-               "node "
-               "that is not pruned";
+               "node that is not pruned";
     if (!last && info->pruned &&
         (s->pruned_count == s->gray_count ||
          info->level[level + 1].white_count / 8 < s->pruned_count))
@@ -428,11 +428,11 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
                              bool required, ebpo_error *error)
 {
     char words[128] = "";
-    uint32_t has = info->parts | (info->pruned ? WORD_PRUNED : 0) |
-                   (info->subtree_level ? WORD_SUBTREES : 0) | (info->gates ? WORD_GATES : 0);
+    uint32_t parts = info->parts | (info->pruned ? WORD_PRUNED : 0) |
+                     (info->subtree_level ? WORD_SUBTREES : 0) | (info->gates ? WORD_GATES : 0);
     for (int i = 0; i < part_word_count; i++)
         if (part_words[i].required == required &&
-            (!part_words[i].part || has & part_words[i].part)) {
+            (!part_words[i].part || parts & part_words[i].part)) {
             size_t used = strlen(words);
             snprintf(words + used, sizeof words - used, "%s%s", used ? " " : "",
                      part_words[i].word);
@@ -728,17 +728,17 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
 
 /* Sets the bit of a part in *found (bit i: part_words[i]). A known part may be in the list of
  * required or in that of optional parts, but only once. An unknown required part is an error. */
-static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, unsigned *found,
+static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, unsigned *listed,
                              ebpo_error *error)
 {
     for (int i = 0; i < part_word_count; i++) {
         if (strcmp(word, part_words[i].word) != 0)
             continue;
-        if (*found >> i & 1)
+        if (*listed >> i & 1)
             return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
                                   "part \"%s\" is listed twice; get a fresh copy of the file",
                                   word);
-        *found |= 1u << i;
+        *listed |= 1u << i;
         return EBPO_OK;
     }
     if (!required)
@@ -751,7 +751,7 @@ static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, uns
 static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                              ebpo_error *error)
 {
-    unsigned found = 0;
+    unsigned listed = 0;
     for (int required = 1; required >= 0; required--) {
         const char *name = required ? "required_parts" : "optional_parts";
         char words[1024], *remaining = words;
@@ -766,21 +766,21 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
             remaining = space ? space + 1 : NULL;
             if (space)
                 *space = 0;
-            status = *word ? mark_part(in, word, required, &found, error)
+            status = *word ? mark_part(in, word, required, &listed, error)
                            : wrong_value(in, "/", name, error);
         }
         if (status != EBPO_OK)
             return status;
     }
     for (int i = 0; i < part_word_count; i++)
-        if (found >> i & 1)
+        if (listed >> i & 1)
             info->parts |= part_words[i].part;
     info->pruned = info->parts & WORD_PRUNED;
     info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* get_subtrees replaces the 1 */
     info->gates = info->parts & WORD_GATES;
     info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES);
     /* bit 0: the part `levels`, which every file has */
-    return found & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
+    return listed & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }
 
 static ebpo_status get_subtrees(ebpo_head *in, ebpo_head_object root, ebpo_info *info,

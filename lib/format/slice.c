@@ -219,8 +219,8 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_quota *space, ebpo_error
     if (status == EBPO_OK)
         localise_faces(slice, &shared);
     if (status == EBPO_OK && shared.count) {
-        uint32_t *fit = ebpo_realloc(shared.sorted, shared.count, sizeof *fit);
-        slice->shared = fit ? fit : shared.sorted;
+        uint32_t *shrunk = ebpo_realloc(shared.sorted, shared.count, sizeof *shrunk);
+        slice->shared = shrunk ? shrunk : shared.sorted;
         slice->shared_count = (uint32_t)shared.count;
         shared.sorted = NULL;
     }

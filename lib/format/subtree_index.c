@@ -428,11 +428,11 @@ ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group
     return status;
 }
 
-/* Adds values to *sum. Returns false if a value is 2^40 or more, or if the sum is 2^62 or more.
- * Only values of 64 bits can be so large. */
+/* Adds values to *sum. Returns false if a value is 2^40 or more, or if the sum is 2^62 or more. A
+ * value can be 2^40 or more only if it has 64 bits. */
 static bool sum_rows(const uint8_t *rows, unsigned element_size, uint64_t count, uint64_t *sum)
 {
-    uint64_t total = 0, all = 0;
+    uint64_t total = 0, all = 0; /* all: bits that are set in any value */
     switch (element_size) {
     case 1:
         for (uint64_t i = 0; i < count; i++)
@@ -487,28 +487,28 @@ static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                                                          1, row, sizeof *row, error);
 }
 
-/* Finds the subtree that contains an item of a level below the subtrees' roots. `what`: EBPO_S_GRAY
- * and so on, the kind of the item (also in the functions below). */
-static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned what, uint64_t item,
+/* Finds the subtree that contains an item of a level below the subtrees' roots. `kind`: the kind of
+ * the item, EBPO_S_GRAY and so on (also in the functions below). */
+static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned kind, uint64_t item,
                                 ebpo_subtree_row *row, ebpo_error *error)
 {
-    return ebpo_subtree_table_find(chunks, ebpo_subtree_column(&chunks->file->info, level, what),
+    return ebpo_subtree_table_find(chunks, ebpo_subtree_column(&chunks->file->info, level, kind),
                                    item, row, error);
 }
 
 /* Returns the number of items of a level before the row's subtree. */
 static uint64_t items_before(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
-                             unsigned what)
+                             unsigned kind)
 {
-    return row->before[ebpo_subtree_column(&chunks->file->info, level, what)];
+    return row->before[ebpo_subtree_column(&chunks->file->info, level, kind)];
 }
 
 /* Returns the number of items of a level in the row's subtree. */
 static uint64_t items_in(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
-                         unsigned what)
+                         unsigned kind)
 {
-    return row->after[ebpo_subtree_column(&chunks->file->info, level, what)] -
-           items_before(chunks, row, level, what);
+    return row->after[ebpo_subtree_column(&chunks->file->info, level, kind)] -
+           items_before(chunks, row, level, kind);
 }
 
 static const char *const contradicts = "the index contradicts the counts in the header";
@@ -538,15 +538,15 @@ static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtre
                : row_contradicts(chunks, error);
 }
 
-/* Checks column `what` of a row: it must be the sum of array `id` over the subtree's nodes of the
+/* Checks column `kind` of a row: it must be the sum of array `id` over the subtree's nodes of the
  * level. `nodes`: the column that counts these nodes. */
 static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
-                              ebpo_array_id id, unsigned nodes, unsigned what, ebpo_error *error)
+                              ebpo_array_id id, unsigned nodes, unsigned kind, ebpo_error *error)
 {
     uint64_t sum = 0;
     ebpo_status status = ebpo_chunks_sum(chunks, id, level, items_before(chunks, row, level, nodes),
                                          items_in(chunks, row, level, nodes), &sum, error);
-    return status != EBPO_OK || sum == items_in(chunks, row, level, what)
+    return status != EBPO_OK || sum == items_in(chunks, row, level, kind)
                ? status
                : row_contradicts(chunks, error);
 }
@@ -753,9 +753,9 @@ static void hint_rows(const hinting *t, ebpo_array_id id, int level, uint64_t be
 
 /* Returns the number of items of a level before the first subtree; if `after` is true, up to the
  * end of the last subtree. */
-static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool after)
+static uint64_t subtree_sum(const hinting *t, int level, unsigned kind, bool after)
 {
-    unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
+    unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, kind);
     return after ? t->last->after[column] : t->first->before[column];
 }
 

@@ -66,7 +66,8 @@ static void add_vertex(recent *r, uint32_t v)
 }
 
 /* Adds the edges of a triangle in the direction that they have in the neighbouring triangles.
- * `with_first`: false: not the edge from t[0] to t[1], over which the triangle was reached. */
+ * `with_first`: true to add also the edge from t[0] to t[1]; false if the triangle was reached over
+ * this edge. */
 static void add_edges(recent *r, const uint32_t t[3], bool with_first)
 {
     if (with_first)
@@ -173,9 +174,7 @@ static uint32_t new_number(coder *c, uint32_t former, prediction from)
     return c->number[former] = c->next++;
 }
 
-/* Encodes a triangle at recent edge number `edge`. i: corner of the triangle where this edge
- * begins.
- */
+/* Encodes a triangle at recent edge `edge`. i: corner of the triangle where this edge begins. */
 static void put_attached(coder *c, unsigned edge, uint32_t i)
 {
     recent_edge e = c->recent.edge[edge];
@@ -212,12 +211,13 @@ static void put_free(coder *c, uint64_t triangle)
     add_edges(&c->recent, t, true);
 }
 
-/* Encodes all triangles: the next at the most recent edge that has one, or the first that is not
- * encoded. Vertices without triangles get the last numbers. */
+/* Encodes all triangles. The next triangle is one at the most recent edge that has a triangle which
+ * is not yet encoded. If no recent edge has such a triangle, the next triangle is the first that is
+ * not yet encoded. Vertices without triangles get the last numbers. */
 static void put_triangles(coder *c)
 {
     uint64_t first = 0;
-    for (uint64_t left = c->in->triangle_count; left; left--) {
+    for (uint64_t remaining = c->in->triangle_count; remaining; remaining--) {
         uint32_t i = NONE;
         unsigned edge = 0;
         for (; edge < c->recent.edges && i == NONE; edge += i == NONE)
@@ -272,6 +272,8 @@ static void decode_normal(const uint8_t in[2], float out[3])
     out[2] = (float)(z / length);
 }
 
+/* Returns the number that stands for a difference of 16 bits: 0, -1, 1, -2, ... become 0, 1, 2, 3,
+ * ... */
 static uint16_t encode_zigzag(int32_t value)
 {
     int16_t wrapped = (int16_t)(uint16_t)value;
@@ -378,6 +380,7 @@ static bool take_new(decoder *d, prediction from, uint32_t *out)
     return true;
 }
 
+/* Decodes a triangle that has no recent edge, after its first byte. */
 static bool get_free(decoder *d, uint32_t t[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -393,6 +396,7 @@ static bool get_free(decoder *d, uint32_t t[3])
     return true;
 }
 
+/* Decodes the next triangle. t: the numbers of its vertices. */
 static bool get_triangle(decoder *d, uint32_t t[3])
 {
     if (d->code == d->end)
@@ -744,9 +748,9 @@ static ebpo_status read_rows(const ebpo_file *file, ebpo_array_id id, uint64_t f
         t.to && reader ? EBPO_OK : ebpo_fail_memory(error, (end - first) * cols * t.size);
     for (uint64_t k = first / rows; first < end && k * rows < end && status == EBPO_OK; k++) {
         status = ebpo_reader_chunk(file, array, k, &reader->reader, reader->raw, error);
-        uint64_t left = array->shape.rows - k * rows;
+        uint64_t remaining = array->shape.rows - k * rows;
         if (status == EBPO_OK)
-            take_rows(&t, array, k * rows, left < rows ? left : rows, reader->raw);
+            take_rows(&t, array, k * rows, remaining < rows ? remaining : rows, reader->raw);
     }
     ebpo_idle_readers_give(&ebpo_reader_own(file)->idle, reader);
     return status;

@@ -6,9 +6,10 @@
 #include "format/file_in.h"
 #include "geometry/cells.h"
 
-/* The vertices of a patch are on a grid of 2^EBPO_PATCH_GRID steps along each axis of the node's
- * cell. Each cell EBPO_PATCH_CELLS levels below the node has at most one vertex on the border of
- * the patch. EBPO_PATCH_LEVEL: deepest level of nodes with patches. */
+/* EBPO_PATCH_GRID: the vertices of a patch are on a grid of 2^EBPO_PATCH_GRID steps along each axis
+ * of the node's cell. EBPO_PATCH_CELLS: the border of a patch has at most one vertex in each cell
+ * that is EBPO_PATCH_CELLS levels below the node. EBPO_PATCH_LEVEL: deepest level of nodes with
+ * patches. */
 enum { EBPO_PATCH_GRID = 10, EBPO_PATCH_CELLS = 5, EBPO_PATCH_LEVEL = 14 };
 
 /* A patch to encode. */

@@ -41,7 +41,7 @@ static const double STALE_SECONDS = 3600;
 
 struct ebpo_disk {
     int folder;            /* descriptor of the folder */
-    uint64_t limit;        /* greatest number of bytes of all blocks */
+    uint64_t limit;        /* maximum number of bytes of all blocks in the folder */
     char key[65];          /* digest of URL and version: beginning of the blocks' names */
     pthread_mutex_t lock;  /* protects `written` and `number` */
     uint64_t written;      /* bytes that were written since the last trim_folder */
@@ -259,12 +259,12 @@ static bool read_fully(int fd, void *data, size_t size)
 {
     uint8_t *to = data;
     while (size) {
-        ssize_t got = read(fd, to, size);
-        if (got <= 0 && !(got < 0 && errno == EINTR))
+        ssize_t received = read(fd, to, size);
+        if (received <= 0 && !(received < 0 && errno == EINTR))
             return false;
-        if (got > 0) {
-            to += got;
-            size -= (size_t)got;
+        if (received > 0) {
+            to += received;
+            size -= (size_t)received;
         }
     }
     return true;
@@ -274,12 +274,12 @@ static bool write_fully(int fd, const void *data, size_t size)
 {
     const uint8_t *from = data;
     while (size) {
-        ssize_t put = write(fd, from, size);
-        if (put < 0 && errno != EINTR)
+        ssize_t written = write(fd, from, size);
+        if (written < 0 && errno != EINTR)
             return false;
-        if (put > 0) {
-            from += put;
-            size -= (size_t)put;
+        if (written > 0) {
+            from += written;
+            size -= (size_t)written;
         }
     }
     return true;
