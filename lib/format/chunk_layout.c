@@ -41,8 +41,8 @@ enum {
     FIRST_LEVELS = 5,    /* levels 0 to 5 are always stored whole */
     LEAVES_OF_DEEP = 64, /* a deep level has at least one leaf for each 64 faces of the mesh */
     CHUNK_FACES = 16384, /* a chunk of a level has the nodes for about this number of faces */
-    CHUNK_LEAST = 256,   /* least bytes of a chunk of a level */
-    CHUNK_MAX = 32768,   /* most bytes of a chunk of a level */
+    CHUNK_LEAST = 256,   /* minimum size of a chunk of a level, in bytes */
+    CHUNK_MAX = 32768,   /* maximum size of a chunk of a level, in bytes */
     /* rows of a chunk of other arrays */
     MAP_ROWS = 2048,        /* /maps/vertex_source */
     FACES_INDEX_ROWS = 512, /* /mesh/faces_index */
@@ -74,12 +74,12 @@ static int first_deep_level(const ebpo_info *info)
  * 2^40 rows, so both sides are below 2^64 before squaring. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
-    uint64_t wanted = rows * CHUNK_FACES, found = 1;
-    for (;; found *= 2) {
-        uint64_t product = found * info->face_count;
+    uint64_t wanted = rows * CHUNK_FACES, power = 1;
+    for (;; power *= 2) {
+        uint64_t product = power * info->face_count;
         if (!ebpo_wide_less(ebpo_wide_left(ebpo_wide_product(product, product), 1),
                             ebpo_wide_product(wanted, wanted)))
-            return found;
+            return power;
     }
 }
 
@@ -101,22 +101,22 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     }
     if (id >= EBPO_LEVEL_ARRAYS || level <= last_whole_level(info) || ebpo_schema_is_index(id))
         return UINT64_MAX;
-    uint64_t found = rows_for_faces(info, rows);
-    while (found * row_bytes < CHUNK_LEAST)
-        found *= 2;
-    while (found * row_bytes > CHUNK_MAX)
-        found /= 2;
-    return found;
+    uint64_t chunk_rows = rows_for_faces(info, rows);
+    while (chunk_rows * row_bytes < CHUNK_LEAST)
+        chunk_rows *= 2;
+    while (chunk_rows * row_bytes > CHUNK_MAX)
+        chunk_rows /= 2;
+    return chunk_rows;
 }
 
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size)
 {
-    uint32_t most = ebpo_full_chunk_rows(rows, cols, element_size); /* in a chunk */
+    uint32_t max_rows = ebpo_full_chunk_rows(rows, cols, element_size);
     if (!info->subtree_level)
-        return most;
+        return max_rows;
     uint64_t wanted = wanted_rows(info, id, level, rows, element_size * (cols ? cols : 1));
-    return wanted < most ? (uint32_t)wanted : most;
+    return wanted < max_rows ? (uint32_t)wanted : max_rows;
 }
 
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
@@ -292,11 +292,11 @@ static uint64_t *row_of(const counting *c, uint64_t subtree)
     return c->sums->before + subtree * c->sums->cols;
 }
 
-/* Returns the sum of one column of a level over the subtrees before a subtree. `what`: EBPO_S_GRAY
+/* Returns the sum of one column of a level over the subtrees before a subtree. `kind`: EBPO_S_GRAY
  * and so on. */
-static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned what)
+static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned kind)
 {
-    return row_of(c, subtree)[ebpo_subtree_column(c->info, level, what)];
+    return row_of(c, subtree)[ebpo_subtree_column(c->info, level, kind)];
 }
 
 /* Returns the first group (eight siblings) of a level that belongs to a subtree. */

@@ -161,7 +161,8 @@ void ebpo_chunks_hint(ebpo_chunks *c, ebpo_hints *e, ebpo_array_id id, int level
         (void)ebpo_chunks_missing(c, id, level, row, rows, c->collecting);
     if (c->counted)
         return;
-    uint64_t left = array->shape.rows - row, last = row + (rows < left ? rows : left) - 1;
+    uint64_t remaining = array->shape.rows - row,
+             last = row + (rows < remaining ? rows : remaining) - 1;
     hint_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
 }
 
@@ -243,9 +244,9 @@ static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),
-             left = c->limit > taken ? c->limit - taken : 0,
-             share = smaller_of(left / AHEAD_SHARE, AHEAD_MAX);
-    uint64_t batch = smaller_of(left / BATCH_SHARE, AHEAD_MAX / BATCH_SHARE);
+             remaining = c->limit > taken ? c->limit - taken : 0,
+             share = smaller_of(remaining / AHEAD_SHARE, AHEAD_MAX);
+    uint64_t batch = smaller_of(remaining / BATCH_SHARE, AHEAD_MAX / BATCH_SHARE);
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
@@ -324,8 +325,8 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
     bool missing = false;
     if (!array->present || rows == 0 || row >= array->shape.rows)
         return false;
-    uint64_t left = array->shape.rows - row,
-             last = (row + (rows < left ? rows : left) - 1) / array->shape.chunk_rows;
+    uint64_t remaining = array->shape.rows - row,
+             last = (row + (rows < remaining ? rows : remaining) - 1) / array->shape.chunk_rows;
     for (uint64_t i = row / array->shape.chunk_rows; i <= last; i++) {
         uint64_t key = key_of(array, i);
         if (!ebpo_cache_has(c->cache, key)) {

@@ -86,11 +86,11 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* for remote files and files with a chunk directory, locates only a single chunk now */
-    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
+    uint64_t max_chunks = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
-        ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, id), &a->shape,
-                             coding, &a->chunks, &a->stored_bytes, error);
+        ebpo_head_read_array(head, a->path, max_chunks, ebpo_reader_rows_of_chunk(file, id),
+                             &a->shape, coding, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file, NULL);

@@ -401,11 +401,11 @@ ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint
  * memory. The caller frees the flags. */
 static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_t count)
 {
-    bool *has = ebpo_alloc_zero(ebpo_shape_chunks(&array->shape), sizeof *has);
-    for (uint64_t i = 0; has && i < count; i++)
+    bool *requested = ebpo_alloc_zero(ebpo_shape_chunks(&array->shape), sizeof *requested);
+    for (uint64_t i = 0; requested && i < count; i++)
         if (rows[i] < array->shape.rows)
-            has[rows[i] / array->shape.chunk_rows] = true;
-    return has;
+            requested[rows[i] / array->shape.chunk_rows] = true;
+    return requested;
 }
 
 /* Collects the chunks of vertices, and of their source indices if `parts` has EBPO_PART_MAPS. */
@@ -422,12 +422,13 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0);
     uint64_t number = ebpo_shape_chunks(&array->shape), rows = array->shape.chunk_rows;
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
-    bool *has = ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
-    for (uint64_t i = 0; has && i < number; i++) {
+    bool *requested =
+        ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
+    for (uint64_t i = 0; requested && i < number; i++) {
         uint64_t first = chunks->vertices_before ? chunks->vertices_before[i] : 0,
                  end = chunks->vertices_before && i + 1 < number ? chunks->vertices_before[i + 1]
                                                                  : chunks->file->info.vertex_count;
-        if (!has[i])
+        if (!requested[i])
             continue;
         ebpo_chunks_hint(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
         if (parts & EBPO_PART_MAPS)
@@ -436,7 +437,7 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
             hint_vertices(chunks, &e, first, end - first, parts);
     }
     ebpo_hint_all(&e);
-    free(has);
+    free(requested);
 }
 
 void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
@@ -445,12 +446,13 @@ void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t 
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_VERTICES, 0);
     uint64_t rows = array->shape.chunk_rows;
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
-    bool *has = ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
-    for (uint64_t i = 0; has && i < ebpo_shape_chunks(&array->shape); i++)
-        if (has[i])
+    bool *requested =
+        ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
+    for (uint64_t i = 0; requested && i < ebpo_shape_chunks(&array->shape); i++)
+        if (requested[i])
             hint_vertices(chunks, &e, i * rows, rows, parts);
     ebpo_hint_all(&e);
-    free(has);
+    free(requested);
 }
 
 /* --- reading rows in any order --- */

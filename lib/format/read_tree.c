@@ -51,7 +51,7 @@ typedef struct refs_job {
 
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
 {
-    uint64_t above = first;
+    uint64_t above = first; /* each reference is stored as a distance below `above` */
     for (uint64_t k = 0; k < count; k++) {
         if (refs[k] >= above)
             return false;
@@ -87,14 +87,14 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
 }
 
 /* Compares an index array of the file with the sums `computed`. Does nothing if the file lacks the
- * array, or if the array belongs to one of the parts `without`, which are not read. */
+ * array, or if the array belongs to one of `omitted_parts`, which are not read. */
 static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
-                               int number, uint64_t without, const uint64_t *computed,
+                               int number, uint64_t omitted_parts, const uint64_t *computed,
                                ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, number);
     uint64_t *stored = NULL;
-    if (!array->present || ebpo_schema[id].needs & without)
+    if (!array->present || ebpo_schema[id].needs & omitted_parts)
         return EBPO_OK;
     ebpo_read_options read = ebpo_read_threads(1);
     read.workspace = level->workspace;
@@ -148,16 +148,16 @@ static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *
 
 /* Checks the index arrays of types and of gray nodes. */
 static ebpo_status check_indexes(const ebpo_file *file, int number, const ebpo_level *level,
-                                 uint64_t without, ebpo_error *error)
+                                 uint64_t omitted_parts, ebpo_error *error)
 {
     uint64_t *types = ebpo_index_types(level, number == 0), *gray = ebpo_index_gray(level);
     ebpo_status status = types && gray
                              ? EBPO_OK
                              : ebpo_fail_memory(error, level->group_count / EBPO_INDEX_ROWS * 32);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_TYPES_INDEX, level, number, without, types, error);
+        status = check_index(file, EBPO_A_TYPES_INDEX, level, number, omitted_parts, types, error);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_GRAY_INDEX, level, number, without, gray, error);
+        status = check_index(file, EBPO_A_GRAY_INDEX, level, number, omitted_parts, gray, error);
     free(types);
     free(gray);
     return status;
@@ -180,10 +180,10 @@ static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *le
     return status == EBPO_OK ? finish_lists(file, number, level, error) : status;
 }
 
-static void hint_arrays(const ebpo_file *file, int level, uint32_t without)
+static void hint_arrays(const ebpo_file *file, int level, uint32_t omitted_parts)
 {
     ebpo_hints e = EBPO_HINTS_INIT(file);
-    ebpo_hint_level(&e, level, without);
+    ebpo_hint_level(&e, level, omitted_parts);
     ebpo_hint_all(&e);
 }
 
@@ -274,6 +274,7 @@ static ebpo_status decode_faces(void *context, const ebpo_array_in *array, uint6
     mesh_job *j = context;
     ebpo_check check = ebpo_reader_check(j->file, j->mesh->workspace);
     uint64_t last = ebpo_shape_chunks(&array->shape) - 1;
+    /* number of vertices that the faces so far use */
     uint64_t used = j->faces_index ? j->faces_index[chunk] : 0;
     if (used > j->mesh->vertex_count || (chunk == 0 && used))
         return ebpo_check_fail(&check, -1, "/mesh/faces_index",
@@ -404,7 +405,7 @@ static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t li
 
 /* Returns one past the largest possible source index of a face. Faces that a repair added have
  * indices from source_face_count on. */
-static uint64_t face_limit(const ebpo_info *info)
+static uint64_t face_source_limit(const ebpo_info *info)
 {
     return info->source_face_count + info->repair_record.added_faces;
 }
@@ -433,7 +434,7 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
     status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, &read,
                       &out->vertex_source, error);
     if (status == EBPO_OK)
-        status = read_map(file, EBPO_A_FACE_SOURCE, face_limit(&file->info), &read,
+        status = read_map(file, EBPO_A_FACE_SOURCE, face_source_limit(&file->info), &read,
                           &out->face_source, error);
     if (status != EBPO_OK)
         ebpo_maps_free(out);
@@ -494,11 +495,10 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **position, ebpo_error *error)
 {
-    enum {
-        WORDS = 8
-    }; /* words of `bits` for each entry of `before`, the number of set bits before
-          these words */
+    enum { WORDS = 8 }; /* number of words of `bits` for each entry of `before` */
     uint64_t words = (limit <= UINT32_MAX ? limit : UINT64_C(1) << 32) / 64 + 1;
+    /* bits: bit i is set if i is a source index. before: number of set bits before the words of the
+     * entry */
     uint64_t *bits = ebpo_alloc_zero(words, sizeof *bits);
     uint32_t *before = ebpo_alloc(words / WORDS + 1, sizeof *before),
              *out = ebpo_array_alloc(workspace, count, sizeof *out), sum = 0;
@@ -590,7 +590,7 @@ static ebpo_status to_source_order(const ebpo_file *file, ebpo_mesh *mesh,
                                 file->info.source_vertex_count, &vertex_position, error);
     if (status == EBPO_OK)
         status = sort_by_source(workspace, maps.face_source, mesh->face_count,
-                                face_limit(&file->info), &face_position, error);
+                                face_source_limit(&file->info), &face_position, error);
     ebpo_maps_free(&maps);
     if (status == EBPO_OK)
         status = reorder_vertices(mesh, vertex_position, error);

@@ -43,8 +43,8 @@ typedef enum chunk_list {
 
 /* The headers of a file, while the file is written. */
 typedef struct file_headers {
-    ebpo_plan
-        *plan; /* write_headers and headers_begin_index set the handles of the plan's arrays */
+    /* write_headers and headers_begin_index set the handles of the plan's arrays */
+    ebpo_plan *plan;
     ebpo_h5_out out;
     ebpo_h5_id root;
     ebpo_array_out list[CHUNK_LIST_COUNT]; /* a list without rows is not written */
@@ -337,13 +337,12 @@ typedef struct writer {
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
-    uint64_t
-        *checksum_row; /* [chunks] rows of the list of chunk checksums, if the list is written */
+    /* [chunks] rows of the list of chunk checksums, if the list is written */
+    uint64_t *checksum_row;
     /* [arrays of the plan] index of the array's first row in checksum_row */
     uint64_t *first_checksum;
-    uint64_t
-        *size_row; /* [size_rows] rows so far of the list of chunk sizes, if the list is written
-                    */
+    /* [size_rows] rows so far of the list of chunk sizes, if the list is written */
+    uint64_t *size_row;
     uint64_t size_rows;
     uint64_t top_bytes; /* end of the chunks with which a reader locates a subtree */
     uint64_t index_at;  /* offset of HDF5's chunk indexes; 0: none, or not yet written */
@@ -730,15 +729,15 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
 ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *folder, const char *name,
                             const ebpo_write_options *options, ebpo_file **out, ebpo_error *error)
 {
-    ebpo_publish named = EBPO_PUBLISH_INIT;
+    ebpo_publish publish = EBPO_PUBLISH_INIT;
     char path[EBPO_FOLDER_BYTES + 32];
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    ebpo_status status = ebpo_publish_begin(&named, path, error);
+    ebpo_status status = ebpo_publish_begin(&publish, path, error);
     if (status == EBPO_OK)
-        status = ebpo_tree_write_into(tree, ebpo_publish_path(&named), folder, options, error);
+        status = ebpo_tree_write_into(tree, ebpo_publish_path(&publish), folder, options, error);
     if (status == EBPO_OK)
-        status = ebpo_open_own(ebpo_publish_path(&named), out, error);
-    ebpo_publish_abort(&named);
+        status = ebpo_open_own(ebpo_publish_path(&publish), out, error);
+    ebpo_publish_abort(&publish);
     return status;
 }
 
@@ -754,14 +753,14 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
     ebpo_status status = ebpo_open_own(ebpo_publish_path(out), &file, error);
     if (status != EBPO_OK)
         return status;
-    bool same = memcmp(file->info.content_sha256, from->info.content_sha256,
-                       sizeof file->info.content_sha256) == 0 &&
-                memcmp(file->attributes.sha256, from->attributes.sha256,
-                       sizeof file->attributes.sha256) == 0;
-    if (same)
+    bool are_equal = memcmp(file->info.content_sha256, from->info.content_sha256,
+                            sizeof file->info.content_sha256) == 0 &&
+                     memcmp(file->attributes.sha256, from->attributes.sha256,
+                            sizeof file->attributes.sha256) == 0;
+    if (are_equal)
         status = ebpo_file_check_content(file, read, error);
     ebpo_close(file);
-    if (status != EBPO_OK || same)
+    if (status != EBPO_OK || are_equal)
         return status;
     status = ebpo_file_check_content(from, read, error);
     return status != EBPO_OK

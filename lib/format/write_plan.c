@@ -86,8 +86,7 @@ static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all,
     if (a->rows == 0 ||
         ((vertex || face) && a->rows != (vertex ? info->vertex_count : info->face_count)))
         return "an attribute array of vertices or faces does not have a row for each of them, or "
-               "an "
-               "attribute array has no rows";
+               "an attribute array has no rows";
     for (uint64_t k = 0; k < i; k++)
         if (strcmp(all->array[k].element, a->element) == 0 && all->array[k].rows != a->rows)
             return "two attribute arrays of one element have different numbers of rows";
@@ -408,7 +407,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
             ebpo_points64_encode(tree->mesh.xyz64 + 3 * row, rows, encoded);
         break;
     case EBPO_A_FACES:
-        used = plan->faces_index[row / array->shape.chunk_rows];
+        used = plan->faces_index[row / array->shape.chunk_rows]; /* vertices of earlier chunks */
         /* does not fail, as index_faces has checked the faces */
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, encoded);
         break;
@@ -600,10 +599,10 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
 /* Returns the smallest size of an element, 1, 2 or 4 bytes, that is sufficient for all values. */
 static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, uint64_t count)
 {
-    uint32_t all = 0;
+    uint32_t bits = 0; /* bits that are set in any value */
     EBPO_FOR_ITEMS(level->workspace, i, 0, count)
-        all |= values[i];
-    return all <= UINT8_MAX ? 1 : all <= UINT16_MAX ? 2 : 4;
+        bits |= values[i];
+    return bits <= UINT8_MAX ? 1 : bits <= UINT16_MAX ? 2 : 4;
 }
 
 /* Same as narrow_unsigned, for signed values. */
