@@ -1,6 +1,6 @@
 /* Implements the functions of POSIX for files and folders (os_windows.h) with functions of Windows.
  *
- * Every file is opened so that other programs may read, write, rename and remove it meanwhile, as
+ * Every file is opened so that other programs may read, write, rename and remove it at any time, as
  * on POSIX. A removed file loses its name at once if the file system supports this (NTFS),
  * otherwise when it is closed. A path gets the prefix "\\?\", which permits paths of 32,767
  * characters. A descriptor of a folder stands for the folder's current path. */

@@ -254,11 +254,11 @@ static int allocate_blocks(int fd, size_t bytes)
     return fault;
 #else
     static const char zeros[1 << 16];
-    for (size_t left = bytes; left > 0;) {
-        ssize_t done = write(fd, zeros, left < sizeof zeros ? left : sizeof zeros);
+    for (size_t remaining = bytes; remaining > 0;) {
+        ssize_t done = write(fd, zeros, remaining < sizeof zeros ? remaining : sizeof zeros);
         if (done < 0 && errno != EINTR)
             return errno;
-        left -= done > 0 ? (size_t)done : 0;
+        remaining -= done > 0 ? (size_t)done : 0;
     }
     return 0;
 #endif

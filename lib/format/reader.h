@@ -74,7 +74,7 @@ typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, u
                                     ebpo_error *error);
 
 /* Reads all chunks of an array that is present, and passes them to `take`: in any order, or in
- * ascending order if options->threads is 1. Releases pages of the workspace meanwhile. */
+ * ascending order if options->threads is 1. Releases pages of the workspace while it reads. */
 EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
                                            const ebpo_read_options *options, ebpo_rows_fn take,
                                            void *context, ebpo_error *error);

@@ -70,7 +70,8 @@ static void drop_edge(open_edges *o, uint32_t at)
         o->edge[at] = o->edge[at + 1];
 }
 
-/* Return the position of the newest edge that starts, or ends, at v; o->end if there is none. */
+/* These two functions return the position of the newest edge that starts, or ends, at v. They
+ * return o->end if there is no such edge. */
 static uint32_t find_starting(const open_edges *o, uint32_t v)
 {
     for (uint32_t i = o->end; i > o->begin; i--)
@@ -101,12 +102,12 @@ static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
 static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
 {
     uint64_t wanted = edge_of(a, b);
-    uint32_t least = o->end - o->begin > NEAR ? o->end - NEAR : o->begin, i = o->end;
-    while (i >= least + 8 && !any_of_eight(o->edge + i - 8, wanted))
+    uint32_t first_near = o->end - o->begin > NEAR ? o->end - NEAR : o->begin, i = o->end;
+    while (i >= first_near + 8 && !any_of_eight(o->edge + i - 8, wanted))
         i -= 8;
-    while (i > least && o->edge[i - 1] != wanted)
+    while (i > first_near && o->edge[i - 1] != wanted)
         i--;
-    if (i > least)
+    if (i > first_near)
         drop_edge(o, i - 1);
     else
         push_edge(o, edge_of(b, a));

@@ -48,7 +48,7 @@ static bool is_compact(ebpo_head_state *s, ebpo_head_cursor c, bool links)
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
     if (version != 0)
         return ebpo_refuse(s, "the object's links or attributes are stored in an unknown way");
-    if (flags & 1)
+    if (flags & 1) /* the greatest creation order follows */
         ebpo_cursor_take(&c, links ? 8 : 2);
     if (ebpo_cursor_u64(&c) != EBPO_NO_ADDRESS && !c.cut)
         return ebpo_refuse_foreign(s, links ? "a group's links are stored outside of its header"
@@ -127,11 +127,12 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     unsigned flags = ebpo_cursor_u8(&c);
     if (flags & 0xc0)
         return ebpo_refuse(s, "the object's header has unknown flags");
+    /* skips the times of the object, and its limits for the storage of attributes */
     ebpo_cursor_take(&c, (flags & 0x20 ? 16 : 0) + (flags & 0x10 ? 4 : 0));
     uint64_t bytes = ebpo_cursor_uint(&c, 1u << (flags & 3));
     if (c.cut)
         return ebpo_refuse(s, damaged_block);
-    *gap = flags & 4 ? 2 : 0;
+    *gap = flags & 4 ? 2 : 0; /* 4: messages have a creation order */
     return read_block(s, h, at, (uint64_t)(c.at - prefix), bytes, *gap);
 }
 

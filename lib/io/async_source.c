@@ -20,12 +20,12 @@
 
 enum {
     HEAD_BYTES = 131072,   /* the first bytes, which opening reads (EBPO_HTTP_HEAD for URLs) */
-    RANGE_BYTES = 4 << 20, /* greatest size of a needed range */
+    RANGE_BYTES = 4 << 20, /* maximum size of a needed range */
     /* smaller gaps between needed ranges are also fetched, which is faster than another request */
     GAP_BYTES = 16384,
     GAP_BYTES_OF_MANY = 32768, /* used instead of GAP_BYTES for more than MANY ranges */
     MANY = 256,
-    COMPACT_COUNT = 1 << 16 /* the wanted ranges are merged each time when so many were added */
+    COMPACT_COUNT = 1 << 16 /* the wanted ranges are merged whenever this number was added */
 };
 
 /* Supplied bytes [begin, end) of the file. */
@@ -366,19 +366,20 @@ void ebpo_async_end(ebpo_async *a, uint64_t operation)
 ebpo_status ebpo_async_needed(ebpo_async *a, const ebpo_range **ranges, size_t *count,
                               ebpo_error *error)
 {
-    uint64_t found = 0;
+    uint64_t needed_count = 0;
     bool added = true;
     pthread_mutex_lock(&a->lock);
     ebpo_status status = a->changed ? fail_changed(a, error) : EBPO_OK;
     merge_wanted(a, a->wanted_count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES);
     for (uint64_t i = 0; i < a->wanted_count && added; i++)
-        added = add_needed(a, a->wanted[i].offset, a->wanted[i].offset + a->wanted[i].size, &found);
+        added = add_needed(a, a->wanted[i].offset, a->wanted[i].offset + a->wanted[i].size,
+                           &needed_count);
     if (!added && status == EBPO_OK)
-        status = ebpo_fail_memory(error, (found + 1) * sizeof *a->needed);
+        status = ebpo_fail_memory(error, (needed_count + 1) * sizeof *a->needed);
     a->wanted_count = 0;
     pthread_mutex_unlock(&a->lock);
     *ranges = a->needed;
-    *count = status == EBPO_OK ? (size_t)found : 0;
+    *count = status == EBPO_OK ? (size_t)needed_count : 0;
     return status;
 }
 

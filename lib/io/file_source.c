@@ -81,18 +81,18 @@ ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void 
 {
     uint8_t *next = to;
     while (bytes) {
-        ssize_t got =
+        ssize_t received =
             pread(file->fd, next, bytes < READ_BYTES ? (size_t)bytes : READ_BYTES, (off_t)at);
-        if (got < 0 && errno == EINTR)
+        if (received < 0 && errno == EINTR)
             continue;
-        if (got < 0)
+        if (received < 0)
             return ebpo_fail_errno(error, path, "cannot be read");
-        if (got == 0)
+        if (received == 0)
             return ebpo_fail_file(error, EBPO_E_IO, path,
                                   "became shorter while it was read; read it again");
-        next += got;
-        at += (uint64_t)got;
-        bytes -= (uint64_t)got;
+        next += received;
+        at += (uint64_t)received;
+        bytes -= (uint64_t)received;
     }
     return EBPO_OK;
 }
@@ -133,8 +133,8 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
                              "reading", error);
 }
 
-/* Compares the file's current content with the loaded bytes. *same: true if they are equal. */
-static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *same,
+/* Compares the file's current content with the loaded bytes. *equal: true if they are equal. */
+static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *equal,
                                  ebpo_error *error)
 {
     enum { STEP = 1 << 16 };
@@ -142,13 +142,13 @@ static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, 
     uint8_t *current = ebpo_alloc(STEP, 1);
     if (!current)
         return ebpo_fail_memory(error, STEP);
-    *same = true;
+    *equal = true;
     EBPO_FOR_ITEMS_EVERY(file->workspace, 64, step, 0, (file->size + STEP - 1) / STEP) {
         uint64_t at = step * STEP, remaining = file->size - at;
         size_t bytes = remaining < STEP ? (size_t)remaining : STEP;
         status = ebpo_whole_file_read(file, at, current, bytes, path, error);
-        *same = status == EBPO_OK && memcmp(current, file->data + at, bytes) == 0;
-        if (!*same)
+        *equal = status == EBPO_OK && memcmp(current, file->data + at, bytes) == 0;
+        if (!*equal)
             break;
     }
     free(current);
@@ -161,14 +161,14 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
     struct stat st;
     if (fstat(file->fd, &st) != 0)
         return ebpo_fail_errno(error, path, "cannot be examined");
-    bool same = (uint64_t)st.st_size == file->size && st.st_mtim.tv_sec == file->mtime_s &&
-                st.st_mtim.tv_nsec == file->mtime_ns;
+    bool equal = (uint64_t)st.st_size == file->size && st.st_mtim.tv_sec == file->mtime_s &&
+                 st.st_mtim.tv_nsec == file->mtime_ns;
     /* true: the file may have changed although the modification time is equal */
     bool doubtful =
         file->fresh || st.st_ctim.tv_sec != file->ctime_s || st.st_ctim.tv_nsec != file->ctime_ns;
     ebpo_status status =
-        same && doubtful && file->data ? compare_bytes(file, path, &same, error) : EBPO_OK;
-    if (status == EBPO_OK && !same)
+        equal && doubtful && file->data ? compare_bytes(file, path, &equal, error) : EBPO_OK;
+    if (status == EBPO_OK && !equal)
         return ebpo_fail_file(error, EBPO_E_IO, path,
                               "was changed while it was read; read it again");
     return status;
@@ -245,17 +245,17 @@ static int open_folder_by_folder(int top, char *name)
         int below = strcmp(word, "..") == 0
                         ? (errno = EXDEV, -1)
                         : openat(folder, word, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-        int why = errno;
+        int saved_errno = errno;
         close(folder);
-        errno = why;
+        errno = saved_errno;
         folder = below;
     }
     if (folder >= 0) {
         fd = strcmp(word, "..") == 0 ? (errno = EXDEV, -1)
                                      : openat(folder, word, FLAGS | O_NOFOLLOW);
-        int why = errno;
+        int saved_errno = errno;
         close(folder);
-        errno = fd < 0 && why == ELOOP ? EXDEV : why;
+        errno = fd < 0 && saved_errno == ELOOP ? EXDEV : saved_errno;
     }
     return fd;
 }
@@ -268,17 +268,17 @@ int ebpo_open_below(const char *folder, const char *name)
     if (!open_at_once(top, name, &fd)) {
         char *copy = strdup(name);
         fd = copy ? open_folder_by_folder(top, copy) : -1;
-        int why = copy ? errno : ENOMEM;
+        int saved_errno = copy ? errno : ENOMEM;
         free(copy);
-        errno = why;
+        errno = saved_errno;
     }
-    int why = errno;
+    int saved_errno = errno;
     close(top);
-    errno = why;
+    errno = saved_errno;
     return fd;
 }
 
-/* number of bytes that ebpo_bytes_are_text checks */
+/* Number of bytes that ebpo_bytes_are_text checks. */
 enum { CHECKED_BYTES = 512 };
 
 /* Kinds of files by their first bytes. */

@@ -480,7 +480,7 @@ static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
     return at % p->block == 0 && (end - at >= p->block || end == p->size);
 }
 
-/* Reads blocks of a range from disk, from both ends inwards; the lock is released meanwhile. Sets
+/* Reads blocks of a range from disk, from both ends inwards. Releases the lock while it reads. Sets
  * fetch_begin and fetch_end to the part in the middle that must be requested. */
 static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
 {
@@ -682,7 +682,7 @@ void ebpo_range_cache_hint(ebpo_range_cache *p, const ebpo_range *ranges, size_t
 
 /* --- reading --- */
 
-/* Stores the fetched blocks of a range on disk; the lock is released meanwhile. */
+/* Stores the fetched blocks of a range on disk. Releases the lock while it writes. */
 static void store_blocks(ebpo_range_cache *p, ebpo_cached_range *range)
 {
     range->to_store = false;
@@ -705,7 +705,7 @@ static bool is_to_be_stored(const ebpo_cached_range *range)
 }
 
 /* Stores one range on disk that has been fetched but not read, so that its bytes are not lost when
- * the process ends. Returns false if there is no such range. The lock is released meanwhile. */
+ * the process ends. Returns false if there is no such range. Releases the lock while it writes. */
 static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
