@@ -111,10 +111,11 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     *a = (ebpo_array_in){ .id = EBPO_A_ATTRIBUTE, .level = number };
     ebpo_attribute_path(number, a->path);
     /* for remote files and files with a chunk directory, locates only a single chunk now */
-    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
+    uint64_t max_chunks = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     ebpo_status status =
-        ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, EBPO_A_ATTRIBUTE),
-                             &a->shape, coding, &a->chunks, &a->stored_bytes, error);
+        ebpo_head_read_array(head, a->path, max_chunks,
+                             ebpo_reader_rows_of_chunk(file, EBPO_A_ATTRIBUTE), &a->shape, coding,
+                             &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     if (strcmp(coding, EBPO_CODING_COLUMNS_FORMER) == 0)
@@ -197,9 +198,7 @@ static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo
         (items->shape.cols ||
          items->shape.element_size != ebpo_attribute_bytes(file->attributes.head[n].head.type)))
         status = attribute_head_wrong(file, items->path,
-                                      "the array's element size does not match its "
-                                      "type",
-                                      error);
+                                      "the array's element size does not match its type", error);
     return status;
 }
 
@@ -239,10 +238,9 @@ static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK &&
         (header->shape.cols || header->shape.element_size != 1 ||
          header->coding != ebpo_coding_plain || header->shape.rows > EBPO_ATTRIBUTE_HEADER))
-        status = attribute_head_wrong(file, path,
-                                      "the header does not consist of bytes, or is too "
-                                      "long",
-                                      error);
+        status =
+            attribute_head_wrong(file, path, "the header does not consist of bytes, or is too long",
+                                 error);
     return status;
 }
 
@@ -296,7 +294,7 @@ bool ebpo_file_attribute(const ebpo_file *file, unsigned n, ebpo_attribute_facts
 {
     if (n >= file->attributes.count)
         return false;
-    const ebpo_attribute_in *of = &file->attributes.head[n];
+    const ebpo_attribute_in *attribute = &file->attributes.head[n];
     ebpo_attribute_facts facts = { .type = attribute->head.type,
                                    .rows = attribute->head.rows,
                                    .columns = attribute->different ? 0 : attribute->head.columns,

@@ -20,11 +20,11 @@
 
 enum {
     HEAD_BYTES = 262144,     /* bytes for the headers of the copy */
-    DEPTH_MAX = 2,           /* greatest depth of a group: /levels/00 */
-    OBJECTS_MAX = 8192,      /* greatest number of objects and attributes */
-    VALUE_MAX = 65536,       /* greatest number of bytes of an attribute */
+    DEPTH_MAX = 2,           /* maximum depth of a group: /levels/00 */
+    OBJECTS_MAX = 8192,      /* maximum number of objects and attributes */
+    VALUE_MAX = 65536,       /* maximum number of bytes of an attribute */
     LEVEL = 1,               /* compression level: the lowest, because the copy is temporary */
-    CACHE_BYTES = 256 << 20, /* of decoded chunks in libhdf5 */
+    CACHE_BYTES = 256 << 20, /* size of libhdf5's cache of decoded chunks */
     PATH = 96                /* size of a path, including the final zero byte */
 };
 
@@ -166,9 +166,8 @@ static bool can_decode(copying *c, const array_copy *a)
         snprintf(
             what, sizeof what,
             "the array is compressed by HDF5's filter %d (%.40s), which libhdf5 does not have; on "
-            "a "
-            "machine with this filter's plugin, rewrite the file with `h5repack -f SHUF -f GZIP=6 "
-            "-f FLET`",
+            "a machine with this filter's plugin, rewrite the file with "
+            "`h5repack -f SHUF -f GZIP=6 -f FLET`",
             id, *name && ebpo_text_ok(name) ? name : "no name");
         omit_array(c, a->path, what);
         return false;
