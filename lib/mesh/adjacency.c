@@ -12,10 +12,12 @@
 #include "geometry/predicates.h"
 #include "mesh/adjacency.h"
 
-/* Number of faces for each call of a thread's function; maximum length of lists that are sorted by
- * insertion. */
-enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
+enum {
+    FACE_GRAIN = 1 << 15, /* number of faces for each call of a thread's function */
+    INSERTION_LIMIT = 48  /* longer lists are sorted by qsort, shorter lists by insertion */
+};
 
+/* Arguments of the threads that build the stars. */
 typedef struct build {
     const ebpo_mesh *mesh;
     ebpo_stars *stars;
@@ -50,8 +52,8 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Stores a face in the row of vertex v. first[v] is initially the end of the row and counts down to
- * its beginning. */
+/* Stores a face in the star of vertex v. first[v] is initially the end of the star in stars->face,
+ * and counts down to its beginning. */
 static inline void put_face(ebpo_stars *stars, uint32_t v, uint64_t f)
 {
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
@@ -274,7 +276,7 @@ static int normal_sign(const edge *e, const double p[3], int *axis)
 }
 
 /* Compares the angles of two faces around the edge: less than 0 if a comes first, 0 if both have
- * the same angle. */
+ * the same angle. Within quarters 0 and 2 all faces have the same angle. */
 static int compare_angles(const ebpo_edge_face *a, const ebpo_edge_face *b, const edge *e)
 {
     if (a->quarter != b->quarter)
@@ -282,14 +284,15 @@ static int compare_angles(const ebpo_edge_face *a, const ebpo_edge_face *b, cons
     return a->quarter % 2 ? -ebpo_orient3d(e->v, e->w, a->at, b->at) : 0;
 }
 
+/* Compares by angle, and coplanar faces by their source indices. */
 static int compare_turn(const void *x, const void *y, void *context)
 {
     const ebpo_edge_face *a = x, *b = y;
     int by_angle = compare_angles(a, b, context);
     if (by_angle)
         return by_angle;
-    int by_number = a->source < b->source ? -1 : a->source > b->source;
-    return a->reversed ? -by_number : by_number;
+    int by_source = a->source < b->source ? -1 : a->source > b->source;
+    return a->reversed ? -by_source : by_source;
 }
 
 bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v, uint32_t w)

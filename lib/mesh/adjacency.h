@@ -50,7 +50,7 @@ typedef struct ebpo_star {
     ebpo_workspace *workspace; /* workspace of the mesh; set by the first call that gathers */
 } ebpo_star;
 
-/* Gathers the edge uses at vertex v. Returns false when memory is short. */
+/* Gathers the links of all edges at vertex v. Returns false when memory is short. */
 bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh *mesh, uint32_t v);
 void ebpo_star_free(ebpo_star *star);
 
@@ -107,8 +107,8 @@ typedef struct ebpo_edge_face {
      * around the edge: 0: zero; 1: less than a half turn; 2: a half turn; 3: more than a half turn
      */
     uint8_t quarter;
-    bool layered;    /* the face has the same angle as the previous face */
-    bool reversed;   /* among coplanar faces, greater indices come first */
+    bool layered;    /* the face has the same angle as the previous face of the sorted list */
+    bool reversed;   /* true: coplanar faces are sorted by descending source index */
     uint64_t source; /* index in the source */
     double at[3];    /* position of the corner that is not on the edge */
 } ebpo_edge_face;
@@ -125,13 +125,13 @@ bool ebpo_edge_faces_add(ebpo_edge_faces *e, uint32_t face, uint8_t out, uint64_
 /* Sorts the faces by patch. */
 void ebpo_edge_faces_sort(ebpo_edge_faces *e);
 
-/* Sorts the faces by angle around the edge from vertex v to w, exactly, beginning anywhere.
- * Coplanar faces are treated as layers in the order of their source indices, so their order is the
- * same at every shared edge. Returns false if a face has no area. */
+/* Sorts the faces by angle around the edge from vertex v to w, exactly, beginning at the angle of
+ * face[0]. Coplanar faces are treated as layers in the order of their source indices, so the layers
+ * have the same order at every edge that they share. Returns false if a face has no area. */
 bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v, uint32_t w);
 
-/* Returns true if the sorted faces alternate in direction along the edge; coplanar faces may be in
- * any order. */
+/* Returns true if the sorted faces use the edge alternately in one and the other direction;
+ * coplanar faces may be in any order. */
 bool ebpo_edge_faces_alternate(const ebpo_edge_faces *e);
 
 #endif

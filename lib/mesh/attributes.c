@@ -127,8 +127,8 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
            ebpo_array_grow(workspace, &a->values, &a->item_capacity, items, bytes);
 }
 
-/* Appends a note to the text `to` of `size` bytes. Appends "and more" instead when the note does
- * not fit. */
+/* Appends a note to the text `to`, an array of `size` bytes. If the note does not fit, appends "and
+ * more" once. */
 static void append_note(char *to, size_t size, const char *format, va_list args) EBPO_PRINTF(3, 0);
 
 static void append_note(char *to, size_t size, const char *format, va_list args)
@@ -192,12 +192,12 @@ static ebpo_status copy_array(ebpo_attributes *to, const ebpo_attribute *from, e
     return EBPO_OK;
 }
 
-/* Makes attributes from others: `array` borrows or copies each array. */
-static ebpo_status make_of(ebpo_attributes **out, const ebpo_attributes *from,
-                           ebpo_workspace *workspace,
-                           ebpo_status (*array)(ebpo_attributes *to, const ebpo_attribute *from,
-                                                ebpo_error *error),
-                           ebpo_error *error)
+/* Makes attributes with the arrays and the header of `from`. take_array: borrow_array or
+ * copy_array. */
+static ebpo_status make_from(
+    ebpo_attributes **out, const ebpo_attributes *from, ebpo_workspace *workspace,
+    ebpo_status (*take_array)(ebpo_attributes *to, const ebpo_attribute *from, ebpo_error *error),
+    ebpo_error *error)
 {
     *out = NULL;
     if (!from)
@@ -212,7 +212,7 @@ static ebpo_status make_of(ebpo_attributes **out, const ebpo_attributes *from,
     else if (from->header)
         memcpy(made->header, from->header, made->header_bytes = from->header_bytes);
     for (uint64_t i = 0; i < from->count && status == EBPO_OK; i++)
-        status = array(made, &from->array[i], error);
+        status = take_array(made, &from->array[i], error);
     if (status == EBPO_OK)
         *out = made;
     else
@@ -223,23 +223,24 @@ static ebpo_status make_of(ebpo_attributes **out, const ebpo_attributes *from,
 ebpo_status ebpo_attributes_borrow(ebpo_attributes **out, const ebpo_attributes *from,
                                    ebpo_error *error)
 {
-    return make_of(out, from, from ? from->workspace : NULL, borrow_array, error);
+    return make_from(out, from, from ? from->workspace : NULL, borrow_array, error);
 }
 
 ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *from,
                                  ebpo_workspace *workspace, ebpo_error *error)
 {
-    return make_of(out, from, workspace, copy_array, error);
+    return make_from(out, from, workspace, copy_array, error);
 }
 
 /* --- rows --- */
 
+/* The selection of rows of an array into a new array. */
 typedef struct picking {
     ebpo_workspace *workspace;
-    const ebpo_attribute *from;
-    const uint32_t *rows; /* [count] row of `from` for each row of `made` */
+    const ebpo_attribute *from; /* the old array */
+    const uint32_t *rows; /* [count] row of `from` for each row of `made`; no such row: zeros */
     uint64_t count;
-    ebpo_attribute made;
+    ebpo_attribute made; /* the new array */
 } picking;
 
 static void pick_columns(picking *p)
@@ -282,7 +283,8 @@ static void pick_items(picking *p)
     }
 }
 
-/* Writes the selected rows to p->made, which the caller frees. */
+/* Writes the selected rows to p->made, which the caller frees. Returns false when memory is short.
+ */
 static bool pick_rows(picking *p)
 {
     const ebpo_attribute *from = p->from;
@@ -460,8 +462,8 @@ bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, do
 
 /* --- names --- */
 
-/* Name endings that form a group. */
-static const char *const together[][4] = {
+/* Endings of names whose columns form a group, such as position.x, position.y, position.z. */
+static const char *const group_endings[][4] = {
     { "x", "y", "z", NULL },          { "red", "green", "blue", "alpha" },
     { "red", "green", "blue", NULL }, { "r", "g", "b", "a" },
     { "r", "g", "b", NULL },          { "s", "t", NULL, NULL },
@@ -490,8 +492,8 @@ static unsigned count_matching(const char *const ends[4], const ebpo_attribute_n
 
 unsigned ebpo_attribute_names_together(const ebpo_attribute_name *names, unsigned count)
 {
-    for (size_t i = 0; i < sizeof together / sizeof together[0]; i++) {
-        unsigned n = count_matching(together[i], names, count);
+    for (size_t i = 0; i < sizeof group_endings / sizeof group_endings[0]; i++) {
+        unsigned n = count_matching(group_endings[i], names, count);
         if (n > 1)
             return n;
     }

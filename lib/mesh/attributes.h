@@ -1,6 +1,7 @@
 /* Stores the attributes of a mesh: numeric data beyond positions and corners, such as colours,
- * normals and labels. Each array belongs to the vertices or faces, in the order of the source, or
- * to another element of the source. Source: format-spec/attributes.md. For use by one thread. */
+ * normals and labels. Each array belongs to an *element* of the source file, as PLY files define
+ * it: the vertices, the faces, or another list of equal items. Rows are in the order of the source.
+ * Source: format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_ATTRIBUTES_H
 #define EBPO_MESH_ATTRIBUTES_H
 
@@ -11,9 +12,9 @@ enum {
         64, /* greatest number of columns, and of items in lists that become columns */
     EBPO_ATTRIBUTE_ARRAYS = 1000, /* greatest number of arrays of a mesh */
     EBPO_ATTRIBUTE_NO_LIST = -1,
-    EBPO_ATTRIBUTE_HEADER = 1 << 20,   /* greatest size of a header in bytes */
+    EBPO_ATTRIBUTE_HEADER = 1 << 20,   /* greatest size of a source file's header in bytes */
     EBPO_ATTRIBUTE_ELEMENT_BYTES = 64, /* including the terminating zero */
-    EBPO_ATTRIBUTE_NAMES_BYTES = 256
+    EBPO_ATTRIBUTE_NAMES_BYTES = 256   /* including the terminating zero */
 };
 
 typedef struct ebpo_attribute {
@@ -26,7 +27,7 @@ typedef struct ebpo_attribute {
     uint8_t *values; /* [rows][columns] in native byte order; for lists [ends[rows - 1]] */
     /* [rows] number of list items up to the end of each row; NULL: each row has `columns` items */
     uint64_t *ends;
-    uint64_t row_capacity, item_capacity;
+    uint64_t row_capacity, item_capacity; /* rows, and list items, for which there is space */
     bool borrowed; /* values and ends belong to another mesh, which frees them */
 } ebpo_attribute;
 
@@ -67,6 +68,7 @@ static inline bool ebpo_attribute_is_float(ebpo_attribute_type type)
     return type >= EBPO_ATTRIBUTE_FLOAT32;
 }
 
+/* Returns true if the array belongs to this element. */
 bool ebpo_attribute_is_of(const ebpo_attribute *a, const char *element);
 /* Returns true for attributes of the mesh's vertices or faces, which are selected and sorted
  * together with the vertices or faces. */

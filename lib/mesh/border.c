@@ -1,12 +1,14 @@
 /* Finds the border of a mesh: the edges that faces do not use equally often in both directions, and
- * closed loops that they form.
+ * closed loops that these edges form.
  *
- * An edge that faces use n times from a to b and m times from b to a has weight n - m (n > m). The
- * border is the boundary of the faces as a chain, so at each vertex the weights of the edges that
- * arrive and of the edges that leave have equal sums, whatever the mesh: non-manifold, twisted, or
- * with faces turned against each other. A walk along edges of positive weight therefore never ends,
- * until it returns to one of its vertices. There, a simple loop is cut off with the least weight of
- * its edges, which is subtracted from them. Each cut uses up at least one edge.
+ * An edge that faces use n times from a to b and m times from b to a has weight n - m (n > m). A
+ * face arrives at each of its vertices as often as it leaves it. So at each vertex of any mesh
+ * (also non-manifold, twisted, or with neighbouring faces of opposite orientation), the weights of
+ * the edges that arrive and the weights of the edges that leave have equal sums. A walk along edges
+ * of positive weight can therefore continue until it returns to one of its vertices. The part of
+ * the walk from this vertex on is a simple loop. It is cut off: its weight is the least weight of
+ * its edges, and is subtracted from the weight of each of them. So at least one edge of the loop
+ * has the weight 0 afterwards, and the walks come to an end.
  *
  * Walks begin at the least remaining edge and follow the least remaining edge at each vertex, in
  * the source's order, so the result depends neither on threads nor on the order of the mesh. */
@@ -28,14 +30,15 @@ enum { VERTEX_GRAIN = 1 << 13 };
 typedef struct border_edge {
     uint64_t key; /* source indices: from << 32 | to */
     uint32_t from, to;
-    uint32_t weight; /* what remains of it */
-    uint32_t spare;
+    uint32_t weight; /* remaining weight, after the weights of loops that were cut off */
+    uint32_t spare;  /* always 0: the sort copies whole records */
 } border_edge;
 
+/* The edges that one thread has found. */
 typedef struct edge_list {
     border_edge *edge;
     uint64_t count, capacity;
-    ebpo_star star;
+    ebpo_star star; /* scratch memory: the faces at one vertex */
 } edge_list;
 
 typedef struct tracing {
@@ -45,12 +48,14 @@ typedef struct tracing {
     unsigned threads;
     border_edge *edge; /* sorted by key */
     uint64_t count;
-    /* The edges that leave a vertex are contiguous; a vertex is named by the first of them. */
-    uint64_t *start; /* [count] the vertex to which each edge goes */
-    uint64_t *next;  /* [count] of vertices: the first edge that may remain */
-    uint64_t *place; /* [count] of vertices: position on the path plus 1; 0: not on the path */
-    uint64_t *path;  /* edges */
-    uint64_t length, steps;
+    /* The edges that leave a vertex are contiguous. The index of the first of these edges stands
+     * for the vertex in the following arrays. */
+    uint64_t *start; /* [count] for each edge, the vertex at which the edge ends */
+    uint64_t *next;  /* [count] for each vertex, the first edge whose weight may not be 0 yet */
+    uint64_t *place; /* [count] for each vertex, position on the path plus 1; 0: not on the path */
+    uint64_t *path;  /* [length] edges of the current walk that are in no loop yet */
+    uint64_t length;
+    uint64_t steps; /* steps of all walks */
     ebpo_border *out;
 } tracing;
 
@@ -70,7 +75,7 @@ static bool add_edge(const ebpo_mesh *mesh, edge_list *list, uint32_t from, uint
     return true;
 }
 
-/* Collects the edges of which a vertex of the range is the lower one. */
+/* Collects the unbalanced edges whose lower vertex is in the range. */
 static ebpo_status collect_edges(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -125,7 +130,8 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Decides nothing: each pair of vertices is one edge, so keys are unique. */
+/* Compares edges for the sort. Each pair of vertices is one edge, so keys are unique and the result
+ * does not matter. */
 static int compare_edges(const void *a, const void *b)
 {
     const border_edge *x = a, *y = b;
@@ -159,7 +165,7 @@ static ebpo_status sort_edges(tracing *t, ebpo_error *error)
 
 /* --- loops --- */
 
-/* Returns the first edge that leaves a vertex, given by its source index. */
+/* Returns the first edge that leaves a vertex. vertex: source index. */
 static uint64_t find_start(const tracing *t, uint64_t vertex)
 {
     uint64_t low = 0, high = t->count;
@@ -189,8 +195,8 @@ static ebpo_status prepare_walks(tracing *t, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Appends the end of the path, from edge number `from` on, as a loop of the least weight of its
- * edges, and removes it from the path. Returns false when memory is short. */
+/* Moves the end of the path, from position `from` on, to the loops. The weight of the loop is the
+ * least weight of its edges. Returns false when memory is short. */
 static bool cut_loop(tracing *t, uint64_t from)
 {
     ebpo_border *b = t->out;
@@ -217,7 +223,8 @@ static bool cut_loop(tracing *t, uint64_t from)
     return true;
 }
 
-/* Walks from a vertex until no edge that leaves it remains. */
+/* Walks from a vertex, and cuts off loops, until all edges that leave this vertex have the weight
+ * 0. Returns false when memory is short. */
 static bool walk_from(tracing *t, uint64_t vertex)
 {
     uint64_t at = vertex;
@@ -228,7 +235,7 @@ static bool walk_from(tracing *t, uint64_t vertex)
                t->edge[*next].weight == 0)
             ++*next;
         if (*next == t->count || t->edge[*next].from != t->edge[at].from)
-            return true; /* only at the first vertex: weights balance at the others */
+            return true; /* only possible at the walk's first vertex: the others are balanced */
         if (++t->steps % EBPO_ITEMS_SCATTERED == 0)
             ebpo_release_pages(t->mesh->workspace);
         t->path[t->length++] = *next;

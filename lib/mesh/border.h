@@ -1,12 +1,14 @@
-/* Finds the border of a mesh: its boundary as a chain, as closed directed loops with weights. */
+/* Finds the border of a mesh: the edges that faces do not use equally often in both directions
+ * (unbalanced edges), as closed directed loops with weights. */
 #ifndef EBPO_MESH_BORDER_H
 #define EBPO_MESH_BORDER_H
 
 #include <ebpo/mesh.h>
 
 /* Simple closed loops (no repeated vertex, at least three edges). Loop i consists of
- * vertex[first[i] .. first[i + 1]). The sum of weight times loop, over all loops, has each edge as
- * often as the faces use it in this direction, minus their uses in the opposite direction. */
+ * vertex[first[i] .. first[i + 1]). For each directed edge, the sum of the weights of the loops
+ * that contain it is the number of its uses by faces in this direction, minus the number of uses in
+ * the opposite direction. */
 typedef struct ebpo_border {
     uint64_t loop_count;
     uint64_t edge_count; /* unbalanced edges of the mesh */
@@ -14,11 +16,11 @@ typedef struct ebpo_border {
     uint32_t *vertex;    /* indices in the current mesh */
     uint32_t *weight;    /* [loop_count] at least 1 */
     uint64_t loop_capacity, weight_capacity, vertex_capacity;
-    ebpo_workspace *workspace; /* the mesh's; owns all arrays */
+    ebpo_workspace *workspace; /* workspace of the mesh; owns all arrays */
 } ebpo_border;
 
-/* Finds the border of any mesh. A balanced mesh has no loops. The result depends only on the mesh
- * in the source's order. `out` is cleared on failure. */
+/* Finds the border of any mesh. A mesh without unbalanced edges has no loops. The result depends
+ * only on the mesh in the source's order. `out` is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_border_find(ebpo_border *out, const ebpo_mesh *mesh,
                                            unsigned threads, ebpo_error *error);
 void ebpo_border_free(ebpo_border *border);

@@ -187,18 +187,19 @@ static void connect_edges(chaining *c, uint64_t edge, uint64_t next)
 }
 
 /* Returns the corner of `face` that follows the vertex. */
-static uint32_t leaves_to(const chaining *c, uint32_t vertex, uint32_t face)
+static uint32_t next_corner(const chaining *c, uint32_t vertex, uint32_t face)
 {
     const uint32_t *v = c->mesh->faces + 3 * (uint64_t)face;
     return v[0] == vertex ? v[1] : v[1] == vertex ? v[2] : v[0];
 }
 
-/* Walks around the vertex of c->star, from the face of an arriving edge across edges that are used
- * twice. Returns the neighbour at the boundary edge that ends the fan, or EBPO_NO_INDEX. */
+/* Walks around `vertex`, whose faces are in c->star, from the face of an arriving edge across edges
+ * that are used twice. Returns the other vertex of the boundary edge that ends the fan, or
+ * EBPO_NO_INDEX if the fan ends at another edge. */
 static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 {
     for (uint64_t steps = 0; steps <= c->star.faces; steps++) {
-        uint32_t neighbour = leaves_to(c, vertex, face);
+        uint32_t neighbour = next_corner(c, vertex, face);
         uint64_t run = ebpo_star_find(&c->star, neighbour);
         if (run == c->star.count)
             return EBPO_NO_INDEX;
@@ -229,8 +230,9 @@ static uint64_t find_departure(const chaining *c, uint64_t begin, uint64_t end, 
     return NONE;
 }
 
-/* Connects the arriving edges [a, b) and the departing edges [d, e) at one vertex: first by fans,
- * then the remaining edges in ascending order. Returns false when memory is short. */
+/* Connects the edges at one vertex: c->arrivals[a .. b) with c->edges[d .. e), which depart. Edges
+ * at the two ends of one fan are connected first, then the remaining edges in ascending order.
+ * Returns false when memory is short. */
 static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d,
                            uint64_t e)
 {
@@ -307,7 +309,7 @@ static void visit_vertex(chaining *c, uint32_t vertex)
     c->path[c->path_length++] = vertex;
 }
 
-/* Returns a key for the edge that consists of source indices. */
+/* Returns the key of an edge in the order of the source: source indices from << 32 | to. */
 static uint64_t source_key(const chaining *c, uint64_t edge)
 {
     return ebpo_mesh_source_vertex(c->mesh, c->edges[edge].from) << 32 |
@@ -372,7 +374,8 @@ static ebpo_status chain_edges(chaining *c, ebpo_error *error)
     ebpo_workspace *w = c->mesh->workspace;
     if (!allocate_arrays(c))
         return ebpo_workspace_fail(w,
-                                   c->count * 56 + c->mesh->vertex_count * sizeof *c->path_position,
+                                   c->count * 56 /* all arrays with a row for each edge, about */ +
+                                       c->mesh->vertex_count * sizeof *c->path_position,
                                    error);
     ebpo_status status = sort_all(c, error);
     if (status != EBPO_OK)
@@ -380,7 +383,7 @@ static ebpo_status chain_edges(chaining *c, ebpo_error *error)
     if (!connect_all(c))
         return ebpo_fail_memory(error, c->star.capacity * 2 * sizeof *c->star.links);
     EBPO_FOR_ITEMS(w, e, 0, c->count) {
-        if (!c->continued[e])
+        if (!c->continued[e]) /* the first edge of a chain that is not closed */
             walk_chain(c, e);
     }
     c->out->on_paths = c->out->count;
@@ -417,14 +420,15 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
 /* --- the source's order --- */
 
 typedef struct rank {
-    uint64_t key;
-    uint32_t number, triangles; /* index of the loop; number of triangles that close it */
+    uint64_t key;       /* ebpo_loops.start */
+    uint32_t number;    /* index of the loop */
+    uint32_t triangles; /* number of triangles that close the loop */
 } rank;
 
 typedef struct ranking {
     const ebpo_loops *loops;
-    uint64_t begin; /* loops from this index on */
-    rank *sorted;
+    uint64_t begin; /* index of the first loop to sort */
+    rank *sorted;   /* the loops from `begin` on, in the source's order */
 } ranking;
 
 static ebpo_status make_ranks(void *context, uint64_t begin, uint64_t end, void *records,

@@ -38,8 +38,8 @@ typedef struct ebpo_loops {
                          32 | to */
     /* number of loops that were removed from chains that are not closed; these loops come first */
     uint64_t on_paths;
-    /* number of chains that cannot be closed, because the directions of their edges do not continue
-     * one another */
+    /* number of chains that are not closed: where their last edge arrives, every departing edge
+     * already continues another edge */
     uint64_t open_chains;
     ebpo_workspace *workspace; /* workspace of the mesh; owns all arrays */
 } ebpo_loops;

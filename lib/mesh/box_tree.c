@@ -47,8 +47,8 @@ static void swap_points(ebpo_tree_point *a, ebpo_tree_point *b)
     *b = t;
 }
 
-/* Partitions the points (Hoare): coordinates before p[middle] are not greater along the axis, those
- * after it are not less. */
+/* Reorders the points (Hoare's selection): along the axis, no point before p[middle] has a greater
+ * coordinate than p[middle], and no point after it a lesser one. */
 static void split_points(ebpo_tree_point *p, uint64_t count, uint64_t middle, int axis)
 {
     uint64_t low = 0, high = count - 1;
@@ -83,7 +83,7 @@ static void build_node(const ebpo_box_tree *tree, uint64_t node, ebpo_tree_point
 
 static bool build_nodes(ebpo_box_tree *tree)
 {
-    uint64_t nodes = 1;
+    uint64_t nodes = 1; /* of a tree whose leaves are all as deep as the largest halves require */
     for (uint64_t most = tree->count; most > EBPO_BOX_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
@@ -101,6 +101,7 @@ typedef struct filling {
     const void *user;
 } filling;
 
+/* Extends `box` by another box. */
 static void join_boxes(ebpo_point_box *box, const ebpo_point_box *other)
 {
     for (int k = 0; k < 3; k++) {
@@ -155,7 +156,8 @@ typedef struct walking {
     void *user;
 } walking;
 
-/* Visits the points p[count] below a node. Returns false as soon as `visit` does. */
+/* Walks the subtree of a node, which contains the points p[count]. Returns false as soon as `visit`
+ * does. */
 static bool walk_node(const walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
     ebpo_box_node n = { &w->tree->node[node], &w->filled[node], count };

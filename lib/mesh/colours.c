@@ -47,13 +47,14 @@ bool ebpo_colour_columns(const ebpo_attributes *in, const char *element,
     return false;
 }
 
-/* Converts a value to a byte; `full` becomes 255. */
+/* Converts a value from the range [0, full] to a byte from 0 to 255. */
 static uint8_t byte_of(double value, double full)
 {
     double scaled = value / full * 255;
     return scaled >= 255 ? 255 : scaled > 0 ? (uint8_t)(scaled + 0.5) : 0; /* NaN gives 0 */
 }
 
+/* Reads a value of this type at `from`, and returns it as a byte. */
 #define VALUE_AS(type, full)                 \
     {                                        \
         type value;                          \

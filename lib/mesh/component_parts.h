@@ -31,13 +31,14 @@ struct ebpo_components {
     const ebpo_mesh_groups *named; /* the groups, in place of components; list, number and position
                                       are then unused. NULL: components */
     uint64_t count; /* initially all components, later only components that are not cavities */
-    ebpo_found_component *list; /* [all] */
-    ebpo_component *facts;      /* [count] */
+    ebpo_found_component *list; /* all components, also cavities */
+    ebpo_component *facts;      /* [count] results for ebpo_components_get */
     /* [face_count] component of each face, borrowed; NULL: derived from its vertices */
     uint32_t *of_face;
-    uint32_t *number;   /* [vertex_count] component; EBPO_NO_INDEX: unused vertex */
-    uint32_t *position; /* [vertex_count] position among the component's vertices; NULL: see
-                           position_of */
+    uint32_t *number; /* [vertex_count] component of each vertex; EBPO_NO_INDEX: unused vertex */
+    /* [vertex_count] position among the component's vertices; NULL: position_of in components.c
+     * searches for it */
+    uint32_t *position;
     ebpo_number_groups faces, vertices;
 };
 
@@ -45,14 +46,15 @@ struct ebpo_components {
  * for an invalid mesh. */
 EBPO_MUST_USE ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error);
 
-/* Groups faces (or vertices) by their components or named groups. */
+/* Groups faces (or vertices, if `faces` is false) by their components or named groups. */
 EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool faces,
                                                 ebpo_number_groups *g, ebpo_error *error);
 
 /* Finds components with their faces, edges and volumes; cavities are not yet joined to their hosts.
  * Free with ebpo_components_free, also on failure. `closed`: NULL, or the result of
- * ebpo_mesh_find_shells; then each shell is a component, and the other faces are connected by
- * vertices. The array `closed` becomes the field `of_face` of the result. */
+ * ebpo_mesh_find_shells, the shell (closed surface) of each face. With `closed`, each shell is a
+ * component, and only faces in no shell are connected by vertices. The array `closed` becomes the
+ * field `of_face` of the result. */
 EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed,
                                                unsigned threads, const ebpo_progress *progress,
                                                ebpo_components **out, ebpo_error *error);
@@ -67,7 +69,8 @@ EBPO_MUST_USE ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t
 EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
                                                   const ebpo_progress *progress, ebpo_error *error);
 
-/* Sets the host of each component. ebpo_components_measure must have been called. */
+/* Sets the host of each component (ebpo_found_component.host). ebpo_components_measure must have
+ * been called. */
 EBPO_MUST_USE ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error);
 
 /* The groups of faces that a file names. */
@@ -84,8 +87,9 @@ struct ebpo_mesh_groups {
     uint64_t run_count;
 };
 
-/* Merges runs of one name into a group; "" and "default" are the same name. The first run's name is
- * reported only if the run has faces. EBPO_E_LIMIT, EBPO_E_MEMORY. */
+/* Merges all runs with the same name into a group; "" and "default" are the same name. runs[0] has
+ * the faces before the first name of the file; without such faces, it makes no group. EBPO_E_LIMIT,
+ * EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count,
                                                ebpo_mesh_groups **out, ebpo_error *error);
 

@@ -16,6 +16,7 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/sum.h"
 
+/* Numbers of vertices and of components for each call of a thread's function. */
 enum { VERTEX_GRAIN = 1 << 13, COMPONENT_GRAIN = 64 };
 
 typedef struct measuring {
@@ -42,8 +43,8 @@ static void set_open(ebpo_components *c, uint32_t component)
     __atomic_store_n(&c->list[component].open, true, __ATOMIC_RELAXED);
 }
 
-/* Visits an edge with faces in several components. Marks each component as open that does not use
- * the edge equally often in both directions. Returns false when memory is short. */
+/* Visits an edge whose faces may belong to several components. Marks as open the components that do
+ * not use the edge equally often in both directions. Returns false when memory is short. */
 static bool visit_edge(ebpo_components *c, const ebpo_link *links, uint64_t uses,
                        ebpo_edge_faces *e)
 {
@@ -89,6 +90,7 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
+/* Marks the components that are open. */
 static ebpo_status inspect_edges(measuring *m, unsigned threads, const ebpo_progress *progress,
                                  ebpo_error *error)
 {
@@ -135,7 +137,8 @@ static double volume_term(const measuring *m, ebpo_found_component *c, uint64_t 
            (t[0][2] - base[2]) * cross[2];
 }
 
-/* Adds up volumes. The summation is exact, so the order of the terms does not matter. */
+/* Computes the volumes and boxes of components. The summation is exact, so the order of the terms
+ * does not matter. */
 static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -176,20 +179,20 @@ ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
 
 /* --- the closed component around a cavity --- */
 
-/* A closed component of negative volume, with the first vertex of its first face. A cavity is in
- * the host around which this vertex has a winding number other than 0. */
+/* A closed component of negative volume. Its host is the smallest closed component of positive
+ * volume around which the cavity's point `at` has a winding number other than 0. */
 typedef struct cavity {
-    double at[3];
-    int64_t winding; /* winding number of `at` around the current host */
-    uint32_t component;
-    bool placed;
+    double at[3];       /* first vertex of the cavity's first face */
+    int64_t winding;    /* minus the winding number of `at` around the current host */
+    uint32_t component; /* index of the cavity in the list of components */
+    bool placed;        /* true: the host is known */
 } cavity;
 
 typedef struct placing {
     const ebpo_components *components;
     cavity *cavities; /* sorted by at[1] */
     uint64_t count;
-    uint32_t *hosts; /* sorted by volume */
+    uint32_t *hosts; /* closed components of positive volume, smallest first */
     uint64_t host_count;
 } placing;
 
@@ -210,8 +213,7 @@ static int compare_hosts(const void *x, const void *y, void *list)
     return a < b ? -1 : 1;
 }
 
-/* Lists the cavities and the possible hosts. */
-static void list_both(placing *p)
+static void list_cavities_and_hosts(placing *p)
 {
     const ebpo_components *c = p->components;
     for (uint64_t i = 0; i < c->count; i++) {
@@ -242,8 +244,9 @@ static uint64_t first_from_y(const placing *p, double y)
     return low;
 }
 
-/* Counts the crossings of a face with the segments that lead from the cavities' points along x to
- * the end of the host. */
+/* Adds the crossings with a face of the host to `winding` of the cavities without a host. For each
+ * cavity, a segment leads from its point along x to the greatest x of the host's box, where the
+ * winding number is 0. */
 static void cross_face(placing *p, const ebpo_found_component *host, uint64_t face)
 {
     const ebpo_mesh *mesh = p->components->mesh;
@@ -304,7 +307,7 @@ ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error)
     p.cavities = ebpo_array_alloc(workspace, c->count, sizeof *p.cavities);
     p.hosts = ebpo_array_alloc(workspace, c->count, sizeof *p.hosts);
     if (p.cavities && p.hosts)
-        list_both(&p);
+        list_cavities_and_hosts(&p);
     else
         status = ebpo_workspace_fail(workspace, c->count * sizeof *p.cavities, error);
     for (uint64_t i = 0; i < p.host_count && p.count; i++) /* smallest volume first */

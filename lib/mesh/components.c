@@ -63,6 +63,7 @@ static int compare_first(const void *x, const void *y)
     return a->first < b->first ? -1 : 1;
 }
 
+/* Adds face f to the component *number, which is created if it is EBPO_NO_INDEX. */
 static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, uint64_t *capacity,
                             ebpo_error *error)
 {
@@ -115,7 +116,7 @@ static ebpo_status list_components(ebpo_components *c, const uint32_t *parent, u
 
 /* ---- groups ---- */
 
-/* Returns the component of face or vertex i. */
+/* Returns the component or named group of face i (or of vertex i, if `faces` is false). */
 static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
 {
     if (c->named) /* only for faces */
@@ -125,7 +126,8 @@ static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
     return c->number[faces ? c->mesh->faces[3 * i] : i];
 }
 
-/* Counts the indices of each group, then stores them, ascending within a group. */
+/* Stores the indices of each group, ascending within a group. g->begin first counts the indices of
+ * each group, then becomes the position of each group's next index. */
 static void fill_groups(const ebpo_components *c, bool faces, ebpo_number_groups *g)
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count, sum = 0;
@@ -288,6 +290,7 @@ ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number, ebp
     return status;
 }
 
+/* Joins cavities to their hosts, and groups the faces and vertices of the joined components. */
 static ebpo_status group_all(ebpo_components *c, ebpo_error *error)
 {
     ebpo_status status = ebpo_cavities_place(c, error);
@@ -432,11 +435,12 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
     out->vertex_count = facts.vertex_count;
     out->face_count = facts.face_count;
     if (!make_arrangement(c->mesh, out) || !make_arrays(c->mesh, out)) {
+        /* with double positions: 24 + 4 bytes a vertex, 12 + 4 bytes a face */
         status = ebpo_workspace_fail(out->workspace,
                                      28 * facts.vertex_count + 16 * facts.face_count, error);
     }
-    if (status ==
-        EBPO_OK) /* the rows stay in source order; the builder selects the rows of the component */
+    /* the rows stay in source order; the builder selects the rows of the component */
+    if (status == EBPO_OK)
         status = ebpo_attributes_borrow(&out->attributes, c->mesh->attributes, error);
     if (status != EBPO_OK) {
         ebpo_mesh_free(out);
@@ -454,17 +458,18 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
 /* Name of faces without a group, as in the OBJ format. */
 static const char unnamed[] = "default";
 
+/* The merging of runs into groups. */
 typedef struct naming {
     const ebpo_named_run *runs;
-    uint64_t count;
-    uint32_t *order;       /* by name, then in file order */
-    uint32_t *first_alike; /* [count] first run of the same name */
-    uint32_t *number;      /* [count] for the first run of a name: the group */
+    uint64_t count;        /* number of runs */
+    uint32_t *order;       /* [count] runs, sorted by name, then in file order */
+    uint32_t *first_alike; /* [count] for each run, the first run of the same name */
+    uint32_t *number;      /* [count] group of each first run of a name; EBPO_NO_INDEX: none yet */
     ebpo_mesh_groups *out;
-    uint64_t name_bytes;
+    uint64_t name_bytes; /* used bytes of out->names */
 } naming;
 
-/* Returns the run with the name that is reported. */
+/* Returns the run, with the name "default" in place of an empty name. */
 static ebpo_named_run shown_name(const ebpo_named_run *run)
 {
     return run->size ? *run : (ebpo_named_run){ unnamed, sizeof unnamed - 1, run->faces };
@@ -486,6 +491,7 @@ static int compare_runs(const void *x, const void *y, void *runs)
     return order ? order : a < b ? -1 : 1;
 }
 
+/* Computes n->first_alike. */
 static void find_alike(naming *n)
 {
     for (uint64_t i = 0; i < n->count; i++) {
@@ -533,7 +539,7 @@ static void name_groups(naming *n)
         out->run_group[out->run_count++] = number;
     }
     out->with_faces = out->count;
-    for (uint64_t i = 1; i < n->count; i++)
+    for (uint64_t i = 1; i < n->count; i++) /* run 0 has no name in the file */
         name_group(n, i, 0);
 }
 
@@ -621,8 +627,8 @@ uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face)
 
 /* --- named groups in place of components; a vertex may be in several groups --- */
 
-/* Lists each group's vertices once, in the order of its faces; only counts them if `members` is
- * NULL. `last_group`: [vertex_count] last group that used the vertex. */
+/* Lists each vertex of a group once, in the order of the group's faces. If c->vertices.members is
+ * NULL, only counts the vertices. `last_group`: [vertex_count] last group that used the vertex. */
 static void list_vertices(ebpo_components *c, uint32_t *last_group)
 {
     const ebpo_mesh *mesh = c->mesh;
@@ -650,6 +656,7 @@ static int compare_vertices(const void *x, const void *y)
     return a < b ? -1 : a > b;
 }
 
+/* Sets c->vertices: the vertices of each group, ascending. */
 static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
 {
     ebpo_workspace *workspace = c->mesh->workspace;
@@ -671,6 +678,7 @@ static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Sets c->facts, the results for ebpo_components_get. */
 static ebpo_status list_groups(ebpo_components *c, ebpo_error *error)
 {
     c->facts = ebpo_array_alloc(c->mesh->workspace, c->count, sizeof *c->facts);

@@ -15,9 +15,14 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"
 
-/* Vertices with more faces than this are not searched for existing edges, which keeps the work
- * linear. */
-enum { SEARCHED_DEGREE = 4096, VERTEX_GRAIN = 1 << 13, LOOP_GRAIN = 16 };
+enum {
+    /* the faces at a vertex are not searched for existing edges if there are more faces than this;
+     * so the work is linear in the size of the mesh */
+    SEARCHED_DEGREE = 4096,
+    /* numbers of vertices and of loops for each call of a thread's function */
+    VERTEX_GRAIN = 1 << 13,
+    LOOP_GRAIN = 16
+};
 
 typedef struct loop_vertex {
     uint32_t vertex;
@@ -27,13 +32,14 @@ typedef struct loop_vertex {
 /* Scratch memory of a thread. */
 typedef struct scratch {
     ebpo_star star;
-    ebpo_boundary boundary;
-    double (*point)[3];
-    uint32_t (*triangles)[3];
+    ebpo_boundary boundary;   /* the boundary edges that the thread has found */
+    double (*point)[3];       /* positions of the loop's vertices */
+    uint32_t (*triangles)[3]; /* the loop's triangles, as indices in the loop */
     uint64_t point_capacity, triangle_capacity;
     /* the loop's vertices, sorted for lookup */
     loop_vertex sorted[EBPO_OPTIMAL_CHAIN];
-    /* [n][n] for a loop of n vertices: 1 if an edge of the mesh connects two of them */
+    /* [n][n] for a loop of n vertices: 1 if an edge of the mesh connects two vertices of the loop
+     */
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
 
@@ -49,9 +55,10 @@ typedef struct filling {
     ebpo_loops loops;
     uint64_t *before; /* [loops.count] number of triangles of the loops that precede each loop in
                        * the order of ebpo_loops_rank */
-    uint64_t added;
+    uint64_t added;   /* number of added faces */
 } filling;
 
+/* Collects the boundary edges whose lower vertex is in the range. */
 static ebpo_status collect_edges(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -123,7 +130,8 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
     }
 }
 
-/* Fills a loop. Its triangles follow the triangles of the loops that precede it (f->before). */
+/* Fills a loop. Its triangles follow the triangles of the loops that precede it (f->before).
+ * Returns false when memory is short. */
 static bool fill_loop(filling *f, scratch *s, uint64_t number)
 {
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
@@ -168,7 +176,7 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
 /* --- all loops --- */
 
 /* Reserves space after the mesh's faces, which do not change. Also sets the source indices of the
- * added faces, which follow those of all faces of the source, dropped ones included. */
+ * added faces, which follow the indices of all faces of the source, also of dropped faces. */
 static ebpo_status reserve_space(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;
@@ -190,6 +198,7 @@ static ebpo_status reserve_space(filling *f, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Fills all holes. The caller frees the arrays of *f, also on failure. */
 static ebpo_status run_filling(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;

@@ -24,7 +24,10 @@ static const ebpo_import_format *const formats[] = {
     &ebpo_import_ply,
 };
 
-enum { FORMATS = sizeof formats / sizeof *formats, LIST_TEXT = 24 * FORMATS };
+enum {
+    FORMATS = sizeof formats / sizeof *formats,
+    LIST_TEXT = 24 * FORMATS /* bytes for the names of all formats, with separators */
+};
 
 /* --- building the mesh from a reader's values and faces --- */
 
@@ -167,11 +170,13 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, const ebpo_import_format *format,
 
 ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error)
 {
+    /* the message for a file of a known type that is no mesh, such as an image; else NULL */
     const char *foreign = ebpo_wrong_kind_of_file(job->data, job->size),
                *name = ebpo_path_name(job->name);
     const ebpo_import_format *format = ebpo_import_recognise(job->data, job->size, job->name);
     char list[LIST_TEXT];
-    /* a binary STL file may begin like a file of another type */
+    /* a file with the signature of a mesh format is a mesh: a binary STL file may begin like a file
+     * of another type */
     if (foreign && has_signature(job->data, job->size))
         foreign = NULL;
     if (!foreign && format)

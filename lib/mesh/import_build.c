@@ -211,7 +211,7 @@ static ebpo_status reserve_scratch(ebpo_import_build *b, uint64_t n)
     if (!ebpo_mul_ok(n, 3 * sizeof(double) + 4 * sizeof(uint32_t), &bytes) ||
         __builtin_add_overflow(bytes, ebpo_polygon_scratch_bytes(n), &bytes) ||
         !ebpo_grow(&b->scratch, &b->scratch_capacity, bytes, 1))
-        return ebpo_fail_memory(b->error, n * 40);
+        return ebpo_fail_memory(b->error, n * 40); /* 24 + 16 bytes a corner */
     return EBPO_OK;
 }
 
@@ -343,12 +343,13 @@ void ebpo_import_free(ebpo_import_build *b)
         freelocale(b->c_locale);
 }
 
-/* For each table: the names of its columns, and the name of the list of a face's three corners. */
+/* For each table: the names of its columns, and the name of the attribute that lists the values of
+ * a face's three corners. */
 static const struct {
     const char *names, *list_name;
-} sorts[EBPO_IMPORT_SORTS] = { { "red green blue", "color" },
-                               { "nx ny nz", "normal" },
-                               { "s t", "texcoord" } };
+} attribute_names[EBPO_IMPORT_SORTS] = { { "red green blue", "color" },
+                                         { "nx ny nz", "normal" },
+                                         { "s t", "texcoord" } };
 
 /* A table whose values become an attribute. */
 typedef struct placing {
@@ -358,13 +359,14 @@ typedef struct placing {
     size_t bytes; /* bytes of a row as stored */
 } placing;
 
+/* Returns the description of an attribute for one row a vertex or face, without values. */
 static ebpo_attribute head_of(const placing *p, const char *element)
 {
     ebpo_attribute head = { .list = EBPO_ATTRIBUTE_NO_LIST };
     head.type = p->table->bytes ? EBPO_ATTRIBUTE_UINT8 : EBPO_ATTRIBUTE_FLOAT32;
     head.columns = ebpo_import_columns(p->sort);
     snprintf(head.element, sizeof head.element, "%s", element);
-    snprintf(head.names, sizeof head.names, "%s", sorts[p->sort].names);
+    snprintf(head.names, sizeof head.names, "%s", attribute_names[p->sort].names);
     return head;
 }
 
@@ -387,7 +389,7 @@ static void drop_attribute(const placing *p)
     ebpo_attributes_remove(p->b->mesh->attributes, p->b->mesh->attributes->count - 1);
 }
 
-/* Returns the value of a corner, or zeros if it has none. */
+/* Returns the values of a corner, or zeros if the corner has no values. */
 static const void *value_at(const placing *p, uint64_t corner)
 {
     static const float none[3] = { 0, 0, 0 };
@@ -397,7 +399,7 @@ static const void *value_at(const placing *p, uint64_t corner)
 }
 
 /* Adds the values as an attribute of vertices, if all corners at each vertex have equal values.
- * *fits: true if they do. */
+ * *fits: true if the attribute was added. */
 static ebpo_status place_on_vertices(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
@@ -419,7 +421,7 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
 }
 
 /* Adds the values as an attribute of faces, if all corners of each face have equal values. *fits:
- * true if they do. */
+ * true if the attribute was added. */
 static ebpo_status place_on_faces(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
@@ -443,15 +445,15 @@ static ebpo_status place_in_lists(const placing *p)
     ebpo_attribute head = head_of(p, "face"), *a;
     head.columns *= 3;
     head.list = EBPO_ATTRIBUTE_UINT8;
-    snprintf(head.names, sizeof head.names, "%s", sorts[p->sort].list_name);
+    snprintf(head.names, sizeof head.names, "%s", attribute_names[p->sort].list_name);
     ebpo_status status = add_attribute(p, &head, &a);
     for (uint64_t i = 0; status == EBPO_OK && i < 3 * p->b->mesh->face_count; i++)
         memcpy(a->values + i * p->bytes, value_at(p, i), p->bytes);
     return status;
 }
 
-/* Converts values to bytes in the same memory. A byte is written before, or at, the next value to
- * be read. */
+/* Converts values to bytes in the same memory. No byte is written behind the next value to be read.
+ */
 static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;
@@ -486,7 +488,7 @@ ebpo_status ebpo_import_attributes(ebpo_import_build *b)
     return status;
 }
 
-#define EMPTY UINT32_MAX
+#define EMPTY UINT32_MAX /* a free slot of the hash table */
 
 /* Returns the bits of a coordinate of `size` bytes; -0 becomes 0. */
 static inline uint64_t bits_of(const char *at, size_t size)
@@ -507,8 +509,8 @@ static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
            bits_of(xyz + 2 * size, size) == key[2];
 }
 
-/* Moves the first vertex of each position to the front; returns the number of positions. Callers
- * pass a constant size, for which the compiler specialises this function. */
+/* Implements ebpo_import_weld for coordinates of `size` bytes; returns the number of positions.
+ * Callers pass a constant size, for which the compiler specialises this function. */
 static inline uint64_t weld_positions(char *xyz, size_t size, uint64_t count, uint32_t *map,
                                       uint32_t *table, uint64_t slots)
 {

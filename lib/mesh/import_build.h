@@ -16,6 +16,7 @@
 #define EBPO_IMPORT_MAX  (UINT64_C(0xfffffffe))
 #define EBPO_IMPORT_NONE UINT32_MAX /* not a vertex index */
 
+/* The sorts (kinds) of values to which corners refer; the index of a table. */
 typedef enum ebpo_import_sort {
     EBPO_IMPORT_COLOURS,
     EBPO_IMPORT_NORMALS,
@@ -23,11 +24,12 @@ typedef enum ebpo_import_sort {
     EBPO_IMPORT_SORTS
 } ebpo_import_sort;
 
-/* Values to which corners refer: colours, normals or texture coordinates. */
+/* All values of one sort in the file. */
 typedef struct ebpo_import_table {
     float *values; /* [rows][columns] */
     uint64_t rows, capacity;
-    /* [faces of the mesh][3] rows; EBPO_IMPORT_NONE: no row; only with attributes */
+    /* [faces of the mesh][3] row of each corner; EBPO_IMPORT_NONE: no row. NULL if attributes are
+     * not requested */
     uint32_t *index;
     uint64_t index_capacity;
     bool named;   /* some corner refers to a row */
@@ -40,12 +42,15 @@ typedef struct ebpo_import_corner {
     uint32_t vertex, row[EBPO_IMPORT_SORTS];
 } ebpo_import_corner;
 
+/* The state of the building. A reader calls, in this order: ebpo_import_begin, the functions that
+ * add vertices and rows, ebpo_import_faces, ebpo_import_polygon for each polygon, ebpo_import_end,
+ * ebpo_import_attributes, ebpo_import_free. */
 typedef struct ebpo_import_build {
-    const char *name;
+    const char *name; /* of the file, for messages */
     ebpo_error *error;
     ebpo_mesh *mesh;
-    bool attributes; /* attributes are requested: values are stored */
-    locale_t c_locale;
+    bool attributes;   /* attributes are requested: values are stored */
+    locale_t c_locale; /* for parsing numbers with a decimal point */
 
     bool doubles;         /* positions are doubles, otherwise floats */
     bool loses_digits;    /* floats do not keep the text of a coordinate */
@@ -72,8 +77,8 @@ EBPO_MUST_USE ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mes
  * number. */
 bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, size_t n);
 
-/* Parses the number again and writes the number divided by `weight` to *value. Sets b->loses_digits
- * if the quotient is no float. */
+/* Parses s[0 .. n), which must be a number, and writes the number divided by `weight` to *value.
+ * Sets b->loses_digits if the quotient is no float. (A vertex of an OBJ file may have a weight.) */
 void ebpo_import_quotient(ebpo_import_build *b, double *value, const char *s, size_t n,
                           double weight);
 
@@ -94,10 +99,12 @@ EBPO_MUST_USE ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort
 /* Returns the number of columns of a table: 2 for texture coordinates, else 3. */
 unsigned ebpo_import_columns(ebpo_import_sort sort);
 
-/* Call this function after the last vertex and row, before the first polygon. */
+/* Allocates the arrays for polygons. Call this function after the last vertex and row, before the
+ * first polygon. */
 EBPO_MUST_USE ebpo_status ebpo_import_faces(ebpo_import_build *b);
 
-/* Returns space for another corner of the current polygon, or NULL when memory is short. */
+/* Appends a corner to the current polygon, and returns its address, where the caller stores it.
+ * Returns NULL when memory is short. */
 ebpo_import_corner *ebpo_import_add_corner(ebpo_import_build *b);
 
 /* Triangulates the polygon of the corners, or counts it as omitted if it has fewer than three
@@ -107,8 +114,9 @@ EBPO_MUST_USE ebpo_status ebpo_import_polygon(ebpo_import_build *b);
 /* Merges vertices of equal position. EBPO_E_FORMAT: there are no faces. */
 EBPO_MUST_USE ebpo_status ebpo_import_end(ebpo_import_build *b);
 
-/* Adds the values of the tables to the attributes: of vertices if all corners at each vertex agree;
- * otherwise of faces, as one value for the face or as lists of its three corners. */
+/* Adds the values of the tables to the attributes. A table becomes an attribute of vertices if all
+ * corners at each vertex have equal values. Otherwise it becomes an attribute of faces: one value
+ * if the three corners of each face have equal values, else the values of the three corners. */
 EBPO_MUST_USE ebpo_status ebpo_import_attributes(ebpo_import_build *b);
 
 /* Copies a word for a message: at most 40 characters; '?' replaces unprintable characters. */

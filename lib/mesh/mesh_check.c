@@ -1,5 +1,6 @@
 /* Checks a mesh. Examines faces, edges, vertices and positions in parallel, and reports whether the
- * mesh is a closed 2-manifold, and the errors with their locations. */
+ * mesh is a closed 2-manifold. Also reports findings (properties that are often defects) with their
+ * locations. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,8 +36,9 @@ void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found)
     list->item[list->count++] = found;
 }
 
-enum { FACE_GRAIN = 1 << 14 };
+enum { FACE_GRAIN = 1 << 14 }; /* number of faces of a block */
 
+/* Results for one block of faces. */
 typedef struct face_block {
     ebpo_sum area2, volume6; /* twice the area, six times the volume */
     ebpo_finding zero_area, index_repeated;
@@ -45,7 +47,7 @@ typedef struct face_block {
 typedef struct face_pass {
     const ebpo_check *check;
     face_block *blocks;
-    double centre[3];
+    double centre[3]; /* apex of the tetrahedra whose volumes are added, in check->units */
 } face_pass;
 
 /* Returns the root of v (core/disjoint_sets.h) and halves the path to the root. Any thread may call
@@ -94,6 +96,8 @@ static bool surely_nonzero(double a, double b, double c, double d)
     return permanent > 1e-280 && permanent < 1e300 && fabs(a * d - b * c) > 1e-15 * permanent;
 }
 
+/* Returns true if a face has no area: if no component of its normal is certainly nonzero, by an
+ * exact test. */
 static bool zero_area(const double a[3], const double b[3], const double c[3])
 {
     double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
@@ -104,6 +108,7 @@ static bool zero_area(const double a[3], const double b[3], const double c[3])
     return ebpo_zero_area(a, b, c);
 }
 
+/* Returns the length of a cross product in the unit of areas. */
 static double cross_length(const ebpo_units *u, const double cross[3])
 {
     if (!u->scaled)
@@ -188,21 +193,23 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
     return status;
 }
 
-enum { STAR_GRAIN = 1 << 13 };
+enum { STAR_GRAIN = 1 << 13 }; /* number of vertices of a block */
 
+/* Results for the stars (faces at a vertex) of one block of vertices. */
 typedef struct star_block {
     ebpo_finding boundary, nonmanifold, misoriented, unbalanced, bowtie, repeated_face;
-    ebpo_sum length;
+    ebpo_sum length; /* sum of the lengths of edges */
     uint64_t edges, components;
 } star_block;
 
+/* Scratch memory of a thread. */
 typedef struct scratch {
     ebpo_star star;
     uint32_t *fans; /* disjoint sets of the star's faces (parents); a fan is a set of faces joined
                        across edges */
     uint64_t fan_capacity;
-    ebpo_same_faces same; /* faces of the star with equal vertices */
-    ebpo_boundary *boundary;
+    ebpo_same_faces same;    /* the star's faces, sorted by their vertices */
+    ebpo_boundary *boundary; /* the boundary edges that the thread has found */
     unsigned worker;
 } scratch;
 
@@ -232,7 +239,7 @@ static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
     return a != b;
 }
 
-/* Adds an edge to the findings. Returns false when memory is short. */
+/* Adds an edge from v to its findings, if it has any. Returns false when memory is short. */
 static bool classify_edge(const ebpo_check *check, star_block *block, const scratch *s, uint32_t v,
                           const ebpo_link *links, uint64_t uses)
 {
@@ -328,7 +335,7 @@ static ebpo_status check_stars(void *context, uint64_t begin, uint64_t end, unsi
         uint64_t degree = ebpo_stars_degree(&check->stars, vertex);
         if (degree == 0)
             continue;
-        block.components += check->parents[v] == v;
+        block.components += check->parents[v] == v; /* one root for each component */
         if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
             !check_edges(check, &block, s, vertex) ||
             !record_repeated_faces(check, &block, s, vertex))
@@ -397,7 +404,7 @@ done:
     return status;
 }
 
-enum { VERTEX_GRAIN = 1 << 15 };
+enum { VERTEX_GRAIN = 1 << 15 }; /* number of vertices of a block */
 
 static ebpo_status check_coordinates(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                      ebpo_error *error)
@@ -428,9 +435,10 @@ ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error)
                              "checking coordinates", error);
 }
 
+/* Results for one block of vertices. */
 typedef struct vertex_block {
-    double min[3], max[3];
-    uint64_t referenced;
+    double min[3], max[3]; /* box of the vertices that faces use */
+    uint64_t referenced;   /* number of these vertices */
     ebpo_finding unreferenced;
 } vertex_block;
 
@@ -538,8 +546,8 @@ static void record_repeated(const ebpo_check *check, uint32_t v)
                     ebpo_mesh_source_vertex(check->mesh, v), v, v);
 }
 
-/* Skips the vertices at a run's next position, and records all of them except the first one in the
- * source. *lowest: that first vertex; EBPO_NO_INDEX before the first call. */
+/* Skips the vertices at a run's next position, and records all of them except the vertex with the
+ * lowest source index. *lowest: this vertex; EBPO_NO_INDEX before the first call. */
 static void skip_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
     double first[3], p[3];
@@ -558,8 +566,8 @@ static void skip_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
     } while (r->at < r->end && p[0] == first[0] && p[1] == first[1] && p[2] == first[2]);
 }
 
-/* Finds repeated positions in an arranged mesh. Either all vertices form one run, or used and
- * unused vertices form one run each. */
+/* Finds repeated positions in an arranged mesh. Either all vertices form one run (`grouped`), or
+ * the used vertices form a run and the unused vertices form another run. */
 static void compare_along_curve(const ebpo_check *check)
 {
     const ebpo_mesh *mesh = check->mesh;
@@ -618,8 +626,8 @@ ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Completes the report: is the mesh a closed 2-manifold (EBP 2017, section 3.1), and what is its
- * genus (Euler's formula)? */
+/* Completes the report: decides whether the mesh is a closed 2-manifold (EBP 2017, section 3.1),
+ * and computes its genus by Euler's formula. */
 static void complete_report(ebpo_check *c)
 {
     ebpo_mesh_report *r = c->report;
@@ -636,6 +644,7 @@ static void complete_report(ebpo_check *c)
     }
 }
 
+/* Counts the boundary loops (holes). */
 static ebpo_status boundary_loops(ebpo_check *c, ebpo_error *error)
 {
     ebpo_loops loops;

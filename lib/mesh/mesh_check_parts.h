@@ -23,7 +23,8 @@ typedef struct ebpo_units {
  * vertices of an edge, or a vertex, or a face. For a repeated face, `b` is the first face with the
  * same vertices. */
 typedef struct ebpo_found {
-    uint32_t kind, location; /* as in ebpo_finding */
+    uint32_t kind;     /* ebpo_finding_kind */
+    uint32_t location; /* source index, as in ebpo_finding.locations */
     uint32_t a, b;
 } ebpo_found;
 
@@ -70,7 +71,7 @@ static inline double ebpo_scaled_length(const double d[3], const int exponent[3]
     return most * sqrt(sum);
 }
 
-/* Counts a location, and stores it if it is among the lowest EBPO_FINDING_LOCATIONS. */
+/* Counts a location, and stores it if it is among the EBPO_FINDING_LOCATIONS lowest locations. */
 static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t location)
 {
     int kept =
@@ -84,6 +85,7 @@ static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t location)
     finding->locations[i] = location;
 }
 
+/* Adds the count and the locations of another block's finding. */
 static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding *other)
 {
     uint64_t kept = other->count < EBPO_FINDING_LOCATIONS ? other->count : EBPO_FINDING_LOCATIONS;
@@ -92,7 +94,7 @@ static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding 
     finding->count += other->count - kept;
 }
 
-/* Adds a place to the worker's list. */
+/* Adds a location to the worker's list. When memory is short, only sets its short_of_memory. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found);
 
 /* Counts a location, and adds it to the worker's list if all locations are requested. `location`:

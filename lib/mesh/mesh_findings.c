@@ -1,6 +1,6 @@
 /* Finds all locations of a mesh's findings. The mesh check records the locations, which are then
- * sorted. They are passed to the caller with the surrounding faces, or written as a PLY file with a
- * colour for each kind of finding. */
+ * sorted. Each location is passed to the caller with the surrounding faces, and a PLY file (the
+ * *picture*) can show all locations, with a colour for each kind of finding. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,7 +20,7 @@
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 
-/* --- the PLY file that shows the findings in colour (the picture) --- */
+/* --- the picture --- */
 
 typedef struct findings_picture {
     const ebpo_mesh *mesh;
@@ -35,7 +35,8 @@ typedef struct findings_picture {
 
 static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error);
-/* Shows a finding at these faces (indices in the current mesh). */
+/* Shows a finding at these faces (indices in the current mesh). A face with several findings shows
+ * the finding of the lowest kind. */
 static void record_in_picture(findings_picture *picture, const ebpo_found *found,
                               const uint64_t *faces, uint64_t count);
 /* Writes the picture. `report` is for the legend. */
@@ -77,10 +78,10 @@ static bool is_vertex(uint32_t kind) { return kind >= EBPO_FOUND_BOWTIE_VERTEX; 
 typedef struct finding_search {
     const ebpo_mesh *mesh;
     ebpo_findings_options options;
-    ebpo_findings_fn take;
+    ebpo_findings_fn take; /* receives each finding; NULL: none, or it has returned false */
     void *user;
     ebpo_found_list all; /* locations of all kinds, sorted */
-    uint32_t *component; /* [vertex_count] */
+    uint32_t *component; /* [vertex_count] component of each vertex */
     ebpo_stars stars;
     uint64_t *faces; /* faces around the current location */
     uint64_t face_count, face_capacity;
@@ -94,14 +95,14 @@ typedef struct keyed {
     ebpo_found found;
 } keyed;
 
-/* Above this bit, keys are below EBPO_SORT_BINS, as ebpo_sort requires: a kind has at most four
- * bits. */
+/* Keys shifted right by this number of bits are below EBPO_SORT_BINS, as ebpo_sort requires: a kind
+ * has at most four bits. */
 enum { KEY_SHIFT = 18 };
 
 typedef struct sorting {
     const ebpo_mesh *mesh;
-    const ebpo_found *from;
-    ebpo_found *to;
+    const ebpo_found *from; /* unsorted locations */
+    ebpo_found *to;         /* receives the sorted locations */
 } sorting;
 
 static ebpo_status make_keyed(void *context, uint64_t begin, uint64_t end, void *records,
@@ -198,7 +199,8 @@ static int compare_numbers(const void *x, const void *y)
 }
 
 /* Collects the faces that have all `count` corners, as indices in the current mesh. Searches the
- * faces at the corner with the fewest faces, because another corner may have very many faces. */
+ * faces at the corner with the fewest faces, because another corner may have very many faces.
+ * Returns false when memory is short. */
 static bool gather_faces(finding_search *p, const uint32_t *corner, int count)
 {
     uint32_t vertex = corner[0];
@@ -220,7 +222,8 @@ static bool gather_faces(finding_search *p, const uint32_t *corner, int count)
     return true;
 }
 
-/* Collects the faces of a finding, as indices in the current mesh. */
+/* Collects the faces of a finding, as indices in the current mesh. Returns false when memory is
+ * short. */
 static bool faces_of(finding_search *p, const ebpo_found *f)
 {
     if (ebpo_found_is_edge(f->kind))
@@ -249,6 +252,7 @@ static int vertices_of(const finding_search *p, const ebpo_found *f, uint32_t ou
     return ebpo_found_is_edge(f->kind) ? 2 : 1;
 }
 
+/* Returns the finding in source indices. Converts p->faces to source indices. */
 static ebpo_mesh_finding make_finding(finding_search *p, const ebpo_found *f)
 {
     uint32_t v[3];
@@ -272,6 +276,7 @@ static ebpo_mesh_finding make_finding(finding_search *p, const ebpo_found *f)
 
 enum { BETWEEN_STEPS = 1 << 12 }; /* number of findings between two reports of progress */
 
+/* Passes all findings to the caller and to the picture. */
 static ebpo_status report_all(finding_search *p, ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
@@ -296,6 +301,7 @@ static ebpo_status report_all(finding_search *p, ebpo_error *error)
 
 /* ---- entry point ---- */
 
+/* Checks the mesh, and sets p->all to the locations that the check has recorded. */
 static ebpo_status record_all(finding_search *p, ebpo_mesh_report *report, ebpo_error *error)
 {
     unsigned threads = ebpo_thread_count(p->options.threads);
@@ -357,7 +363,12 @@ ebpo_status ebpo_mesh_findings(const ebpo_mesh *mesh, const ebpo_findings_option
     return status;
 }
 
-enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8, FACE_BYTES = 1 + 3 * 4 + 3 };
+enum {
+    NOTHING = UINT8_MAX, /* in findings_picture.face */
+    /* bytes in the PLY file: three doubles; the number of corners, three indices and a colour */
+    VERTEX_BYTES = 3 * 8,
+    FACE_BYTES = 1 + 3 * 4 + 3
+};
 
 static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error)
@@ -420,21 +431,21 @@ static void put_colour(uint8_t kind, uint8_t rgb[3])
     ebpo_finding_colour(kind == NOTHING ? -1 : kind, rgb);
 }
 
-/* Returns the indices of vertices or faces, sorted by their source indices. NULL when memory is
- * short. Source indices of dropped faces are skipped. */
+/* Returns the indices of vertices or faces, sorted by their source indices, or NULL when memory is
+ * short. source: [count] source indices, from which those of dropped faces may be missing. */
 static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, uint64_t count)
 {
-    uint64_t most = count;
+    uint64_t size = count;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, count)
-        most = source[i] >= most ? source[i] + (uint64_t)1 : most;
-    uint32_t *order = ebpo_array_alloc(mesh->workspace, most, sizeof *order);
+        size = source[i] >= size ? source[i] + (uint64_t)1 : size;
+    uint32_t *order = ebpo_array_alloc(mesh->workspace, size, sizeof *order);
     if (!order)
         return NULL;
-    ebpo_array_fill(mesh->workspace, order, 0xff, most * sizeof *order);
+    ebpo_array_fill(mesh->workspace, order, 0xff, size * sizeof *order);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, count)
         order[source[i]] = (uint32_t)i;
     uint64_t kept = 0;
-    EBPO_FOR_ITEMS(mesh->workspace, i, 0, most)
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, size)
         if (order[i] != EBPO_NO_INDEX)
             order[kept++] = order[i];
     return order;
@@ -472,6 +483,7 @@ typedef struct written {
     uint32_t *vertices, *faces, *rank;
 } written;
 
+/* Sets *w to the order of the source. */
 static ebpo_status order_all(const ebpo_mesh *mesh, written *w, ebpo_error *error)
 {
     const struct ebpo_arrangement *a = mesh->arrangement;

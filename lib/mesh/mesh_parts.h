@@ -15,7 +15,8 @@
 /* The order of a mesh whose vertices and faces are sorted along a Morton curve (ebpo_mesh_arrange),
  * or whose faces were partly dropped. */
 struct ebpo_arrangement {
-    /* the box around the referenced vertices, with exact cell faces down to box.grid_level */
+    /* the box around the referenced vertices (vertices that faces use), with exact cell faces down
+     * to box.grid_level */
     ebpo_box box;
     /* number of referenced vertices, which come first, along the curve; unreferenced vertices
      * follow, also along the curve */
@@ -104,8 +105,8 @@ static inline void ebpo_face_turn(uint32_t face[3])
     face[2] = v;
 }
 
-/* Repair steps. EARLIER: the orientation of earlier versions of this library, which did not change
- * consistent components. */
+/* Repair steps. EARLIER: with ORIENT, orients as earlier versions of this library did: does not
+ * turn components whose faces are already consistent. */
 enum {
     EBPO_REPAIR_WELD = 1,
     EBPO_REPAIR_ORIENT = 2,
@@ -140,9 +141,9 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned 
                                                 uint32_t **closed, ebpo_error *error);
 
 /* Decides which vertices are merged, by the rule of ebpo_mesh_weld_within, in a mesh without
- * repeated positions. map [vertex_count] receives the new index of each vertex. from [vertex_count]
- * receives the *kept remaining vertices, ascending. *moved is the largest distance by which a
- * vertex moves. */
+ * repeated positions. map [vertex_count] receives the new index of each vertex. `from`
+ * [vertex_count] receives the remaining vertices, ascending; *kept is their number. *moved is the
+ * largest distance by which a vertex moves. */
 EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
                                                  uint32_t *map, uint32_t *from, uint64_t *kept,
                                                  double *moved, ebpo_error *error);
@@ -166,13 +167,14 @@ static inline bool ebpo_exponent_is_far(int exponent)
 }
 
 typedef struct ebpo_mesh_frame {
-    bool scaled; /* false: coordinates are unchanged */
-    int exponent[3];
+    bool scaled;     /* false: coordinates are unchanged */
+    int exponent[3]; /* the unit of axis k is 2^exponent[k] */
 } ebpo_mesh_frame;
 
 /* Computes the frame from the corners of all faces. */
 ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh);
 
+/* Writes the position of a vertex in the units of the frame. */
 static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_mesh *mesh,
                                        uint64_t vertex, double out[3])
 {
@@ -186,7 +188,7 @@ static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_
  * takes 5.3 to 10.7 bytes for each vertex. */
 typedef struct ebpo_positions {
     const ebpo_mesh *mesh; /* borrowed */
-    uint32_t *slots;
+    uint32_t *slots;       /* [mask + 1] vertex indices; EBPO_NO_INDEX: a free slot */
     uint64_t mask;
     ebpo_workspace *workspace; /* workspace of the mesh */
     uint64_t repeated; /* number of vertices that repeat the position of an earlier vertex */

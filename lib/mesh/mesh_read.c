@@ -14,14 +14,15 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/component_parts.h"
 
-enum { HASH_STEP = 1 << 22 };
+enum { HASH_STEP = 1 << 22 }; /* bytes between two releases of pages */
 
+/* The computation of the file's SHA-256. */
 typedef struct hashing {
     const ebpo_whole_file *file;
     ebpo_workspace *workspace;
     uint8_t digest[32];
     pthread_t thread;
-    bool threaded;
+    bool threaded; /* `thread` was started */
 } hashing;
 
 static void *hash_file(void *argument)
@@ -72,7 +73,7 @@ static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const
     return status;
 }
 
-/* If another program has changed the file while it was read, returns this error instead of
+/* If another program has changed the file during reading, returns this as an error in place of
  * `status`, because the change may have caused a format error. */
 static ebpo_status report_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
                                  ebpo_error *error)

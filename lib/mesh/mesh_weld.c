@@ -17,6 +17,7 @@
 
 enum { VERTEX_GRAIN = 1 << 14 };
 
+/* The bits of a position as doubles, in which -0 is replaced by 0. */
 typedef struct key {
     uint64_t bits[3];
 } key;
@@ -109,7 +110,10 @@ uint32_t ebpo_positions_first(const ebpo_positions *t, uint32_t v)
     return t->slots[at];
 }
 
-enum { GRAIN = 1 << 15, WORD = 64 };
+enum {
+    GRAIN = 1 << 15, /* number of vertices, or of faces, of a block */
+    WORD = 64        /* bits of a word of welding.remaining */
+};
 
 typedef struct welding {
     ebpo_mesh *mesh;
@@ -119,8 +123,8 @@ typedef struct welding {
     uint64_t kept;      /* number of remaining vertices */
     uint32_t *map;      /* [vertex_count] new index of each vertex */
     uint32_t *from;     /* [kept] the remaining vertex of each group */
-    /* arranged mesh: [blocks of GRAIN vertices + 1] number of groups that begin in the block; later
-     * the number in all previous blocks */
+    /* arranged mesh: [blocks of GRAIN vertices] number of groups that begin in the block; later the
+     * number of groups that begin in all previous blocks */
     uint64_t *heads;
     uint64_t *remaining; /* arranged mesh: bit s is set if vertex s of the source remains */
     uint64_t *before;    /* [words of `remaining`] number of bits that are set before the word */
@@ -162,6 +166,7 @@ static ebpo_status group_by_table(welding *w, ebpo_error *error)
 
 /* --- groups in an arranged mesh: comparison of neighbours --- */
 
+/* Returns true if vertex v has another position than the previous vertex. */
 static bool begins_group(const ebpo_mesh *mesh, uint64_t v)
 {
     double p[3], q[3];
@@ -261,8 +266,8 @@ static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Prepares the new source indices: the positions that the remaining vertices would have in a welded
- * source. */
+/* Sets w->remaining and w->before. Source indices will be renumbered as if the source had no
+ * removed vertices: the new index of a vertex is the number of remaining vertices before it. */
 static ebpo_status number_sources(welding *w, ebpo_error *error)
 {
     ebpo_workspace *workspace = w->mesh->workspace;
@@ -300,7 +305,8 @@ static void record_differences(const welding *w)
                              (unsigned long long)differ);
 }
 
-/* Lists the remaining attribute rows; attributes are in the order of the source. */
+/* Lists the attribute rows of the remaining vertices. Attributes are in the order of the source, so
+ * without an arrangement the rows are w->from. */
 static ebpo_status list_rows(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
@@ -369,6 +375,7 @@ static void move_vertices(welding *w)
         ebpo_array_free(mesh->workspace, order->key);
         order->key = NULL;
     }
+    /* frees the unused end of the array */
     void *smaller = mesh->workspace || order ? NULL : ebpo_realloc(base, 3 * w->kept, size / 3);
     if (smaller && mesh->xyz32)
         mesh->xyz32 = smaller;
@@ -376,6 +383,7 @@ static void move_vertices(welding *w)
         mesh->xyz64 = smaller;
 }
 
+/* Welds the mesh. The caller frees the arrays of *w, also on failure. */
 static ebpo_status run_welding(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
@@ -412,7 +420,7 @@ static ebpo_status run_welding(welding *w, ebpo_error *error)
     return status;
 }
 
-/* Welds the mesh. Distance 0 means equal positions. */
+/* Welds the mesh and adds to the record. Distance 0 means equal positions. */
 static ebpo_status weld_mesh(ebpo_mesh *mesh, double distance, ebpo_repair_record *record,
                              ebpo_error *error)
 {

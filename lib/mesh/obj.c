@@ -1,7 +1,7 @@
-/* Reads OBJ files in two passes. The first counts vertices, normals, texture coordinates and
- * corners; the second fills the mesh. A corner names its values by indices, which may be negative
- * (counted from the end) and must exist. Materials and groups become attributes or runs of faces.
- * Curves, lines and points are counted and reported.
+/* Reads OBJ files in two passes. The first pass reads vertices, normals and texture coordinates;
+ * the second pass reads faces. A corner of a face refers to its values by indices, which may be
+ * negative (counted back from the latest value). Materials become an attribute of faces, and named
+ * groups become runs of faces. Curves, lines and points are counted and reported.
  *
  * Source: "Object Files (.obj)", appendix B1 of Wavefront's Advanced Visualizer manual, 3.0. */
 #include "core/strict_fp.h"
@@ -154,6 +154,7 @@ bool ebpo_obj_word_is(ebpo_obj_word word, const char *text)
     return word.n == strlen(text) && memcmp(word.s, text, word.n) == 0;
 }
 
+/* Limits for untrusted files: numbers of group statements and of material names. */
 enum { RUNS_MAX = 100000000, MATERIALS_MAX = 10000000 };
 
 ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run, const char *name,
@@ -266,7 +267,7 @@ static void print_properties(FILE *out, const ebpo_attributes *attributes, const
     }
 }
 
-/* Creates a PLY header with the names, because the mesh is exported as PLY. */
+/* Stores the material names as comments of a PLY header, which a later export as PLY writes. */
 static ebpo_status make_header(const ebpo_mesh *mesh, const ebpo_obj_names *names,
                                ebpo_error *error)
 {
@@ -323,7 +324,7 @@ void ebpo_obj_names_free(ebpo_obj_names *names, ebpo_workspace *workspace)
     ebpo_array_free(workspace, names->of_face);
 }
 
-enum { RELEASE = 1 << 22 };
+enum { RELEASE = 1 << 22 }; /* bytes between two releases of pages */
 
 /* Returns EBPO_E_FORMAT with the line of the statement. */
 EBPO_PRINTF(2, 3)
@@ -338,7 +339,8 @@ static ebpo_status fail_statement(const obj_reading *r, const char *format, ...)
                           r->line, text);
 }
 
-/* Reads the first word of the next statement. Releases pages now and then. */
+/* Reads the first word of the next statement, and releases pages after each RELEASE bytes. Returns
+ * false at the end of the file. */
 static bool step_to_statement(obj_reading *r, ebpo_obj_word *word)
 {
     uint64_t at = (uint64_t)(r->text.at - (const char *)r->data);
@@ -353,7 +355,7 @@ static bool step_to_statement(obj_reading *r, ebpo_obj_word *word)
 
 /* --- the second pass: faces, and their materials and groups --- */
 
-/* Index kinds of the second and third part of a corner, v/vt/vn. */
+/* Tables of the second and third index of a corner, v/vt/vn. */
 static const ebpo_import_sort sort_of[2] = { EBPO_IMPORT_TEXTURE, EBPO_IMPORT_NORMALS };
 
 static ebpo_status fail_corner(const obj_reading *r, ebpo_obj_word word)
@@ -364,7 +366,8 @@ static ebpo_status fail_corner(const obj_reading *r, ebpo_obj_word word)
                           text);
 }
 
-/* Reads [+-] digits, up to `end` or a slash. */
+/* Reads [+-] digits, up to `end` or a slash. Ignores digits of a number that is out of range
+ * without them. Returns false if there are no digits, or if another character follows. */
 static bool read_number(const char **at, const char *end, int64_t *number)
 {
     bool negative = *at < end && **at == '-';
@@ -378,7 +381,8 @@ static bool read_number(const char **at, const char *end, int64_t *number)
     return *at > first && (*at == end || **at == '/');
 }
 
-/* Converts an index that counts from 1, or back from the current position, to a row. */
+/* Converts an index that counts from 1 (`number` > 0), or back from the latest row so far (< 0), to
+ * a row. Returns false if the row does not exist among the `total` rows. */
 static bool resolve_index(const obj_reading *r, ebpo_import_sort sort, uint64_t total,
                           int64_t number, uint32_t *row)
 {
@@ -402,6 +406,7 @@ static ebpo_status fail_vertex_index(const obj_reading *r, int64_t number)
                                       "file");
 }
 
+/* Adds a corner to the current polygon. */
 static ebpo_status add_corner(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS],
                               ebpo_obj_word word)
 {
@@ -447,7 +452,7 @@ static ebpo_status read_face(obj_reading *r, const uint64_t total[EBPO_IMPORT_SO
     return status;
 }
 
-/* Sets the current material of all faces so far that have none. */
+/* Gives the current material to all faces that have none, and begins the named material. */
 static ebpo_status use_material(obj_reading *r)
 {
     ebpo_import_build *b = r->build;
@@ -479,6 +484,7 @@ static bool is_curve(ebpo_obj_word word)
     return false;
 }
 
+/* Returns true for statements that only affect rendering, and which are ignored silently. */
 static bool is_display(ebpo_obj_word word)
 {
     static const char *const words[] = { "mg",        "bevel",  "c_interp", "d_interp",
@@ -490,6 +496,7 @@ static bool is_display(ebpo_obj_word word)
     return false;
 }
 
+/* Counts a statement whose content the mesh cannot store. */
 static void record_other(obj_reading *r, ebpo_obj_word word)
 {
     obj_losses *l = &r->losses;
@@ -505,6 +512,8 @@ static void record_other(obj_reading *r, ebpo_obj_word word)
     }
 }
 
+/* Reads a statement in the second pass. Vertices, normals and texture coordinates are only counted,
+ * for negative indices. */
 static ebpo_status read_statement(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS],
                                   ebpo_obj_word word)
 {
@@ -548,7 +557,7 @@ static ebpo_status read_faces(obj_reading *r)
 
 /* --- the first pass: vertices, normals and texture coordinates --- */
 
-enum { MAX_WORDS = 8 };
+enum { MAX_WORDS = 8 }; /* the longest vertex has x y z red green blue alpha; one more is surplus */
 
 /* Reads the next words of the statement. Returns their number, at most MAX_WORDS. */
 static int read_words(obj_reading *r, ebpo_obj_word word[MAX_WORDS])
@@ -587,7 +596,7 @@ static ebpo_status fail_number(const obj_reading *r, ebpo_obj_word word)
                           r->build->vertices + 1);
 }
 
-/* Divides homogeneous coordinates by w. */
+/* Divides the coordinates of a vertex x y z w by w. */
 static ebpo_status divide_by_weight(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
 {
     double w;
@@ -599,7 +608,8 @@ static ebpo_status divide_by_weight(obj_reading *r, const ebpo_obj_word word[4],
     return EBPO_OK;
 }
 
-/* Adds the colour of a vertex, in the row of the vertex. */
+/* Adds the colour of the latest vertex to the table of colours, in the row of the vertex. The rows
+ * of vertices without a colour are black. coloured: the vertex has a colour (`word`). */
 static ebpo_status add_colour(obj_reading *r, const ebpo_obj_word word[3], bool coloured)
 {
     static const float none[3] = { 0, 0, 0 };
@@ -623,7 +633,7 @@ static ebpo_status add_colour(obj_reading *r, const ebpo_obj_word word[3], bool 
                              : status;
 }
 
-/* Reads x y z, x y z w, x y z red green blue, or these with an alpha. */
+/* Reads x y z, x y z w, x y z red green blue, or x y z red green blue alpha. */
 static ebpo_status read_vertex(obj_reading *r)
 {
     ebpo_obj_word word[MAX_WORDS];

@@ -9,12 +9,13 @@
 #include "core/text.h"
 #include "mesh/import_build.h"
 
+/* A word or a name of the file: n bytes at s, not terminated by zero. */
 typedef struct ebpo_obj_word {
     const char *s;
     size_t n;
 } ebpo_obj_word;
 
-/* A position in the file. Lines end with a line feed, a carriage return, or both. */
+/* A position `at` in the file. Lines end with a line feed, a carriage return, or both. */
 typedef struct ebpo_obj_text {
     const char *at, *end;
     uint64_t line; /* from 1 */
@@ -36,6 +37,7 @@ ebpo_obj_word ebpo_obj_name(ebpo_obj_text *t);
  * file. */
 bool ebpo_obj_next_statement(ebpo_obj_text *t, ebpo_obj_word *word);
 
+/* Returns true if the word equals the text. */
 bool ebpo_obj_word_is(ebpo_obj_word word, const char *text);
 
 /* Names in OBJ files: materials, which are stored as an index for each face, and groups. */
@@ -45,18 +47,19 @@ bool ebpo_obj_word_is(ebpo_obj_word word, const char *text);
 EBPO_MUST_USE ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run,
                                             const char *name, ebpo_error *error);
 
+/* The materials: their names, and the index of a name for each face. */
 typedef struct ebpo_obj_names {
-    ebpo_obj_word
-        *material;  /* [count] names in order of first use; index 0: faces without a material */
-    uint32_t *slot; /* hash table of indices */
+    /* [count] names in order of first use; name 0 stands for faces without a material */
+    ebpo_obj_word *material;
+    uint32_t *slot; /* [slots] hash table of indices of names; 0: a free slot */
     uint64_t count, capacity, slots;
     uint32_t current;  /* material of the next faces */
     uint32_t *of_face; /* [faces] material of each face */
     uint64_t face_capacity;
-    uint64_t faces; /* faces that have a material */
+    uint64_t faces; /* number of faces to which a material (or 0) was given */
 } ebpo_obj_names;
 
-/* Begins a material. EBPO_E_LIMIT, EBPO_E_MEMORY. */
+/* Makes a material the current one. EBPO_E_LIMIT, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_obj_use_material(ebpo_obj_names *names, ebpo_obj_word material,
                                                 ebpo_error *error);
 

@@ -77,7 +77,7 @@ static bool next_word(off_text *t, off_word *word)
     return true;
 }
 
-/* Counts non-empty lines, from the next line on. */
+/* Counts lines with a word, from the next line on. */
 static uint64_t count_lines(const off_text *t)
 {
     off_text ahead = *t;
@@ -93,24 +93,36 @@ static uint64_t count_lines(const off_text *t)
     } while (true);
 }
 
-enum { MAX_REST = 16, RELEASE = 1 << 22 };
+enum {
+    MAX_REST = 16,    /* number of words of the rest that are stored; more words are never valid */
+    RELEASE = 1 << 22 /* bytes between two releases of pages */
+};
 
-/* The arrangement of rows in lines, which is derived from the numbers of rows and lines. */
-typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
+/* The arrangement of rows (vertices and faces) in lines, derived from the numbers of rows and
+ * lines. */
+typedef enum rows_in {
+    ROW_A_LINE,      /* one row a line */
+    ROWS_OVER_LINES, /* a row may continue on the next line; the next row begins on a new line */
+    ROWS_ANYHOW      /* a line may contain several rows */
+} rows_in;
 
 typedef struct off_reading {
     ebpo_import_build *build;
     const char *begin;
     off_text text;
-    uint64_t next_release; /* byte offset */
-    uint64_t size, vertices, faces;
-    bool normals, colours, texture, weights; /* the values of each vertex */
+    uint64_t next_release; /* offset at which pages are released again */
+    uint64_t size;         /* of the file, in bytes */
+    uint64_t vertices, faces;
+    bool normals, colours, texture, weights; /* values of each vertex that the header declares */
     rows_in rows;
-    off_word rest[MAX_REST]; /* extra words of the row */
+    /* the *rest* of the current row: its words after the coordinates or the corners */
+    off_word rest[MAX_REST];
     int rest_count;
     bool not_bytes;        /* a colour is not an integer from 0 to 255 */
     float greatest_colour; /* greatest colour value */
-    uint64_t surplus_vertices, surplus_faces, indexed; /* numbers of rows with omitted values */
+    /* numbers of vertices and of faces with values that the header does not declare or that are no
+     * colours, and of faces with an index of a colour */
+    uint64_t surplus_vertices, surplus_faces, indexed;
     uint64_t divided; /* number of vertices with a weight other than 1 */
     /* alpha: a colour has an opacity; both: vertices and faces have colours; more: text follows the
      * last face */
@@ -132,9 +144,10 @@ static ebpo_status fail_line(const off_reading *r, const char *format, ...)
 
 /* --- head --- */
 
-/* Reads the letters ST, C, N, 4 and n in this order, then the word OFF. Returns the length of the
- * letters and the word, or 0 if the word is missing. In ModelNet's files the first count follows
- * without a blank: OFF8. */
+/* Reads the first word: the optional letters ST, C, N, 4 and n in this order, which declare the
+ * vertex values, then OFF. Returns the length up to the end of OFF, or 0 if OFF is missing. (In
+ * ModelNet's files, the first count follows OFF without a blank, as in OFF8.) Sets the values of r,
+ * unless r is NULL, and *dimension: the letter n is present. */
 static size_t read_kind(off_word word, off_reading *r, bool *dimension)
 {
     const char *s = word.s, *end = s + word.n;
@@ -172,6 +185,7 @@ static bool has_off_word(const uint8_t *data, uint64_t size)
     return length && memcmp(word.s + length - 3, "OFF", 3) == 0;
 }
 
+/* Parses a count or an index. Returns false if the word is not a number of at most ten digits. */
 static bool read_count(off_word word, uint64_t *value)
 {
     *value = 0;
@@ -190,7 +204,7 @@ static ebpo_status fail_counts(const off_reading *r)
                      "file");
 }
 
-/* Reads the edge count, which is on the line of the face count, or alone on the next line. Some
+/* Skips the edge count, which is on the line of the face count, or alone on the next line. Some
  * programs omit the edge count. */
 static void read_edges(off_reading *r)
 {
@@ -216,13 +230,14 @@ static ebpo_status find_rows(off_reading *r)
     return EBPO_OK;
 }
 
+/* Reads the header: the first word and the counts. */
 static ebpo_status read_head(off_reading *r)
 {
     off_word word;
     bool dimension = false;
     if (!next_word(&r->text, &word))
         return fail_line(r, "the file is empty and contains no mesh");
-    off_text behind = r->text;
+    off_text after_word = r->text;
     size_t named = read_kind(word, r, &dimension);
     if (named) {
         off_word next;
@@ -233,10 +248,10 @@ static ebpo_status read_head(off_reading *r)
                                   "is a binary OFF file; save it as text, or as PLY");
         if (dimension)
             return ebpo_fail_file(r->build->error, EBPO_E_UNSUPPORTED, r->build->name,
-                                  "line %" PRIu64 ": its points have their own number of "
-                                  "dimensions (nOFF); save it with three "
+                                  "line %" PRIu64 ": the word nOFF declares another number of "
+                                  "dimensions than three; save the model with three "
                                   "dimensions",
-                                  behind.line);
+                                  after_word.line);
         word = next;
         if (!more)
             return fail_counts(r);
@@ -267,7 +282,7 @@ static void release_pages(off_reading *r)
     r->next_release = at + RELEASE;
 }
 
-/* Reads a required word of the row. `first`: it may be on a new line. */
+/* Reads a required word of the row. `first`: the first word, which may be on a new line. */
 static bool next_needed(off_reading *r, bool first, off_word *word)
 {
     return first || r->rows != ROW_A_LINE ? next_word(&r->text, word)
@@ -284,7 +299,8 @@ static void read_rest(off_reading *r)
             r->rest[r->rest_count++] = word;
 }
 
-/* Stores the numbers of the rest, from `first` on, in a row of a table. */
+/* Stores the numbers of the rest, from word `first` on, in a row of a table. *good: false if words
+ * are missing or are no numbers. */
 static ebpo_status keep_values(off_reading *r, ebpo_import_sort sort, int first, bool *good)
 {
     float value[3] = { 0, 0, 0 };
@@ -303,29 +319,30 @@ static ebpo_status keep_values(off_reading *r, ebpo_import_sort sort, int first,
     return r->build->attributes ? ebpo_import_row(r->build, sort, value) : EBPO_OK;
 }
 
-/* Stores normals, then colours of three or four values, then texture coordinates. */
+/* Stores the rest of a vertex: the normal, then a colour of three or four values, then texture
+ * coordinates. */
 static ebpo_status keep_rest(off_reading *r)
 {
-    int at = r->normals ? 3 : 0, left = r->rest_count - at - (r->texture ? 2 : 0);
-    bool fine = left >= 0, good;
+    int at = r->normals ? 3 : 0, colour_values = r->rest_count - at - (r->texture ? 2 : 0);
+    bool as_declared = colour_values >= 0, good;
     ebpo_status status = EBPO_OK;
     if (r->normals) {
         status = keep_values(r, EBPO_IMPORT_NORMALS, 0, &good);
-        fine &= good;
+        as_declared &= good;
     }
     if (r->colours && status == EBPO_OK) {
         status = keep_values(r, EBPO_IMPORT_COLOURS, at, &good);
-        fine &= good && (left == 3 || left == 4);
-        r->alpha |= left == 4;
+        as_declared &= good && (colour_values == 3 || colour_values == 4);
+        r->alpha |= colour_values == 4;
     } else {
-        fine &= left == 0;
+        as_declared &= colour_values == 0;
     }
     if (r->texture && status == EBPO_OK) {
         status = keep_values(r, EBPO_IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0,
                              &good);
-        fine &= good;
+        as_declared &= good;
     }
-    r->surplus_vertices += !fine;
+    r->surplus_vertices += !as_declared;
     return status;
 }
 
@@ -336,8 +353,9 @@ static ebpo_status fail_end(const off_reading *r, const char *what, uint64_t row
                           what, row);
 }
 
-/* Reads the vertex values declared by the first word when rows and lines do not correspond. */
-static ebpo_status read_rest_anyhow(off_reading *r, uint64_t row)
+/* Reads the rest of a vertex. With several rows per line, reads as many words as the header
+ * declares. */
+static ebpo_status read_vertex_rest(off_reading *r, uint64_t row)
 {
     int wanted = (r->normals ? 3 : 0) + (r->colours ? 4 : 0) + (r->texture ? 2 : 0);
     if (r->rows != ROWS_ANYHOW) {
@@ -365,7 +383,8 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
         if (!next_needed(r, k == 0, &word[k])) {
             if (k == 0 || r->text.at == r->text.end)
                 return fail_end(r, "vertex", row + (k > 0));
-            return fail_line(r, "vertex %" PRIu64 " has no three coordinates; repair the file",
+            return fail_line(r,
+                             "vertex %" PRIu64 " has fewer than three coordinates; repair the file",
                              row);
         }
         const char *s = word[k].s;
@@ -378,14 +397,14 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
     for (int k = 0; k < 3 && w != 1; k++)
         ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
     r->divided += w != 1;
-    ebpo_status status = read_rest_anyhow(r, row);
+    ebpo_status status = read_vertex_rest(r, row);
     if (status == EBPO_OK)
         status = ebpo_import_position(r->build, xyz);
     return status == EBPO_OK ? keep_rest(r) : status;
 }
 
-/* Stores the colours of a face. A single value is an index into a colour table that no file
- * contains. */
+/* Stores the colour of a face, if its rest is one. *row: its row in the table of colours, or
+ * EBPO_IMPORT_NONE. A rest of a single value is an index into a colour table of another program. */
 static ebpo_status keep_face(off_reading *r, uint32_t *row)
 {
     ebpo_import_table *t = &r->build->table[EBPO_IMPORT_COLOURS];
@@ -445,7 +464,7 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
     if (corners > r->size / 2)
         return fail_line(r,
                          "face %" PRIu64 " has %" PRIu64 " corners, more than the file can hold; "
-                         "repair it",
+                         "repair the file",
                          row, corners);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)

@@ -1,7 +1,10 @@
-/* Makes neighbouring faces consistent. Faces joined by edges with two faces form patches; one face
- * decides the direction of its patch. Edges with more than two faces are paired by the angle around
- * them. Each closed patch is then turned outwards, or inwards if it bounds a cavity
- * (shell_nesting.c). Decisions are exact and do not depend on threads. */
+/* Makes neighbouring faces consistent. Faces joined by edges with two faces form patches, whose
+ * faces get one orientation. At *crowded* edges, which have more than two faces, patches are joined
+ * in the order of the angles around the edge. Decisions are exact and do not depend on threads.
+ * (shell_nesting.c then turns each closed patch outwards, or inwards if it bounds a cavity.)
+ *
+ * A face *runs against* another face of its patch if the orientations of the two faces are not
+ * consistent. The root of a patch is its lowest face. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,15 +22,16 @@
 enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };
 
 /* Flags of faces, collected at the root of their patch.
- * - OPEN: edges with more than two faces do not balance within the patch.
+ * - OPEN: the patch does not use some crowded edge equally often in both directions.
  * - INCONSISTENT: two adjacent faces have opposite orientations.
  * - TWISTED: no orientation of the faces is consistent.
  * - BOUNDARY: the patch has an edge with one face.
  *
- * The other flags are for patches that were joined around edges with more than two faces.
- * - ROOT: the face was the root of a patch before.
- * - CONTRADICTED: the faces around the patch's edges cannot alternate.
- * - SEPARATE: becomes a separate patch again. */
+ * The other flags are for patches that were joined around crowded edges.
+ * - ROOT: the face was the root of a patch before the joining.
+ * - CONTRADICTED: the faces around the patch's crowded edges cannot alternate in direction.
+ * - UNBALANCED: as OPEN, but for the joined patch.
+ * - SEPARATE: the patch of this root becomes a separate patch again. */
 enum {
     OPEN = 1,
     INCONSISTENT = 2,
@@ -39,47 +43,50 @@ enum {
     SEPARATE = 128
 };
 
-/* A patch to make consistent: faces connected by edges that are used exactly twice, or around edges
- * that are used more often if that closes the patch (join_crowded). */
+/* A patch to make consistent: faces connected by edges that are used exactly twice, or around
+ * crowded edges if that closes the patch (join_crowded). */
 typedef struct patch {
     uint32_t root;
-    uint32_t seed; /* first face in the source; it decides the direction when nothing else does */
+    uint32_t seed; /* first face in the source; it decides the orientation when nothing else does */
     bool closed;   /* every edge has a face on its other side */
-    bool seed_turned;       /* the seed runs against the root */
-    bool turn_others;       /* turn the faces that run as the seed does */
+    bool seed_turned; /* the seed runs against the root */
+    /* true: turn the seed and the faces that do not run against it; false: turn the other faces */
+    bool turn_seed;
     uint64_t count, turned; /* number of faces, and of faces that run against the root */
     ebpo_sum volume;        /* six times the volume, with all faces oriented as the root is */
     double most;            /* largest absolute term of this sum */
 } patch;
 
 typedef struct orienting orienting;
+/* Visits an edge at its lower vertex v. links: [uses] the uses of the edge. */
 typedef ebpo_status (*edge_fn)(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                unsigned worker, ebpo_error *error);
 
 struct orienting {
     const ebpo_mesh *mesh; /* the mesh whose faces are turned */
     unsigned threads;
-    edge_fn visit; /* called at every edge, or only at edges with more than two faces */
-    bool crowded_only;
+    edge_fn visit;
+    bool crowded_only;     /* true: `visit` is called only for crowded edges */
     ebpo_mesh_frame frame; /* frame for volumes, of which only the signs are used */
     ebpo_stars stars;
     ebpo_star *star;         /* one for each thread */
-    ebpo_edge_faces *around; /* one for each thread */
-    bool crowded;            /* the mesh has edges with more than two faces */
-    /* [face_count] index << 1 of a lower face of the patch or of the face itself; plus 1 when the
-     * two faces run against each other */
+    ebpo_edge_faces *around; /* one for each thread: the faces around a crowded edge */
+    bool crowded;            /* the mesh has crowded edges */
+    /* [face_count] disjoint sets of faces: index << 1 of a lower face of the patch or of the face
+     * itself, plus 1 if the two faces run against each other */
     uint64_t *above;
     uint8_t *flags; /* [face_count] */
-    patch *patches; /* sorted by root */
+    patch *patches; /* the patches with faces to turn, sorted by root */
     uint64_t patch_count, patch_capacity;
-    uint64_t flipped, unorientable;
-    pthread_mutex_t lock; /* for the volumes of the patches */
+    uint64_t flipped;      /* number of faces that were turned */
+    uint64_t unorientable; /* number of patches without a consistent orientation */
+    pthread_mutex_t lock;  /* for the volumes of the patches */
 };
 
 /* --- joining faces to patches --- */
 
-/* Returns the root of f << 1, plus 1 when f runs against the root. Halves the path to the root; any
- * thread may do so at any time. */
+/* Returns 2 r for the root r of face f, plus 1 if f runs against r. Halves the path to the root;
+ * any thread may do so at any time. */
 static uint64_t find_root(uint64_t *above, uint32_t f)
 {
     for (uint64_t turned = 0;;) {
@@ -95,8 +102,9 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
     }
 }
 
-/* Links the higher root to the lower root, so the roots do not depend on the order of calls.
- * Returns false if the faces are already in one patch with the opposite orientation. */
+/* Joins the patches of faces a and b. turned: 1 if a runs against b, else 0. Links the higher root
+ * to the lower root, so the roots do not depend on the order of calls. Returns false if the faces
+ * are already in one patch, in which `turned` is wrong. */
 static bool join_patches(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
@@ -116,7 +124,8 @@ static void set_flags(orienting *o, uint32_t face, uint8_t flags)
     __atomic_fetch_or(&o->flags[face], flags, __ATOMIC_RELAXED);
 }
 
-/* Visits the uses of one edge. */
+/* Joins the patches of an edge's two faces. Only sets a flag at an edge with one face or more than
+ * two faces. */
 static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
 {
     uint32_t a = ebpo_link_face(&links[0]), b = ebpo_link_face(&links[uses - 1]);
@@ -203,7 +212,8 @@ static void free_stars(orienting *o)
     ebpo_stars_free(&o->stars);
 }
 
-/* Links each face directly to its root. Roots collect the flags, and precede their faces. */
+/* Links each face directly to its root, and collects the flags at the roots. Faces are visited in
+ * ascending order, so the lower face above[f] is already linked to its root. */
 static void gather_flags(orienting *o)
 {
     EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
@@ -213,9 +223,10 @@ static void gather_flags(orienting *o)
     }
 }
 
-/* --- edges with more than two faces --- */
+/* --- crowded edges --- */
 
-/* Returns the patch of a face, shifted by 1, plus 1 when it runs against the patch. */
+/* Returns 2 r for the root r of the face's patch before the joining, plus 1 if the face runs
+ * against r. */
 static uint64_t patch_at(const orienting *o, uint32_t face)
 {
     return __atomic_load_n(&o->flags[face], __ATOMIC_RELAXED) & ROOT
@@ -223,7 +234,8 @@ static uint64_t patch_at(const orienting *o, uint32_t face)
                : __atomic_load_n(&o->above[face], __ATOMIC_RELAXED);
 }
 
-/* Lists the usable faces at an edge. `joined`: lists them with their current patch. */
+/* Lists the faces at an edge with their patches before the joining, or, if `joined`, with their
+ * joined patches. Returns false when memory is short. */
 static bool list_around(orienting *o, const ebpo_link *links, uint64_t uses, bool joined,
                         ebpo_edge_faces *e)
 {
@@ -239,6 +251,8 @@ static bool list_around(orienting *o, const ebpo_link *links, uint64_t uses, boo
     return true;
 }
 
+/* Sets flags at the roots of the patches that do not use the edge equally often in both directions
+ * when all their faces are oriented as the root. */
 static void flag_unbalanced(orienting *o, ebpo_edge_faces *e, uint8_t flags)
 {
     ebpo_edge_faces_sort(e);
@@ -273,8 +287,8 @@ static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_
     return EBPO_OK;
 }
 
-/* Joins faces of patches that are not closed by themselves, so that around the edge, regions inside
- * and outside of a solid alternate. */
+/* Joins faces of patches that are OPEN, so that around the edge, regions inside and outside of a
+ * solid alternate. */
 static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                unsigned worker, ebpo_error *error)
 {
@@ -302,8 +316,9 @@ static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t us
     return EBPO_OK;
 }
 
-/* Separates patches that joining did not close. Patches that already alternate around every edge
- * stay joined, whatever the order of coplanar layers. */
+/* Separates patches that the joining did not close, because the orientations that their edges
+ * demand contradict each other. Exception: patches whose faces already alternated around every
+ * edge before the joining stay joined, whatever the order of coplanar layers. */
 static void separate_patches(orienting *o)
 {
     const uint8_t bad = CONTRADICTED | UNBALANCED;
@@ -328,9 +343,8 @@ static void separate_patches(orienting *o)
     }
 }
 
-/* Joins patches around edges with more than two faces if the joined patches are then closed. A
- * patch that is closed by itself, such as a cube that shares an edge with another cube, stays
- * separate. */
+/* Joins patches around crowded edges if the joined patches are then closed. A patch that is closed
+ * without the joining, such as a cube that shares an edge with another cube, stays separate. */
 static ebpo_status join_crowded(orienting *o, ebpo_error *error)
 {
     EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count)
@@ -351,6 +365,7 @@ static ebpo_status join_crowded(orienting *o, ebpo_error *error)
     separate_patches(o);
     EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
         uint64_t root = find_root(o->above, (uint32_t)f);
+        /* in a patch without INCONSISTENT, no face is turned */
         o->above[f] = o->flags[root >> 1] & INCONSISTENT ? root : root & ~UINT64_C(1);
         o->flags[root >> 1] |= o->flags[f] & (INCONSISTENT | BOUNDARY | TWISTED);
     }
@@ -359,6 +374,7 @@ static ebpo_status join_crowded(orienting *o, ebpo_error *error)
 
 /* --- the faces to turn --- */
 
+/* Lists the patches with faces to turn. Returns false when memory is short. */
 static bool list_patches(orienting *o)
 {
     EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count) {
@@ -397,6 +413,7 @@ static patch *patch_of(orienting *o, uint64_t f, patch *last)
     return &o->patches[low];
 }
 
+/* Counts the faces of each patch, and finds its seed. */
 static void count_faces(orienting *o)
 {
     patch *p = NULL;
@@ -421,7 +438,8 @@ static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
     pthread_mutex_unlock(&o->lock);
 }
 
-/* Measures the patches. The sum is exact, so the order of additions by threads does not matter. */
+/* Adds up the volumes of closed patches. The sum is exact, so the order in which threads add terms
+ * does not matter. */
 static ebpo_status measure_patches(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                    ebpo_error *error)
 {
@@ -459,13 +477,15 @@ static ebpo_status measure_patches(void *context, uint64_t begin, uint64_t end, 
     return EBPO_OK;
 }
 
+/* Decides which faces of a patch are turned, so that its volume is positive, or, without a volume,
+ * so that as few faces as possible are turned. */
 static void decide_direction(patch *p)
 {
     double volume = p->closed ? ebpo_sum_value(&p->volume) : 0;
     volume = ebpo_volume_is_noise(volume, p->count, p->most) ? 0 : volume;
     volume = p->seed_turned ? -volume : volume;
     uint64_t against_seed = p->seed_turned ? p->count - p->turned : p->turned;
-    p->turn_others = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
+    p->turn_seed = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
 }
 
 static ebpo_status flip_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -477,7 +497,7 @@ static ebpo_status flip_faces(void *context, uint64_t begin, uint64_t end, unsig
     patch *p = NULL;
     EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, begin, end) {
         p = patch_of(o, f, p);
-        if (!p || ((o->above[f] & 1) != p->seed_turned) == p->turn_others)
+        if (!p || ((o->above[f] & 1) != p->seed_turned) == p->turn_seed)
             continue;
         ebpo_face_turn(o->mesh->faces + 3 * f);
         flipped++;
@@ -486,7 +506,8 @@ static ebpo_status flip_faces(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* Finds the patches; `above` and `flags` then describe each face's patch. */
+/* Finds the patches. Afterwards o->above has the root of each face, and o->flags the flags of each
+ * root. */
 static ebpo_status find_patches(orienting *o, ebpo_error *error)
 {
     const ebpo_mesh *mesh = o->mesh;
@@ -495,7 +516,7 @@ static ebpo_status find_patches(orienting *o, ebpo_error *error)
     o->above = ebpo_array_alloc(mesh->workspace, count, sizeof *o->above);
     o->flags = ebpo_array_alloc(mesh->workspace, count, 1);
     if (!o->above || !o->flags)
-        return ebpo_workspace_fail(mesh->workspace, count * 9, error);
+        return ebpo_workspace_fail(mesh->workspace, count * (sizeof *o->above + 1), error);
     ebpo_status status = join_faces(o, error);
     if (status == EBPO_OK)
         gather_flags(o);
@@ -523,7 +544,7 @@ static ebpo_status turn_patches(orienting *o, ebpo_error *error)
                : status;
 }
 
-/* Writes each face's patch if it is closed, otherwise EBPO_NO_INDEX. */
+/* Lists for each face the root of its patch if the patch is closed, otherwise EBPO_NO_INDEX. */
 static ebpo_status list_closed(const orienting *o, uint32_t **closed, ebpo_error *error)
 {
     const ebpo_mesh *mesh = o->mesh;

@@ -10,15 +10,16 @@
 #include "geometry/decimal.h"
 #include "mesh/ply_parts.h"
 
+/* The reading of the rows of an element. */
 typedef struct rows {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
-    uint64_t row;
-    uint64_t to; /* row in the attribute arrays; for a face, the row of its first triangle */
-    bool store;
-    /* false in the first pass over elements that precede the vertices, which are read twice, so
-     * that nothing is counted twice */
-    bool once;
+    uint64_t row; /* index of the current row */
+    uint64_t to;  /* row in the attribute arrays; for a face, the row of its first triangle */
+    bool store;   /* false: values are skipped */
+    /* true: extra values are counted. Elements that precede the vertices are read twice; this is
+     * false in the first pass, so that nothing is counted twice */
+    bool count_surplus;
     uint64_t line; /* line where the row begins */
 } rows;
 
@@ -57,8 +58,8 @@ static ebpo_status next_integer(rows *r, int64_t *value)
 }
 
 /* Reads a coordinate that the header declares as float. If the float differs from the text, records
- * the rounding error. Point files (`strict`) have no such record, so their points keep the double.
- */
+ * the rounding error. Query points (p->strict) have no such record, so they keep the double.
+ * Returns false if the text is not a number. */
 static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
 {
     float narrow;
@@ -75,6 +76,7 @@ static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
     return true;
 }
 
+/* Stores a coordinate. Returns false if the text is not a number of the declared type. */
 static bool parse_coordinate(const rows *r, const ebpo_ply_property *property, ebpo_ply_word token)
 {
     ebpo_ply_parser *p = r->p;
@@ -95,6 +97,7 @@ static bool parse_coordinate(const rows *r, const ebpo_ply_property *property, e
     return good;
 }
 
+/* Reads the vertex indices of a face or strip into p->corners. */
 static ebpo_status read_corners(rows *r, uint64_t count)
 {
     ebpo_ply_parser *p = r->p;
@@ -192,8 +195,8 @@ static bool more_here(ebpo_ply_parser *p)
     return p->at < p->size && !ends_line(p->data[p->at]);
 }
 
-/* Counts extra values at the end of a row. If the row began in an earlier line, a row has too few
- * or too many values, which is an error. */
+/* Counts extra values between the end of a row and the end of the line. If the row began in an
+ * earlier line, this row or an earlier row has too few or too many values, which is an error. */
 static ebpo_status end_row(rows *r)
 {
     ebpo_ply_parser *p = r->p;
@@ -210,12 +213,13 @@ static ebpo_status end_row(rows *r)
                                  "too few or too many values; repair the "
                                  "file",
                                  ebpo_ply_row_name(r->element), r->row, r->line);
-        p->surplus_values += r->once;
+        p->surplus_values += r->count_surplus;
     }
     p->surplus_rows += p->surplus_values > before;
     return EBPO_OK;
 }
 
+/* Skips white space before a row, and records the line where the row begins. */
 static void begin_row(rows *r)
 {
     ebpo_ply_parser *p = r->p;
@@ -252,7 +256,7 @@ ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *e
 {
     rows r = { .p = p,
                .element = element,
-               .once = store,
+               .count_surplus = store,
                .store = store && (element->kind != EBPO_PLY_KIND_OTHER || p->lost) };
     ebpo_status status = EBPO_OK;
     if (!element->properties) /* rows without values have no text */

@@ -51,12 +51,13 @@ static bool keep_names(char *to, size_t capacity, const ebpo_ply_property *prope
     return true;
 }
 
-/* Returns the number of adjacent properties of one type whose names form a group. */
-static unsigned find_together(const ebpo_ply_property *property, uint64_t left)
+/* Returns the number of properties, from property[0] on, that have one type and whose names form a
+ * group: at least 1, at most `limit` and 4. */
+static unsigned group_length(const ebpo_ply_property *property, uint64_t limit)
 {
     ebpo_attribute_name names[4];
     unsigned count = 0;
-    while (count < 4 && count < left && property[count].role == EBPO_PLY_ROLE_NONE &&
+    while (count < 4 && count < limit && property[count].role == EBPO_PLY_ROLE_NONE &&
            !property[count].list && property[count].type == property[0].type) {
         names[count] = (ebpo_attribute_name){ property[count].name.s, property[count].name.n };
         count++;
@@ -64,6 +65,7 @@ static unsigned find_together(const ebpo_ply_property *property, uint64_t left)
     return count ? ebpo_attribute_names_together(names, count) : 1;
 }
 
+/* Records that a property is not kept, and why. */
 static void lose_property(const ebpo_ply_parser *p, const ebpo_ply_element *element,
                           const ebpo_ply_property *property, const char *why)
 {
@@ -76,7 +78,7 @@ static void lose_property(const ebpo_ply_parser *p, const ebpo_ply_element *elem
 
 /* Returns true if an earlier element of the same name has another number of rows. Such elements
  * cannot be kept, because arrays are found by name. */
-static bool is_second(const ebpo_attributes *to, const ebpo_attribute *a, uint64_t rows)
+static bool has_namesake(const ebpo_attributes *to, const ebpo_attribute *a, uint64_t rows)
 {
     for (uint64_t i = 0; i < to->count; i++)
         if (ebpo_attribute_is_of(&to->array[i], a->element) && to->array[i].rows != rows)
@@ -84,6 +86,8 @@ static bool is_second(const ebpo_attributes *to, const ebpo_attribute *a, uint64
     return false;
 }
 
+/* Adds an array for `columns` properties from `property` on, and reserves space for its rows. If
+ * the array cannot be kept, records this and succeeds. */
 static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *element,
                               ebpo_ply_property *property, unsigned columns)
 {
@@ -102,7 +106,7 @@ static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *elemen
     }
     bool face = element->kind == EBPO_PLY_KIND_FACE;
     a.rows = face ? 0 : element->count;
-    if (is_second(to, &a, a.rows)) {
+    if (has_namesake(to, &a, a.rows)) {
         lose_property(p, element, property,
                       "another element has the same name and a different row count");
         return EBPO_OK;
@@ -128,7 +132,7 @@ static ebpo_status plan_element(ebpo_ply_parser *p, const ebpo_ply_element *elem
         if (property[i].role == EBPO_PLY_ROLE_NONE && element->kind == EBPO_PLY_KIND_STRIPS) {
             lose_property(p, element, &property[i], "not supported for triangle strips");
         } else if (property[i].role == EBPO_PLY_ROLE_NONE && element->count) {
-            columns = find_together(property + i, element->properties - i);
+            columns = group_length(property + i, element->properties - i);
             status = plan_array(p, element, property + i, columns);
         }
         i += columns;
@@ -199,6 +203,7 @@ ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *prope
     return EBPO_OK;
 }
 
+/* Returns true if an integer type can hold the value. */
 static bool value_fits(int64_t value, ebpo_ply_type type)
 {
     static const int64_t least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 },
@@ -207,7 +212,8 @@ static bool value_fits(int64_t value, ebpo_ply_type type)
     return value >= least[type] && value <= most[type];
 }
 
-/* Returns false if the text is not a value of the type. */
+/* Converts text to the bits of a value, in the low bytes of *bits. Returns false if the text is not
+ * a value of the type. */
 static bool text_bits(ebpo_ply_parser *p, ebpo_ply_type type, ebpo_ply_word token, uint64_t *bits)
 {
     int64_t whole;
@@ -256,6 +262,7 @@ uint64_t ebpo_ply_text_bits(ebpo_ply_parser *p, const ebpo_ply_property *propert
 
 /* --- polygons --- */
 
+/* Copies a row to the rows from row + 1 to end - 1: all triangles of a polygon have its values. */
 static void repeat_columns(const ebpo_attribute *a, uint64_t row, uint64_t end)
 {
     size_t bytes = a->columns * (size_t)ebpo_attribute_bytes(a->type);

@@ -1,6 +1,6 @@
-/* Reads the body of a binary PLY file, of either byte order. All cores read rows of equal size.
- * Other rows are read one by one; this also locates errors. Positions go to the mesh, faces are
- * triangulated, and other properties go to the attributes.
+/* Reads the body of a binary PLY file, of either byte order. Rows of equal size are read on all
+ * cores. Other rows are read one by one, which also locates errors. Positions go to the mesh, faces
+ * are triangulated, and other properties go to the attributes.
  *
  * Source: Greg Turk, "The PLY Polygon File Format", 1994. */
 #include "core/strict_fp.h"
@@ -76,21 +76,25 @@ static void store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_prope
     }
 }
 
+/* The encoding whose byte order is not the machine's. */
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 enum { FOREIGN = EBPO_PLY_BIG };
 #else
 enum { FOREIGN = EBPO_PLY_LITTLE };
 #endif
 
+/* The row-by-row reading of an element. */
 typedef struct rows {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
-    uint64_t row;
-    uint64_t to; /* row in the attribute arrays; for a face, the row of its first triangle */
-    bool swap;   /* the file's byte order differs from the machine's */
-    bool store;
+    uint64_t row; /* index of the current row */
+    uint64_t to;  /* row in the attribute arrays; for a face, the row of its first triangle */
+    bool swap;    /* the file's byte order differs from the machine's */
+    bool store;   /* false: values are skipped */
 } rows;
 
+/* Reads the vertex indices of a face or strip into p->corners. On failure, p->at is the offset of
+ * the invalid index. */
 static ebpo_status store_corners(rows *r, const ebpo_ply_property *property, uint64_t count)
 {
     ebpo_ply_parser *p = r->p;
@@ -230,10 +234,9 @@ ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *
     return status;
 }
 
-/* Reads rows of equal size on all cores: vertices without lists, and faces while each is a
- * triangle. */
+/* --- rows of equal size, on all cores: vertices without lists, and triangles --- */
 
-enum { GRAIN = 1 << 14 };
+enum { GRAIN = 1 << 14 }; /* number of rows for each call of a thread's function */
 
 typedef struct plain {
     ebpo_ply_parser *p;
@@ -281,6 +284,7 @@ static ebpo_status read_vertices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
+/* Lowers t->deviates to `row`. The error ends the calling thread's range. */
 static ebpo_status record_deviation(plain *t, uint64_t row)
 {
     uint64_t lowest = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
@@ -330,8 +334,8 @@ static ebpo_status read_faces(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* Fills in the layout of triangle rows. Returns false when rows have another list, or the rows do
- * not fit the file. */
+/* Computes the layout of rows that are triangles. Returns false if the rows have another list, or
+ * if the file or the face array is too small for all of them. */
 static bool describe_triangles(plain *t)
 {
     uint64_t at = 0;
@@ -353,6 +357,7 @@ static bool describe_triangles(plain *t)
            t->element->count <= t->p->face_capacity - t->first;
 }
 
+/* Calls `task` for all rows, on all cores. */
 static ebpo_status run_on_rows(plain *t, ebpo_task_fn task)
 {
     ebpo_ply_parser *p = t->p;
@@ -363,9 +368,9 @@ static ebpo_status run_on_rows(plain *t, ebpo_task_fn task)
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-/* Read the rows from p->at on that have one size, and set *done to their number: all vertices or
- * none, and the faces before the first face that is not a triangle or has an invalid vertex index.
- * The row-by-row reader reads the other rows and reports their errors. */
+/* These two functions read rows of equal size from p->at on, and set *done to the number of rows:
+ * all vertices or none; the faces before the first face that is not a triangle or has an invalid
+ * vertex index. The row-by-row reader reads the other rows and reports their errors. */
 static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
                                        bool swap, uint64_t *done)
 {

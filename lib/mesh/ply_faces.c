@@ -74,6 +74,7 @@ static void corner_position(const ebpo_mesh *mesh, uint32_t vertex, double out[3
                              : (double)mesh->xyz32[3 * (uint64_t)vertex + k];
 }
 
+/* Adds the triangles of p->corners, a polygon of n > 3 corners. */
 static ebpo_status triangulate_face(ebpo_ply_parser *p, uint32_t n, uint64_t row)
 {
     ebpo_status status = reserve_scratch(p, n);
@@ -159,22 +160,26 @@ ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row)
     return status;
 }
 
-/* Removes vertices that no face uses and whose coordinates are not finite. Scanners write such
- * vertices for directions without a measured point. The OBJ and OFF readers omit all unused
- * vertices. */
+/* --- removal of vertices that no face uses and whose coordinates are not finite ---
+ *
+ * Scanners write such vertices for directions without a measured point. (The OBJ and OFF readers
+ * omit all unused vertices.) */
 
-enum { GRAIN = 1 << 15, WORD = 64 };
+enum {
+    GRAIN = 1 << 15, /* number of vertices for each call of a thread's function */
+    WORD = 64        /* bits of a word of vertex_removal.used */
+};
 
 typedef struct vertex_removal {
     ebpo_ply_parser *p;
     bool found; /* a coordinate is not finite */
-    /* a face uses a vertex that is not finite: nothing is removed, and the mesh check will report
-     * it with the file's indices */
+    /* a face uses a vertex that is not finite: nothing is removed, so that the mesh check reports
+     * this vertex with its index in the file */
     bool refused;
     uint64_t *used; /* bit v: a face uses vertex v */
     uint32_t *from; /* [kept] old indices of the kept vertices */
-    uint32_t *to;   /* [vertices] new indices */
-    uint64_t kept;
+    uint32_t *to;   /* [vertices] new index of each kept vertex */
+    uint64_t kept;  /* number of kept vertices */
 } vertex_removal;
 
 static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
@@ -238,8 +243,8 @@ static void move_vertices(const vertex_removal *l)
     }
 }
 
-/* Drops elements other than vertices and faces, because they may refer to vertices by indices that
- * have changed. */
+/* Keeps the attributes of kept vertices. If vertex indices have changed, drops the elements other
+ * than vertices and faces, because these elements may contain vertex indices. */
 static void move_attributes(const vertex_removal *l)
 {
     ebpo_attributes *attributes = l->p->mesh->attributes;

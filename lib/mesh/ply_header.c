@@ -22,9 +22,9 @@ enum {
 
 typedef struct reader {
     ebpo_ply_header *header;
-    const char *at, *end;
-    uint64_t line;
-    const char *name;
+    const char *at, *end; /* the bytes of the header that have not been read */
+    uint64_t line;        /* current line, from 1 */
+    const char *name;     /* of the file, for messages */
     bool format_seen;
     ebpo_error *error;
 } reader;
@@ -140,25 +140,26 @@ static ebpo_status format_statement(reader *r, const ebpo_ply_word *words, int n
     return EBPO_OK;
 }
 
+/* Sets the kind of an element by its name, and records the element's index in the header. */
 static ebpo_status record_kind(reader *r, ebpo_ply_element *element)
 {
     ebpo_ply_header *h = r->header;
-    int64_t *place;
+    int64_t *index;
     if (word_is(element->name, "vertex")) {
         element->kind = EBPO_PLY_KIND_VERTEX;
-        place = &h->vertex;
+        index = &h->vertex;
     } else if (word_is(element->name, "face")) {
         element->kind = EBPO_PLY_KIND_FACE;
-        place = &h->face;
+        index = &h->face;
     } else if (word_is(element->name, "tristrips")) {
         element->kind = EBPO_PLY_KIND_STRIPS;
-        place = &h->strips;
+        index = &h->strips;
     } else {
         return EBPO_OK;
     }
-    if (*place >= 0)
+    if (*index >= 0)
         return fail_in_line(r, "duplicate element", element->name);
-    *place = (int64_t)h->elements;
+    *index = (int64_t)h->elements;
     return EBPO_OK;
 }
 
@@ -198,6 +199,7 @@ static ebpo_ply_role role_of(const ebpo_ply_element *element, const ebpo_ply_pro
     return EBPO_PLY_ROLE_NONE;
 }
 
+/* Returns true if the current element already has a property with this role. */
 static bool role_taken(const ebpo_ply_header *h, const ebpo_ply_element *element,
                        ebpo_ply_role role)
 {
@@ -255,8 +257,9 @@ static ebpo_status read_statement(reader *r, ebpo_ply_word line, bool *ended)
         *ended = true;
         return EBPO_OK;
     }
-    /* Blender 2.47 omitted the word "comment" in its first line. After the first element, an
-     * unknown statement is an error, as it could change the meaning of the body. */
+    /* Blender 2.47 omitted the word "comment" in its first line, so unknown statements before the
+     * first element are treated as comments. After the first element they are errors, because they
+     * could change the meaning of the body. */
     r->header->notes++;
     return r->header->elements ? fail_in_line(r, "unknown statement", words[0]) : EBPO_OK;
 }
@@ -273,6 +276,7 @@ const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_e
     return at < end && (*at == '\n' || *at == '\r') ? at : NULL;
 }
 
+/* Reads the first line, "ply". */
 static ebpo_status check_magic(reader *r, uint64_t size)
 {
     ebpo_ply_word line;
@@ -316,6 +320,7 @@ static bool has_role(const ebpo_ply_header *h, const ebpo_ply_element *element, 
     return false;
 }
 
+/* Checks that vertices have coordinates, and faces and strips have vertex indices. */
 static ebpo_status check_roles(const reader *r)
 {
     const ebpo_ply_header *h = r->header;
@@ -375,7 +380,7 @@ void ebpo_ply_header_free(ebpo_ply_header *header)
 
 /* --- messages and progress of the reader --- */
 
-enum { REPORT_BYTES = 1 << 22 };
+enum { REPORT_BYTES = 1 << 22 }; /* bytes of the file between two reports of progress */
 
 ebpo_status ebpo_ply_fail(const ebpo_ply_parser *p, const char *format, ...)
 {

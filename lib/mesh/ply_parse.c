@@ -24,8 +24,8 @@ bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
     return ebpo_ply_first_line(data, size, &line_end) != NULL;
 }
 
-/* Computes the minimum number of bytes of all rows of an element. Returns false if the number does
- * not fit into 64 bits. */
+/* Computes the minimum number of bytes that the rows of an element take in the file. Returns false
+ * if the number does not fit into 64 bits. */
 static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *element, uint64_t *bytes)
 {
     uint64_t row = element->row_bytes;
@@ -84,7 +84,7 @@ static ebpo_status check_counts(const ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-/* Returns true if the mesh stores coordinates as floats: all three are floats in the file.
+/* Returns true if the mesh stores coordinates as floats: the file declares all three as floats.
  * Coordinates of other types are stored as doubles, which represent them exactly. Query points
  * (p->strict) are always stored as doubles. */
 static bool all_float(const ebpo_ply_parser *p)
@@ -151,6 +151,8 @@ static ebpo_status read_early_faces(ebpo_ply_parser *p)
     return status;
 }
 
+/* Reads all elements. Elements before the vertices are skipped first, and read after the vertices.
+ */
 static ebpo_status read_body(ebpo_ply_parser *p)
 {
     ebpo_status status = EBPO_OK;
@@ -186,7 +188,7 @@ static void describe_source(ebpo_ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
-/* Records in mesh->attributes what was not read of the file. */
+/* Records in mesh->attributes which data of the file was not read or was rounded. */
 static ebpo_status record_unread(ebpo_ply_parser *p)
 {
     bool more = p->header.encoding == EBPO_PLY_ASCII && ebpo_ply_ascii_more(p);
@@ -287,7 +289,7 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     ebpo_ply_parser p = {
         .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
     };
-    p.strict = true; /* query points have no record of omitted values, so these are errors */
+    p.strict = true; /* query points have no record of omitted values, so such values are errors */
     *xyz = NULL;
     *count = 0;
     ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);

@@ -12,6 +12,7 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 
+/* The formats of the body: text, or binary with little-endian or big-endian values. */
 typedef enum ebpo_ply_encoding { EBPO_PLY_ASCII, EBPO_PLY_LITTLE, EBPO_PLY_BIG } ebpo_ply_encoding;
 typedef enum ebpo_ply_type {
     EBPO_PLY_INT8,
@@ -31,6 +32,7 @@ typedef enum ebpo_ply_role {
     EBPO_PLY_ROLE_Z,
     EBPO_PLY_ROLE_CORNERS
 } ebpo_ply_role;
+/* The kind of an element (a list of items with the same properties). */
 typedef enum ebpo_ply_kind {
     EBPO_PLY_KIND_OTHER,
     EBPO_PLY_KIND_VERTEX,
@@ -50,14 +52,14 @@ typedef struct ebpo_ply_property {
     ebpo_ply_type count_type; /* type of the list length */
     bool list;
     ebpo_ply_role role;
-    int attribute; /* index of the array for the values, and its column; -1: none */
-    unsigned column;
+    int attribute;   /* index of the array for the values; -1: none */
+    unsigned column; /* column of this array */
 } ebpo_ply_property;
 
 typedef struct ebpo_ply_element {
     ebpo_ply_word name;
     ebpo_ply_kind kind;
-    uint64_t count;
+    uint64_t count;             /* number of rows */
     uint64_t line;              /* line in the header, from 1 */
     uint64_t first, properties; /* range in ebpo_ply_header.property */
     uint64_t row_bytes; /* binary: least size of a row; its exact size if the element has no list */
@@ -77,7 +79,7 @@ typedef struct ebpo_ply_header {
     uint64_t notes;               /* lines that are comments, obj_info or unknown */
 } ebpo_ply_header;
 
-enum { EBPO_PLY_HEADER_LONGEST = 1 << 20 };
+enum { EBPO_PLY_HEADER_LONGEST = 1 << 20 }; /* in bytes */
 
 /* Parses the header at the start of `data`; `name` appears in messages. The words point into
  * `data`. On failure `out` is empty. ebpo_ply_parse_memory checks later that the counts fit the
@@ -86,8 +88,9 @@ EBPO_MUST_USE ebpo_status ebpo_ply_header_parse(ebpo_ply_header *out, const uint
                                                 uint64_t size, const char *name, ebpo_error *error);
 void ebpo_ply_header_free(ebpo_ply_header *header);
 
-/* Returns a pointer to the line end of the first line, "ply". A byte order mark may precede it and
- * blanks may follow it. Returns NULL when there is no such line. */
+/* Returns a pointer to the line end of the first line, "ply", and sets *line_end to the character
+ * that ends lines. A byte order mark may precede the word, and blanks may follow it. Returns NULL
+ * if there is no such line. */
 const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end);
 
 /* Returns the bytes of one value in a binary file: 1, 2, 4 or 8. */
@@ -154,6 +157,7 @@ EBPO_MUST_USE ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p);
 /* Reserves space for a total of `faces` faces. */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_reserve(ebpo_ply_parser *p, uint64_t faces);
 
+/* Returns true if an attribute array receives the values of the property. */
 static inline bool ebpo_ply_is_attribute(const ebpo_ply_property *property)
 {
     return property->attribute >= 0;
@@ -164,12 +168,13 @@ static inline bool ebpo_ply_is_attribute(const ebpo_ply_property *property)
 void ebpo_ply_put_value(const ebpo_ply_parser *p, const ebpo_ply_property *property, uint64_t row,
                         uint64_t bits);
 
-/* Appends a list for `row`. Sets *items to the place for its `count` items. */
+/* Appends a list for `row`, and sets *items to the address where the caller stores its `count`
+ * items. */
 EBPO_MUST_USE ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *property,
                                             uint64_t row, uint64_t count, uint8_t **items);
 
-/* Converts text to the bits of a value. If the value does not fit the type, the property is
- * omitted. */
+/* Converts text to the bits of a value. If the text is not a value of the property's type, the mesh
+ * will not have this attribute, which is recorded. */
 uint64_t ebpo_ply_text_bits(ebpo_ply_parser *p, const ebpo_ply_property *property,
                             ebpo_ply_word token, uint64_t row);
 /* Stores bits at address `at`. */
@@ -188,7 +193,7 @@ void ebpo_ply_blank_faces(ebpo_ply_parser *p, uint64_t first);
  * rows are only skipped. */
 ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *element, bool store);
 
-/* Skips blanks after the last row. Returns true if more text follows. */
+/* Skips blanks after the last row of the last element. Returns true if more text follows. */
 bool ebpo_ply_ascii_more(ebpo_ply_parser *p);
 
 /* --- the body of a binary file, of either byte order --- */

@@ -34,7 +34,8 @@ typedef struct ply_out_property {
 
 typedef struct ply_out_element {
     ebpo_ply_kind kind;
-    uint64_t rows, first, properties; /* range in ply_layout.property */
+    uint64_t rows;
+    uint64_t first, properties; /* range in ply_layout.property */
 } ply_out_element;
 
 typedef struct ply_layout {
@@ -48,14 +49,16 @@ typedef struct ply_layout {
 
 static void free_layout(ply_layout *layout);
 
+/* The creation of a layout. */
 typedef struct making {
     ply_layout *out;
     const ebpo_mesh *mesh;
-    FILE *text;  /* header text */
-    bool *taken; /* [arrays * EBPO_ATTRIBUTE_COLUMNS] columns that the header already has */
-    ebpo_ply_type index_type;
-    bool faces; /* the header has the face element */
-    bool no_memory;
+    FILE *text; /* receives the new header */
+    /* [arrays][EBPO_ATTRIBUTE_COLUMNS] columns that the new header already has */
+    bool *taken;
+    ebpo_ply_type index_type; /* type that holds all vertex indices */
+    bool faces;               /* the new header already has the face element */
+    bool no_memory;           /* memory was short: the layout is not usable */
 } making;
 
 static const char *const type_words[] = { "char", "uchar", "short", "ushort",
@@ -133,8 +136,8 @@ static void put_line(making *m, ebpo_ply_word line)
     fprintf(m->text, "%.*s\n", (int)line.n, line.s);
 }
 
-/* Adds a position or corner property. `line`: the header line with the wanted type, or an empty
- * line. */
+/* Adds the property of a coordinate. `line`: the line of the source header, which has the wanted
+ * type, or an empty line. */
 static void add_position(making *m, ebpo_ply_role role, ebpo_ply_type wanted, ebpo_ply_word line)
 {
     ebpo_ply_type type = axis_type(m, role, wanted);
@@ -145,6 +148,8 @@ static void add_position(making *m, ebpo_ply_role role, ebpo_ply_type wanted, eb
     add_property(m, (ply_out_property){ .role = role, .type = type });
 }
 
+/* Adds the property of the corners, a list. count: type of the list length. wanted: type of the
+ * vertex indices, if it holds all of them. line: as for add_position. */
 static void add_corners(making *m, ebpo_ply_type count, ebpo_ply_type wanted, ebpo_ply_word name,
                         ebpo_ply_word line)
 {
@@ -191,7 +196,8 @@ static void add_column(making *m, uint64_t array, uint32_t column)
                                         .count_type = (ebpo_ply_type)a->list });
 }
 
-/* Adds the column with the values of a header property. Returns false when there is none. */
+/* Adds the column with the values of a property of the source header. Returns false if the mesh has
+ * no such column. */
 static bool add_named(making *m, ebpo_ply_word element, const ebpo_ply_property *property)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
@@ -231,6 +237,7 @@ static void add_rest(making *m, const char *element)
     }
 }
 
+/* Returns the number of rows of an element of attributes, or 0. */
 static uint64_t rows_of(const making *m, ebpo_ply_word element)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
@@ -250,6 +257,7 @@ static void begin_faces(making *m)
     add_element(m, EBPO_PLY_KIND_FACE, m->mesh->face_count);
 }
 
+/* Adds the columns of the element that the source header does not have. */
 static void end_element(making *m, ebpo_ply_kind kind)
 {
     if (kind == EBPO_PLY_KIND_VERTEX)
@@ -274,6 +282,7 @@ static void add_other_elements(making *m)
 
 static const ebpo_ply_word default_corners = { "vertex_indices", 14 };
 
+/* Makes the layout without a source header. */
 static void make_plain(making *m)
 {
     fprintf(m->text, "ply\nformat binary_little_endian 1.0\nelement vertex %" PRIu64 "\n",
@@ -292,10 +301,11 @@ static void make_plain(making *m)
 
 /* --- the source header --- */
 
+/* The reading of the source header, statement by statement, while the new header is made. */
 typedef struct following {
     making *m;
-    ebpo_ply_header header;
-    uint64_t element, property; /* number of statements so far */
+    ebpo_ply_header header;     /* the source header */
+    uint64_t element, property; /* numbers of element and property statements so far */
     ebpo_ply_kind kind;         /* kind of the current element, as written */
     uint64_t rows;              /* rows of the current element */
     bool skipped;               /* the current element is omitted */
@@ -307,6 +317,8 @@ static void close_element(following *f)
         end_element(f->m, f->kind);
 }
 
+/* Adds an element. Strips are written as faces. Omits a second element of faces, and elements whose
+ * attributes the mesh does not have any more. */
 static void follow_element(following *f)
 {
     making *m = f->m;
@@ -329,7 +341,7 @@ static void follow_element(following *f)
     add_element(m, f->kind, f->rows);
 }
 
-/* Adds a property. Elements without rows keep all properties. */
+/* Adds a property. Elements without rows keep all properties of the source header. */
 static void follow_property(following *f, ebpo_ply_word line)
 {
     making *m = f->m;
@@ -382,7 +394,8 @@ static void follow_header(following *f, const char *at, const char *end)
     }
 }
 
-/* Returns false when there is no usable source header. */
+/* Makes the layout in the order of the source header. Returns false, with an unchanged layout, if
+ * there is no usable source header. */
 static bool make_as_source(making *m)
 {
     const ebpo_attributes *all = m->mesh->attributes;
@@ -439,7 +452,7 @@ static void free_layout(ply_layout *layout)
 
 /* --- writing --- */
 
-enum { BUFFER = 1 << 16 };
+enum { BUFFER = 1 << 16 }; /* bytes */
 
 static ebpo_status check_mesh(const ebpo_mesh *mesh, ebpo_error *error)
 {
@@ -499,7 +512,7 @@ static void put_position(writing *w, const ply_out_property *p, uint64_t row)
     float narrow = w->mesh->xyz32 ? w->mesh->xyz32[at] : (float)w->mesh->xyz64[at];
     if (p->type == EBPO_PLY_FLOAT32) {
         memcpy(&bits, &narrow, sizeof narrow);
-        bits = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? bits : bits >> 32;
+        bits = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? bits : bits >> 32; /* the low bytes */
     } else if (p->type == EBPO_PLY_FLOAT64) {
         memcpy(&bits, &w->mesh->xyz64[at], sizeof bits);
     } else {

@@ -18,7 +18,10 @@
 
 /* --- repeated faces --- */
 
-enum { DROP_GRAIN = 1 << 13, WORD = 64 };
+enum {
+    DROP_GRAIN = 1 << 13, /* number of vertices for each call of a thread's function */
+    WORD = 64             /* bits of a word of dropping.removed */
+};
 
 typedef struct dropping {
     ebpo_mesh *mesh;
@@ -103,8 +106,8 @@ static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Removes the marked faces in place. Sorted faces stay sorted, and every vertex that had a face
- * keeps one. */
+/* Removes the marked faces in place. Sorted faces stay sorted. Every vertex that had a face still
+ * has one, because the first of the repeated faces stays. */
 static void remove_marked(const dropping *d)
 {
     ebpo_mesh *mesh = d->mesh;
@@ -223,7 +226,7 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
 
 /* --- all repairs, in order --- */
 
-enum { TURN_GRAIN = 1 << 14 };
+enum { TURN_GRAIN = 1 << 14 }; /* number of faces for each call of a thread's function */
 
 static ebpo_status turn_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
@@ -283,7 +286,8 @@ ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distan
     if (status == EBPO_OK && steps & EBPO_REPAIR_FILL)
         status = ebpo_mesh_fill_holes(mesh, record, error);
     /* Filling holes can close components. A closed component has an outside, which determines its
-     * orientation. So the mesh is oriented again. */
+     * orientation. So the mesh is oriented again. The record then has the number of unorientable
+     * components of the filled mesh only. */
     if (status == EBPO_OK && steps & EBPO_REPAIR_ORIENT && !(steps & EBPO_REPAIR_EARLIER) &&
         record->filled_holes > filled) {
         record->unorientable_components = unorientable;

@@ -1,8 +1,10 @@
 /* Computes the nesting of closed shells and turns each shell outwards, or inwards if it bounds a
- * cavity. A tree of boxes holds sample points of all shells. The samples within a host are found by
- * a pass over the host's faces, which tests each face against the samples near this face (probes).
- * In crowded hosts the samples are found by rays from the samples. Decisions are exact
- * (geometry/predicates.h), so the result does not depend on threads. */
+ * cavity. Six sample points represent a shell (shell_nesting.h). A host is a shell that may contain
+ * other shells; its probes are the samples of the shells whose boxes are within its box. For most
+ * hosts, each face is tested against the probes near the face. A host with many probes for its
+ * number of faces is crowded. For all crowded hosts together, rays from the samples of all shells
+ * are tested against a tree of the hosts' faces. Decisions are exact (geometry/predicates.h), so
+ * the result does not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,9 +20,11 @@
 #include "geometry/predicates.h"
 #include "mesh/shell_nesting.h"
 
-/* State of one thread, with the shells that may be within the current host. */
+/* State of one thread. */
 typedef struct seeker {
-    ebpo_box_tree probes; /* samples of these shells, whose values are winding numbers */
+    /* probes of the current host; the value of a probe is the sum of the crossings from the probe
+     * to a point outside, which is minus the host's winding number at the probe */
+    ebpo_box_tree probes;
     struct probing *all;
     const ebpo_shell *host;  /* current host */
     const double (*face)[3]; /* [3] corners of the current face of the host */
@@ -49,6 +53,8 @@ static bool add_probes(seeker *w, uint32_t number)
     return true;
 }
 
+/* Adds the probes of the shells whose box is within the host's box. Returns false when memory is
+ * short. */
 static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;
@@ -61,8 +67,9 @@ static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
-/* Returns true if a line along the edge from t[0] to t[1], in the y-z plane, separates the box from
- * the triangle. Never true by mistake: rounding errors are bounded, and NaN separates nothing. */
+/* Returns true if, in the y-z plane, a line along the edge from t[0] to t[1] separates the box from
+ * the triangle. Never true by mistake: ROUNDING and TINY bound the rounding errors and underflows,
+ * and NaN separates nothing. */
 static bool edge_separates(const double *const t[3], const ebpo_point_box *box)
 {
     static const double ROUNDING = 0x1p-49, TINY = 0x1p-1000;
@@ -84,13 +91,13 @@ static bool edge_separates(const double *const t[3], const ebpo_point_box *box)
     return low > most + error || high < least - error;
 }
 
-/* Returns false only if no line along x from a point of the box intersects the triangle. */
-static bool face_may_intersect_lines(const double t[3][3], const ebpo_point_box *box)
+/* Returns false only if no ray in direction +x from a point of the box intersects the triangle. */
+static bool face_may_intersect_rays(const double t[3][3], const ebpo_point_box *box)
 {
-    bool before = false;
+    bool ahead = false;
     for (int i = 0; i < 3; i++)
-        before |= t[i][0] >= box->min[0];
-    if (!before)
+        ahead |= t[i][0] >= box->min[0];
+    if (!ahead)
         return false;
     for (int k = 1; k < 3; k++) {
         double low = fmin(fmin(t[0][k], t[1][k]), t[2][k]),
@@ -108,10 +115,11 @@ static bool face_may_intersect_lines(const double t[3][3], const ebpo_point_box 
 
 static bool near_face(void *user, const ebpo_box_node *node)
 {
-    return face_may_intersect_lines(((const seeker *)user)->face, node->points);
+    return face_may_intersect_rays(((const seeker *)user)->face, node->points);
 }
 
-/* Counts crossings of a face with segments from the probes along x to the host's end. */
+/* Adds to the values of probes the crossings with a face. A segment leads from each probe along x
+ * to the greatest x of the host's box. */
 static bool cross_face(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;
@@ -121,6 +129,7 @@ static bool cross_face(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
+/* Computes the values of all probes of the host. */
 static void cross_host(seeker *w)
 {
     const ebpo_components *c = w->all->n->components;
@@ -139,6 +148,7 @@ static int by_number(const void *x, const void *y)
     return (a->number > b->number) - (a->number < b->number);
 }
 
+/* Counts the host in the depth of each shell whose samples are all within the host. */
 static void count_inner(const seeker *w)
 {
     const ebpo_tree_point *p = w->probes.point;
@@ -151,11 +161,11 @@ static void count_inner(const seeker *w)
             continue;
         ebpo_shell *inner = &w->all->n->shells[p[i].number];
         __atomic_fetch_add(&inner->depth, 1, __ATOMIC_RELAXED);
-        /* the segment ends outside */
         __atomic_fetch_sub(&inner->around, p[i].value, __ATOMIC_RELAXED);
     }
 }
 
+/* Finds the shells within each host of the range. */
 static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -198,15 +208,16 @@ static ebpo_status probe_shells(ebpo_nesting *n, ebpo_error *error)
     return status;
 }
 
-/* Casts rays along x from the samples of all shells through one tree of the crowded hosts' faces.
- * The sum of a host's signed crossings is the host's winding number at the sample. */
+/* --- rays along x from the samples of all shells, through one tree of the crowded hosts' faces ---
+ */
 
-enum { SHELL_RAYS_GRAIN = 16 };
+enum { SHELL_RAYS_GRAIN = 16 }; /* number of shells for each call of a thread's function */
 
 /* Crossings of one host by the rays of the current shell. */
 typedef struct tally {
+    /* for each sample, the sum of the crossings: minus the host's winding number at the sample */
     int32_t winding[EBPO_SHELL_SAMPLES];
-    uint32_t shell; /* shell of these rays, plus one */
+    uint32_t shell; /* index of the shell, plus one; if not the current shell, the tally is old */
 } tally;
 
 typedef struct casting {
@@ -223,10 +234,10 @@ typedef struct casting {
 typedef struct caster {
     const casting *all;
     tally *tallies;   /* [host_count] */
-    int32_t *crossed; /* [host_count] hosts that the shell's rays cross */
+    int32_t *crossed; /* [crossed_count] hosts that the shell's rays cross */
     uint64_t crossed_count;
-    uint32_t shell;
-    int sample;
+    uint32_t shell;    /* current shell */
+    int sample;        /* index of the current sample */
     ebpo_point_box at; /* the current sample, as a box of zero extent */
 } caster;
 
@@ -239,6 +250,7 @@ static bool on_ray(void *user, const ebpo_box_node *node)
            at[2] >= box->min[2] && at[2] <= box->max[2];
 }
 
+/* Returns the tally of a host for the current shell. */
 static tally *tally_of(caster *w, int32_t host)
 {
     tally *t = &w->tallies[host];
@@ -259,7 +271,7 @@ static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
         if (w->all->host[points[i].value] == w->shell)
             continue;
         ebpo_face_corners(n->components->mesh, points[i].number, t);
-        if (!face_may_intersect_lines((const double(*)[3])t, &w->at))
+        if (!face_may_intersect_rays((const double(*)[3])t, &w->at))
             continue;
         int crossing = ebpo_axis_crossing(w->at.min, INFINITY, 0, t[0], t[1], t[2]);
         if (crossing != 0)
@@ -268,7 +280,8 @@ static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
-/* Counts the hosts that contain all samples so far, and sums their winding numbers. */
+/* Counts the hosts that contain all samples so far. *around: the sum of their crossings at the
+ * first sample. */
 static uint32_t count_hosts(const caster *w, int32_t *around)
 {
     uint32_t count = 0;
@@ -283,9 +296,9 @@ static uint32_t count_hosts(const caster *w, int32_t *around)
     return count;
 }
 
-/* Tests the samples of each shell until no host contains all samples so far. The samples are the
- * extreme points of the shell, so if a host contains them all, the shell's box is within the host's
- * box. */
+/* Tests the samples of each shell, until no host contains all samples so far. The samples are the
+ * extreme points of the shell. So if a host contains all samples, the shell's box is within the
+ * host's box. */
 static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -305,7 +318,7 @@ static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsign
             hosts = count_hosts(w, &around);
         }
         all->n->shells[i].depth += hosts;
-        all->n->shells[i].around -= around; /* the rays end outside */
+        all->n->shells[i].around -= around;
     }
     return EBPO_OK;
 }
@@ -392,8 +405,10 @@ static ebpo_status cast_all_rays(ebpo_nesting *n, ebpo_error *error)
 
 /* --- closed components, and the number of hosts that contain each component --- */
 
-/* A host is crowded if it has more than this number of samples for each of its faces. */
-enum { CROWD = 8, SHELL_NESTING_GRAIN = 64 };
+enum {
+    CROWD = 8, /* a host is crowded if it has more than this number of probes a face */
+    SHELL_NESTING_GRAIN = 64 /* number of shells for each call of a thread's function */
+};
 
 /* ---- extreme points of each shell ---- */
 
@@ -410,6 +425,7 @@ static bool comes_before(const double a[3], const double b[3], int d)
     return false;
 }
 
+/* Computes the samples of each shell of the range. */
 static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -443,11 +459,11 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
 typedef struct crowd {
     const ebpo_nesting *n;
     const ebpo_shell *host;
-    uint64_t inner; /* number of shells whose box is within the host's, including the host */
+    uint64_t inner; /* number of shells whose box is within the host's box, including the host */
 } crowd;
 
-/* Counts the shells of nodes that are completely within the host, without visiting the nodes below.
- */
+/* Skips nodes outside the host's box. Counts all shells of a node that is completely within the
+ * box, and does not visit the nodes below. */
 static bool count_node(void *user, const ebpo_box_node *node)
 {
     crowd *c = user;
@@ -469,6 +485,7 @@ static bool count_shells(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
+/* Decides which hosts of the range are crowded. */
 static ebpo_status find_crowded(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -487,6 +504,7 @@ static ebpo_status find_crowded(void *context, uint64_t begin, uint64_t end, uns
 
 /* ---- main functions ---- */
 
+/* Lists the closed components whose volume is neither 0 nor NaN. */
 static ebpo_status list_shells(ebpo_nesting *n, ebpo_error *error)
 {
     const ebpo_components *c = n->components;
@@ -555,9 +573,9 @@ void ebpo_nesting_free(ebpo_nesting *n, const ebpo_mesh *mesh)
     ebpo_components_free(n->components);
 }
 
-/* Turns shells outwards, or inwards if they bound a cavity. */
+/* --- turning shells --- */
 
-/* Reverses the faces of a component. Returns their number. */
+/* Reverses the faces of a component. Returns the number of faces. */
 static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
 {
     uint64_t begin = c->faces.begin[component], end = c->faces.begin[component + (uint64_t)1];

@@ -1,4 +1,5 @@
-/* Defines the state of the search for the nesting of closed components. */
+/* Defines the state of the search for the nesting of closed components (shells): how many other
+ * closed components contain each component. */
 #ifndef EBPO_MESH_SHELL_NESTING_H
 #define EBPO_MESH_SHELL_NESTING_H
 
@@ -7,18 +8,18 @@
 #include "mesh/box_tree.h"
 #include "mesh/component_parts.h"
 
-/* A component is within another one, its host, if its least and greatest vertices along each axis
- * are within the host. */
+/* Number of samples of a shell: its least and its greatest vertex along each axis. A shell is
+ * within another shell, its host, if all its samples are within the host. */
 enum { EBPO_SHELL_SAMPLES = 6 };
 
 typedef struct ebpo_shell {
     double sample[EBPO_SHELL_SAMPLES][3];
-    double min[3], max[3];
-    uint32_t component;
-    uint32_t depth; /* number of closed components that contain this component */
-    int32_t around; /* sum of the winding numbers of these components at the samples */
-    /* this shell's box contains too many samples for the number of the shell's faces, so rays are
-     * used */
+    double min[3], max[3]; /* bounding box */
+    uint32_t component;    /* index of the component */
+    uint32_t depth;        /* number of shells that contain this shell */
+    int32_t around;        /* sum of the winding numbers of these shells at sample[0] */
+    /* the box of this shell contains too many samples of other shells for the number of this
+     * shell's faces, so rays are used (shell_nesting.c) */
     bool crowded;
 } ebpo_shell;
 
@@ -35,8 +36,10 @@ static inline bool ebpo_shell_faces_inwards(const ebpo_nesting *n, const ebpo_sh
     return n->components->list[shell->component].volume < 0;
 }
 
+/* Returns true if the shell should face inwards. */
 static inline bool ebpo_shell_is_cavity(const ebpo_shell *shell) { return shell->depth % 2 != 0; }
 
+/* Writes the positions of a face's corners. */
 static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, double t[3][3])
 {
     for (uint64_t k = 0; k < 3; k++)
@@ -69,6 +72,7 @@ static inline bool ebpo_face_add(ebpo_box_tree *tree, const ebpo_mesh *mesh, uin
     return true;
 }
 
+/* Returns true if the box of `inner` is within the box of `outer`. */
 static inline bool ebpo_shell_box_within(const ebpo_shell *inner, const ebpo_shell *outer)
 {
     for (int k = 0; k < 3; k++)
@@ -88,8 +92,8 @@ static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_no
 }
 
 /* Finds the nesting: the number of closed components that contain each component. Initialise `n`
- * with zeros, and free it also on failure. `closed`: result of ebpo_mesh_find_shells; it is
- * modified, and used until `n` is freed. */
+ * with zeros, and free it also on failure. `closed`: result of ebpo_mesh_find_shells, which this
+ * function modifies, and which must exist until `n` is freed. */
 EBPO_MUST_USE ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh,
                                             uint32_t *closed, unsigned threads,
                                             const ebpo_progress *progress, ebpo_error *error);

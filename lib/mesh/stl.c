@@ -20,23 +20,29 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 
-/* Sizes and offsets in a binary STL file. The last two bytes of a facet, the attribute bytes, are
- * read here because assimp treats them as colours even where Magics means "no colour". */
+/* Offsets and sizes in a binary STL file, in bytes. */
+enum {
+    COUNT_OFFSET = 80, /* offset of the number of facets */
+    HEAD_BYTES = 84,   /* size of the text and the number of facets */
+    FACET_BYTES = 50,  /* size of a facet */
+    /* offset in a facet of its last two bytes, the attribute word: a byte count or a colour */
+    WORD_OFFSET = 48
+};
 
-enum { COUNT = 80, STL_BINARY_HEAD = 84, RECORD = 50, STL_BINARY_WORD = 48 };
-
-/* Classification of the bytes of a file. */
+/* The meaning of the bytes of a file. */
 typedef struct stl_bytes {
-    uint64_t models;  /* concatenated models */
-    uint64_t payload; /* bytes after facets, as their last two bytes declare */
-    uint64_t behind;  /* bytes after the last facet */
+    uint64_t models;  /* number of concatenated models */
+    uint64_t payload; /* bytes after facets, as their attribute words declare */
+    uint64_t after;   /* bytes after the last facet, without a meaning */
 } stl_bytes;
 
-static uint64_t stated_faces(const uint8_t *head) { return ebpo_load32(head + COUNT); }
+/* Returns the number of facets that the header declares. */
+static uint64_t stated_faces(const uint8_t *head) { return ebpo_load32(head + COUNT_OFFSET); }
 
+/* Returns the size of the header and these facets. */
 static uint64_t stated_size(const uint8_t *head)
 {
-    return STL_BINARY_HEAD + RECORD * stated_faces(head);
+    return HEAD_BYTES + FACET_BYTES * stated_faces(head);
 }
 
 /* Returns the number of concatenated models if they fill the file exactly, otherwise 0. */
@@ -44,21 +50,22 @@ static uint64_t count_models(const uint8_t *data, uint64_t size)
 {
     uint64_t models = 0, bytes;
     for (uint64_t at = 0; at < size; at += bytes, models++) {
-        bytes = size - at < STL_BINARY_HEAD ? UINT64_MAX : stated_size(data + at);
-        if (bytes > size - at || (bytes == STL_BINARY_HEAD && size > STL_BINARY_HEAD))
+        bytes = size - at < HEAD_BYTES ? UINT64_MAX : stated_size(data + at);
+        if (bytes > size - at || (bytes == HEAD_BYTES && size > HEAD_BYTES))
             return 0;
     }
     return models;
 }
 
-/* Returns the end of the last facet if each facet is followed by the bytes that its last two bytes
- * declare. Returns UINT64_MAX if the facets do not fit into the file. */
+/* Returns the offset of the end of the last facet if each facet is followed by as many bytes as its
+ * attribute word declares. Returns UINT64_MAX if the facets do not fit into the file. */
 static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data, uint64_t size)
 {
-    uint64_t at = STL_BINARY_HEAD;
+    uint64_t at = HEAD_BYTES;
     EBPO_FOR_ITEMS(workspace, i, 0, stated_faces(data)) {
-        uint64_t next = size - at < RECORD ? UINT64_MAX
-                                           : at + RECORD + ebpo_load16(data + at + STL_BINARY_WORD);
+        uint64_t next = size - at < FACET_BYTES
+                            ? UINT64_MAX
+                            : at + FACET_BYTES + ebpo_load16(data + at + WORD_OFFSET);
         if (next > size)
             return UINT64_MAX;
         at = next;
@@ -68,14 +75,14 @@ static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data,
 
 bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size)
 {
-    return known >= STL_BINARY_HEAD && size > STL_BINARY_HEAD && stated_size(data) == size;
+    return known >= HEAD_BYTES && size > HEAD_BYTES && stated_size(data) == size;
 }
 
 /* Returns true if the file consists of binary models: one model, with or without the bytes declared
  * by attribute byte counts, or several concatenated models. */
 static bool fits_binary(const uint8_t *data, uint64_t size)
 {
-    return size >= STL_BINARY_HEAD &&
+    return size >= HEAD_BYTES &&
            (count_models(data, size) ||
             (stated_size(data) < size && end_with_payload(NULL, data, size) == size &&
              stated_faces(data)));
@@ -85,18 +92,19 @@ static ebpo_status fail_ambiguous(const ebpo_import_build *b, const uint8_t *dat
 {
     return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                           "states %" PRIu64 " faces, which take %" PRIu64 " of its %" PRIu64
-                          " bytes; the others may belong to faces (attribute byte counts) or "
-                          "follow them; save it as STL without attributes, or as PLY",
+                          " bytes; the other bytes may belong to faces (attribute byte counts) or "
+                          "follow the last face; save the model as STL without attributes, or as "
+                          "PLY",
                           stated_faces(data), stated_size(data), size);
 }
 
 /* Determines the meaning of the bytes beyond the declared facets. Returns EBPO_E_FORMAT when the
  * meaning is ambiguous. */
 static ebpo_status explain_bytes(const ebpo_import_build *b, const uint8_t *data, uint64_t size,
-                                 stl_bytes *is)
+                                 stl_bytes *bytes)
 {
-    uint64_t end = stated_size(data), held = (size - STL_BINARY_HEAD) / RECORD;
-    *is = (stl_bytes){ .models = 1 };
+    uint64_t end = stated_size(data), facets_in_file = (size - HEAD_BYTES) / FACET_BYTES;
+    *bytes = (stl_bytes){ .models = 1 };
     if (end == size)
         return EBPO_OK;
     uint64_t models = count_models(data, size),
@@ -105,24 +113,26 @@ static ebpo_status explain_bytes(const ebpo_import_build *b, const uint8_t *data
     if (models && payload)
         return fail_ambiguous(b, data, size);
     if (models || payload) {
-        is->models = models ? models : 1;
-        is->payload = payload ? size - end : 0;
+        bytes->models = models ? models : 1;
+        bytes->payload = payload ? size - end : 0;
         return EBPO_OK;
     }
-    if (held && (!stated_faces(data) || (size - STL_BINARY_HEAD) % RECORD == 0))
+    if (facets_in_file && (!stated_faces(data) || (size - HEAD_BYTES) % FACET_BYTES == 0))
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                               "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
                               "; correct the count (bytes 80 to 83), or get the file again",
-                              stated_faces(data), size, held);
+                              stated_faces(data), size, facets_in_file);
     if (last > end && last < size)
         return fail_ambiguous(b, data, size);
-    is->behind = size - end;
+    bytes->after = size - end;
     return EBPO_OK;
 }
 
+/* Adds the corners of all facets of a model as vertices. payload: attribute words are byte counts.
+ */
 static ebpo_status read_facets(ebpo_import_build *b, const uint8_t *model, bool payload)
 {
-    const uint8_t *at = model + STL_BINARY_HEAD;
+    const uint8_t *at = model + HEAD_BYTES;
     ebpo_status status = EBPO_OK;
     EBPO_FOR_ITEMS(b->mesh->workspace, i, 0, stated_faces(model)) {
         for (unsigned k = 0; k < 3 && status == EBPO_OK; k++) {
@@ -135,36 +145,37 @@ static ebpo_status read_facets(ebpo_import_build *b, const uint8_t *model, bool 
         }
         if (status != EBPO_OK)
             return status;
-        at += RECORD + (payload ? ebpo_load16(at + STL_BINARY_WORD) : 0);
+        at += FACET_BYTES + (payload ? ebpo_load16(at + WORD_OFFSET) : 0);
     }
     return EBPO_OK;
 }
 
-/* Counts the facets of a model whose last two bytes are not zero. */
+/* Counts the facets of a model whose attribute word is not 0. */
 static uint64_t count_words(const ebpo_import_build *b, const uint8_t *model)
 {
     uint64_t words = 0;
     EBPO_FOR_ITEMS(b->mesh->workspace, i, 0, stated_faces(model))
-        words += ebpo_load16(model + STL_BINARY_HEAD + RECORD * i + STL_BINARY_WORD) != 0;
+        words += ebpo_load16(model + HEAD_BYTES + FACET_BYTES * i + WORD_OFFSET) != 0;
     return words;
 }
 
-static ebpo_status record_bytes(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
+static ebpo_status record_bytes(ebpo_import_build *b, const stl_bytes *bytes, uint64_t words)
 {
-    ebpo_status status =
-        is->payload || is->behind || words ? ebpo_mesh_need_attributes(b->mesh, b->error) : EBPO_OK;
+    ebpo_status status = bytes->payload || bytes->after || words
+                             ? ebpo_mesh_need_attributes(b->mesh, b->error)
+                             : EBPO_OK;
     if (status != EBPO_OK || !b->mesh->attributes)
         return status;
     ebpo_attributes *to = b->mesh->attributes;
-    ebpo_attributes_count_unread(to, "bytes after facets (attribute byte counts)", is->payload);
-    ebpo_attributes_count_unread(to, "bytes after the last facet", is->behind);
+    ebpo_attributes_count_unread(to, "bytes after facets (attribute byte counts)", bytes->payload);
+    ebpo_attributes_count_unread(to, "bytes after the last facet", bytes->after);
     if (words)
         ebpo_attributes_lose(to,
                              "the attribute bytes of facets (possibly colours), because the file "
                              "holds several models: %" PRIu64,
                              words);
-    if (is->models > 1 && b->attributes)
-        ebpo_attributes_lose(to, "the start of each of %" PRIu64 " models", is->models);
+    if (bytes->models > 1 && b->attributes)
+        ebpo_attributes_lose(to, "the start of each of %" PRIu64 " models", bytes->models);
     return EBPO_OK;
 }
 
@@ -195,71 +206,75 @@ static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64
                                uint64_t *plain)
 {
     *plain = 0;
-    if (size < STL_BINARY_HEAD || (ebpo_bytes_are_text(data, size) && !fits_binary(data, size)))
+    if (size < HEAD_BYTES || (ebpo_bytes_are_text(data, size) && !fits_binary(data, size)))
         return fail_head(b, data, size);
     uint64_t faces = stated_faces(data), words = 0;
     if (stated_size(data) > size)
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                               "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
-                              "; it is cut short or not an STL file",
-                              faces, size, (size - STL_BINARY_HEAD) / RECORD);
+                              "; it bytes cut short or not an STL file",
+                              faces, size, (size - HEAD_BYTES) / FACET_BYTES);
     if (3 * faces > EBPO_IMPORT_MAX)
         return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
                               "states %" PRIu64 " faces of three corners each, more than 2^32 - 2 "
                               "corners; split the model",
                               faces);
-    stl_bytes is;
-    ebpo_status status = explain_bytes(b, data, size, &is);
-    for (uint64_t m = 0, at = 0; status == EBPO_OK && m < is.models; m++) {
-        status = read_facets(b, data + at, is.payload > 0);
-        words += is.models > 1 ? count_words(b, data + at) : 0;
+    stl_bytes bytes;
+    ebpo_status status = explain_bytes(b, data, size, &bytes);
+    for (uint64_t m = 0, at = 0; status == EBPO_OK && m < bytes.models; m++) {
+        status = read_facets(b, data + at, bytes.payload > 0);
+        words += bytes.models > 1 ? count_words(b, data + at) : 0;
         at += stated_size(data + at);
     }
-    *plain = is.models == 1 && !is.payload ? stated_size(data) : 0;
-    return status == EBPO_OK ? record_bytes(b, &is, words) : status;
+    *plain = bytes.models == 1 && !bytes.payload ? stated_size(data) : 0;
+    return status == EBPO_OK ? record_bytes(b, &bytes, words) : status;
 }
 
-enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 };
+/* --- colours of a binary file --- */
+
+enum { VALID_BIT = 0x8000 }; /* bit 15 of an attribute word, see keep_stl_colours */
 
 typedef struct stl_colours {
     const uint8_t *data;
     uint64_t faces;
-    /* magics: the header has COLOR=; words: some attribute bytes are not 0; coloured: some face has
-     * a colour */
+    /* magics: the header has COLOR=; words: some attribute word is not 0; coloured: some face has a
+     * colour */
     bool magics, words, coloured;
-    uint8_t others[3]; /* colour of faces without one */
+    uint8_t fallback[3]; /* colour of faces whose word has no colour */
 } stl_colours;
 
 static uint16_t word_of(const stl_colours *s, uint64_t face)
 {
-    return ebpo_load16(s->data + FIRST + FACE * face + STL_COLOURS_WORD);
+    return ebpo_load16(s->data + HEAD_BYTES + FACET_BYTES * face + WORD_OFFSET);
 }
 
-static bool has_own(const stl_colours *s, uint16_t word)
+/* Returns true if the attribute word has a colour for its face. */
+static bool has_colour(const stl_colours *s, uint16_t word)
 {
-    return s->magics ? !(word & OWN) : (word & OWN) != 0;
+    return s->magics ? !(word & VALID_BIT) : (word & VALID_BIT) != 0;
 }
 
-static void find_default(stl_colours *s)
+/* Sets the fallback: the colour after COLOR= in the header, else white. */
+static void find_fallback(stl_colours *s)
 {
     static const char mark[] = "COLOR=";
     enum { LENGTH = sizeof mark - 1 };
-    memset(s->others, 255, sizeof s->others);
-    for (unsigned i = 0; i + LENGTH + 4 <= HEADER && !s->magics; i++) {
+    memset(s->fallback, 255, sizeof s->fallback);
+    for (unsigned i = 0; i + LENGTH + 4 <= COUNT_OFFSET && !s->magics; i++) {
         s->magics = memcmp(s->data + i, mark, LENGTH) == 0;
         if (s->magics)
-            memcpy(s->others, s->data + i + LENGTH, sizeof s->others);
+            memcpy(s->fallback, s->data + i + LENGTH, sizeof s->fallback);
     }
 }
 
 static void inspect_words(stl_colours *s)
 {
-    find_default(s);
+    find_fallback(s);
     s->coloured = s->magics;
     for (uint64_t f = 0; f < s->faces; f++) {
         uint16_t word = word_of(s, f);
         s->words |= word != 0;
-        s->coloured |= has_own(s, word);
+        s->coloured |= has_colour(s, word);
     }
 }
 
@@ -268,8 +283,8 @@ static uint8_t widen_five_bits(unsigned five) { return (uint8_t)((five * 255 + 1
 
 static void colour_of(const stl_colours *s, uint16_t word, uint8_t rgb[3])
 {
-    memcpy(rgb, s->others, 3);
-    for (unsigned k = 0; k < 3 && has_own(s, word); k++)
+    memcpy(rgb, s->fallback, 3);
+    for (unsigned k = 0; k < 3 && has_colour(s, word); k++)
         rgb[s->magics ? k : 2 - k] = widen_five_bits(word >> 5 * k & 31);
 }
 
@@ -308,23 +323,27 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
     return status;
 }
 
-/* Adds the face attributes `attribute` (unchanged) and `red green blue` (five bits each) unless all
- * their values are empty. Files with COLOR= in the first 80 bytes (Magics): red first, valid where
- * bit 15 is 0, otherwise the face has the colour stated behind COLOR=. Other files (VisCAM): blue
- * first, valid where bit 15 is 1, otherwise white. Text files have no colours. The faces of the
- * mesh must be those of the file. EBPO_E_MEMORY, EBPO_E_IO. */
+/* Adds the face attributes `attribute` (the attribute words, unless all are 0) and `red green blue`
+ * (unless no face has a colour). A word has five bits for each channel. In files with COLOR= in the
+ * first 80 bytes (Magics), the lowest five bits are red, and the word is a colour if bit 15 is 0;
+ * other faces have the colour after COLOR=. In other files (VisCAM), the lowest five bits are blue,
+ * and the word is a colour if bit 15 is 1; other faces are white. The mesh must have the faces of
+ * the file. EBPO_E_MEMORY, EBPO_E_IO. */
 static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
                                     ebpo_error *error)
 {
     stl_colours s = { .data = data, .faces = mesh->face_count };
-    if (size != FIRST + FACE * s.faces || ebpo_load32(data + HEADER) != s.faces)
+    if (size != HEAD_BYTES + FACET_BYTES * s.faces || ebpo_load32(data + COUNT_OFFSET) != s.faces)
         return EBPO_OK;
     inspect_words(&s);
     ebpo_status status = s.coloured ? add_colours(mesh, &s, error) : EBPO_OK;
     return status == EBPO_OK && s.words ? add_words(mesh, &s, error) : status;
 }
 
-enum { STL_HEAD = 84, RELEASE = 1 << 22, CHECKED_BYTES = 1 << 16 };
+enum {
+    RELEASE = 1 << 22,      /* bytes, or vertices, between two releases of pages */
+    CHECKED_BYTES = 1 << 16 /* number of bytes in which is_text searches */
+};
 
 static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
@@ -355,7 +374,7 @@ typedef struct stl_text {
     const char *begin, *at, *end;
     uint64_t line;
     uint64_t loops, corners; /* number of loops so far, and of corners of the current loop */
-    uint64_t next_release;   /* byte offset */
+    uint64_t next_release;   /* offset at which pages are released again */
     uint64_t solids;         /* solids that have facets */
     bool begun;              /* a solid has begun and has no facets so far */
     /* number of unexpected words, and the line of the first one */
@@ -470,8 +489,8 @@ static ebpo_status read_loop(stl_text *t)
     return status;
 }
 
-/* Returns true if the words of a facet, up to its first coordinate, follow `t`. They cannot be part
- * of a name. */
+/* Returns true if the words of a facet after `facet`, up to its first coordinate, begin at t->at.
+ * Such words cannot be part of a name. */
 static bool holds_facet(const stl_text *t)
 {
     stl_text ahead = *t;
@@ -537,6 +556,7 @@ static ebpo_status read_text(stl_text *t)
 
 /* --- text and binary --- */
 
+/* Makes a face of each three vertices. */
 static ebpo_status make_faces(ebpo_import_build *b)
 {
     ebpo_status status = ebpo_import_faces(b);
@@ -554,11 +574,14 @@ static ebpo_status make_faces(ebpo_import_build *b)
     return status == EBPO_OK ? ebpo_import_end(b) : status;
 }
 
+/* Returns true if the file is STL text: it begins with `solid` and is not a valid binary file. A
+ * binary file may also begin with `solid`, but is unlikely to contain the word `facet`, and has
+ * zero bytes. */
 static bool is_text(const uint8_t *data, uint64_t size)
 {
     uint64_t checked = size < CHECKED_BYTES ? size : CHECKED_BYTES;
     const uint8_t *at = data, *end = data + checked;
-    if (!begins_solid(data, size) || memchr(data, 0, size < STL_HEAD ? size : STL_HEAD) ||
+    if (!begins_solid(data, size) || memchr(data, 0, size < HEAD_BYTES ? size : HEAD_BYTES) ||
         fits_binary(data, size))
         return false;
     for (; at + 5 <= end; at++)

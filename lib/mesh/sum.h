@@ -33,6 +33,7 @@ static inline void ebpo_sum_carry(ebpo_sum *s)
     s->adds = 0;
 }
 
+/* Adds a term. */
 static inline void ebpo_sum_add(ebpo_sum *s, double x)
 {
     uint64_t bits;
@@ -54,6 +55,7 @@ static inline void ebpo_sum_add(ebpo_sum *s, double x)
         ebpo_sum_carry(s);
 }
 
+/* Adds another sum. */
 static inline void ebpo_sum_merge(ebpo_sum *s, const ebpo_sum *other)
 {
     ebpo_sum o = *other;

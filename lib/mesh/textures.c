@@ -20,7 +20,10 @@
 #include "io/file_source.h"
 #include "mesh/textures.h"
 
-enum { TEXTURES_DIGEST = 32, TEXTURES_STEP = 1 << 20 };
+enum {
+    TEXTURES_DIGEST = 32,   /* bytes of a SHA-256 */
+    TEXTURES_STEP = 1 << 20 /* bytes that are hashed between two releases of pages */
+};
 
 const char *ebpo_texture_array_name(ebpo_texture_array which)
 {
@@ -91,6 +94,7 @@ ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
     return EBPO_OK;
 }
 
+/* Returns true if `sha256` is the SHA-256 of the bytes. */
 static bool is_digest(ebpo_texture_bytes bytes, ebpo_texture_bytes sha256,
                       ebpo_workspace *workspace)
 {
@@ -125,7 +129,8 @@ typedef struct words {
 
 /* Names that face attributes refer to by index, in the order of the header's comments. */
 typedef struct numbered {
-    const ebpo_attribute *of_faces; /* attribute of faces that refers to the names; NULL: none */
+    const ebpo_attribute
+        *find_face_attribute; /* attribute of faces that refers to the names; NULL: none */
     words *name;
     bool *used; /* [count] true: a kept face refers to the name */
     uint64_t count, capacity;
@@ -174,7 +179,8 @@ static bool words_are(words a, const char *text)
     return a.n == strlen(text) && (!a.n || memcmp(a.s, text, a.n) == 0);
 }
 
-static const ebpo_attribute *of_faces(const ebpo_attributes *all, const char *name)
+/* Returns the face attribute with this name and one value for each face, or NULL. */
+static const ebpo_attribute *find_face_attribute(const ebpo_attributes *all, const char *name)
 {
     for (uint64_t i = 0; i < all->count; i++) {
         const ebpo_attribute *a = &all->array[i];
@@ -193,7 +199,8 @@ static bool add_name(numbered *to, words name)
     return true;
 }
 
-/* Parses "comment material 1 red", "comment TextureFile red.png". */
+/* Collects the names from lines such as "comment material 1 red" and "comment TextureFile red.png".
+ * Returns false when memory is short. */
 static bool read_header(naming *n)
 {
     words text = { n->all->header, n->all->header_bytes }, line;
@@ -254,7 +261,8 @@ static bool has_name(const numbered *n, words name)
     return n->count && bsearch(&name, n->name, n->count, sizeof *n->name, compare_words);
 }
 
-/* Parses one line of an image's uses. Returns true if the kept faces use the image in this way. */
+/* Parses one line of an image's uses, such as "map_Kd red". Returns true if the kept faces use the
+ * image in this way, or if faces do not refer to such names. */
 static bool is_named(const naming *n, words file, words use)
 {
     words word = first_word(&use);
@@ -263,6 +271,7 @@ static bool is_named(const naming *n, words file, words use)
     return !n->materials.of_faces || has_name(&n->materials, use);
 }
 
+/* Returns true if the kept faces use the image, or if the image has no uses. */
 static bool keeps_bytes(const naming *n, uint64_t row)
 {
     ebpo_texture_bytes name =
@@ -309,6 +318,7 @@ static ebpo_status cut_array(naming *n, ebpo_attribute *a, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Keeps the bytes of the images that the faces use. `bytes`: the array of the images' bytes. */
 static ebpo_status keep_used(naming *n, ebpo_attribute *bytes, const uint32_t *faces,
                              uint64_t count, ebpo_error *error)
 {
@@ -338,8 +348,8 @@ ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
     if (!bytes || !of->header || !bytes->rows)
         return EBPO_OK;
     naming n = { .all = of };
-    n.materials.of_faces = of_faces(of, "material");
-    n.files.of_faces = of_faces(of, "texnumber");
+    n.materials.of_faces = find_face_attribute(of, "material");
+    n.files.of_faces = find_face_attribute(of, "texnumber");
     ebpo_status status = keep_used(&n, &of->array[bytes - of->array], faces, count, error);
     free(n.materials.name);
     free(n.materials.used);
@@ -407,6 +417,7 @@ static bool next_line(span *text, span *line)
 
 /* --- the list --- */
 
+/* Returns true if the name is not too long and has no control characters. */
 static bool is_name(span name)
 {
     bool good = name.n > 0 && name.n <= EBPO_TEXTURE_NAME_BYTES;
@@ -423,6 +434,7 @@ static uint64_t hash_of(span name)
     return ebpo_hash_number(hash);
 }
 
+/* Returns the entry of a name, or NULL after recording why there is none. */
 static ebpo_texture_name *find_or_add_name(ebpo_texture_names *names, span name)
 {
     uint64_t at;
@@ -502,6 +514,7 @@ void ebpo_texture_names_of_ply(ebpo_texture_names *names, const char *header, ui
 
 /* --- OBJ --- */
 
+/* Returns true for statements of a material library that name an image. */
 static bool is_map(span word)
 {
     static const char *const others[] = { "bump", "disp", "decal", "refl", "norm" };
@@ -565,16 +578,16 @@ void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
     }
 }
 
-/* Limits for material libraries: total bytes, and number of names that are tried. */
 enum {
-    LIBRARY_BYTES = 1 << 25,
-    LIBRARIES = 100,
-    TEXTURE_FILES_DIGEST = 32,
-    TEXTURE_FILES_STEP = 1 << 20
+    LIBRARY_BYTES = 1 << 25,     /* greatest total size of the material libraries that are read */
+    LIBRARIES = 100,             /* greatest number of libraries' names that are tried */
+    TEXTURE_FILES_DIGEST = 32,   /* bytes of a SHA-256 */
+    TEXTURE_FILES_STEP = 1 << 20 /* bytes of an image that are read and hashed at a time */
 };
-#define IMAGE_BYTES ((uint64_t)1 << 30)
+#define IMAGE_BYTES ((uint64_t)1 << 30) /* greatest size of an image */
 
-typedef struct finding {
+/* The search for the images of a mesh. */
+typedef struct image_search {
     const char *path; /* path of the source */
     ebpo_texture_names names;
     /* number of files that are not found, that are outside the folder, and that are too large */
@@ -582,9 +595,10 @@ typedef struct finding {
     /* number of library names that were tried, and number of libraries that could not be read */
     uint64_t tried, libraries;
     uint64_t library_bytes; /* bytes that were read of libraries */
-    bool keep, no_memory;
+    bool keep;              /* the bytes of images are kept */
+    bool no_memory;
     ebpo_error *error;
-} finding;
+} image_search;
 
 /* --- files near the source --- */
 
@@ -635,7 +649,8 @@ static found open_next_to_source(const char *source, const char *name, ebpo_whol
 
 /* --- names --- */
 
-static bool read_library(finding *f, const char *name)
+/* Collects the names from a material library. Returns false if it cannot be read. */
+static bool read_library(image_search *f, const char *name)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     found how = f->tried++ < LIBRARIES ? open_next_to_source(f->path, name, &file) : ABSENT;
@@ -650,24 +665,24 @@ static bool read_library(finding *f, const char *name)
     return good;
 }
 
-/* Reads the library whose name is the whole text, which may have spaces; otherwise one library for
- * each word. */
+/* Reads the library whose name is the whole text, which may have spaces. If there is no such file,
+ * reads one library for each word of the text. */
 static void read_libraries(void *context, const char *rest, size_t size)
 {
-    finding *f = context;
+    image_search *f = context;
     char *names = strndup(rest, size);
     if (!names || read_library(f, names)) {
         f->no_memory |= !names;
         free(names);
         return;
     }
-    char *left = NULL, *name = strtok_r(names, " \t", &left);
-    for (; name; name = strtok_r(NULL, " \t", &left))
+    char *state = NULL, *name = strtok_r(names, " \t", &state);
+    for (; name; name = strtok_r(NULL, " \t", &state))
         f->libraries += !read_library(f, name);
     free(names);
 }
 
-static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, uint64_t size)
+static void find_names(image_search *f, const ebpo_mesh *mesh, const uint8_t *data, uint64_t size)
 {
     if (strcmp(mesh->source_format, "obj") == 0)
         ebpo_obj_libraries(data, size, read_libraries, f);
@@ -704,7 +719,7 @@ static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
 }
 
 /* Reads the bytes if they are kept, and computes the digest. */
-static ebpo_status read_image(const finding *f, ebpo_whole_file *file, const char *name,
+static ebpo_status read_image(const image_search *f, ebpo_whole_file *file, const char *name,
                               uint8_t digest[TEXTURE_FILES_DIGEST])
 {
     ebpo_status status =
@@ -712,7 +727,7 @@ static ebpo_status read_image(const finding *f, ebpo_whole_file *file, const cha
     return status == EBPO_OK ? make_digest(file, name, digest, f->error) : status;
 }
 
-static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture_name *named)
+static ebpo_status add_image(image_search *f, ebpo_attributes *to, const ebpo_texture_name *named)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     uint8_t digest[TEXTURE_FILES_DIGEST];
@@ -742,8 +757,9 @@ static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture
     return status;
 }
 
-/* --- notes --- */
+/* --- records of what is not stored --- */
 
+/* Records a phrase for one file or for several files. */
 static void lose_files(ebpo_attributes *to, uint64_t count, const char *one, const char *several)
 {
     if (count == 1)
@@ -752,9 +768,9 @@ static void lose_files(ebpo_attributes *to, uint64_t count, const char *one, con
         ebpo_attributes_lose(to, several, count);
 }
 
-static void record_losses(const finding *f, ebpo_attributes *to)
+static void record_losses(const image_search *f, ebpo_attributes *to)
 {
-    uint64_t known = f->names.count - f->absent - f->outside - f->large;
+    uint64_t found_images = f->names.count - f->absent - f->outside - f->large;
     lose_files(to, f->names.omitted, "a name or a use of an image (too many)",
                "%" PRIu64 " names and uses of images (too many)");
     lose_files(to, f->libraries, "names of images (a material library cannot be read)",
@@ -765,12 +781,13 @@ static void record_losses(const finding *f, ebpo_attributes *to)
                "the digests of %" PRIu64 " images (their paths leave the source's folder)");
     lose_files(to, f->large, "an image of more than 1 GiB",
                "%" PRIu64 " images of more than 1 GiB");
-    lose_files(to, f->keep ? 0 : known, "the bytes of an image (--embed-textures keeps them)",
+    lose_files(to, f->keep ? 0 : found_images,
+               "the bytes of an image (--embed-textures keeps them)",
                "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
 }
 
 /* Removes an element of a PLY file that has the reserved name ebpo:texture. */
-static void drop_own(ebpo_attributes *from)
+static void drop_reserved_element(ebpo_attributes *from)
 {
     bool any = false;
     for (uint64_t i = from ? from->count : 0; i-- > 0;)
@@ -782,7 +799,7 @@ static void drop_own(ebpo_attributes *from)
         ebpo_attributes_lose(from, "the element " EBPO_TEXTURE_ELEMENT);
 }
 
-static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
+static ebpo_status add_images(image_search *f, ebpo_mesh *mesh)
 {
     ebpo_status status = EBPO_OK;
     if (f->no_memory)
@@ -801,8 +818,8 @@ static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
 ebpo_status ebpo_textures_find(ebpo_mesh *mesh, const char *path, const uint8_t *data,
                                uint64_t size, bool keep, ebpo_error *error)
 {
-    finding f = { .path = path, .keep = keep, .error = error };
-    drop_own(mesh->attributes);
+    image_search f = { .path = path, .keep = keep, .error = error };
+    drop_reserved_element(mesh->attributes);
     find_names(&f, mesh, data, size);
     ebpo_status status = add_images(&f, mesh);
     ebpo_texture_names_free(&f.names);

@@ -1,5 +1,6 @@
-/* Declares the image files that a source names. Each image is a row of the element `ebpo:texture`,
- * with lists of bytes. Source: format-spec/attributes.md. For use by one thread. */
+/* Stores the image files that a source (mesh file) names. Each image is a row of the element
+ * `ebpo:texture` of the attributes (mesh/attributes.h), with lists of bytes. Source:
+ * format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_TEXTURES_H
 #define EBPO_MESH_TEXTURES_H
 
@@ -11,9 +12,9 @@
 enum {
     EBPO_TEXTURES = 1000,           /* maximum number of images of a mesh */
     EBPO_TEXTURE_NAME_BYTES = 1023, /* maximum length of a name */
-    EBPO_TEXTURE_USE_BYTES = 8192,
-    EBPO_TEXTURE_TEXTS =
-        1 << 24 /* maximum total length of the names, of the uses, and of the digests */
+    EBPO_TEXTURE_USE_BYTES = 8192,  /* maximum length of the uses of an image */
+    /* maximum total length of the names of all images; also of the uses, and of the digests */
+    EBPO_TEXTURE_TEXTS = 1 << 24
 };
 
 /* The arrays of the element. */
@@ -32,10 +33,10 @@ typedef struct ebpo_texture_bytes {
     uint64_t count;
 } ebpo_texture_bytes;
 
-/* Returns NULL when the array does not exist or has another type. */
+/* Returns an array, or NULL if it does not exist or has another type. */
 const ebpo_attribute *ebpo_textures_array(const ebpo_attributes *all, ebpo_texture_array which);
 
-/* Returns the list of a row. */
+/* Returns the list of a row; an empty list if `a` is NULL or the row does not exist. */
 ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row);
 
 /* Adds a row to the mesh's textures. The first call creates the arrays, with bytes if `keep`.

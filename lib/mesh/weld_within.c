@@ -1,4 +1,7 @@
-/* Decides which vertices that are within a distance of each other are joined. */
+/* Decides which vertices that are within a distance of each other are joined. Vertices are visited
+ * in ascending order of x, y and z. A vertex stays if no vertex that stays is within the distance.
+ * Every other vertex is replaced by the nearest vertex that stays. A grid of cells finds
+ * neighbours, and exact arithmetic decides close comparisons. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -12,7 +15,10 @@
 #include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
 
-enum { GRAIN = 1 << 12, KEY_SHIFT = 20 };
+enum {
+    GRAIN = 1 << 12, /* number of vertices for each call of a thread's function */
+    KEY_SHIFT = 20   /* number of the lower bits of sort keys, below the EBPO_SORT_BINS bins */
+};
 
 /* The edge of a grid cell is twice the distance. Indices of cells are below 2^49, so that rounding
  * moves a vertex by at most an eighth of a cell. Hence vertices within the distance of each other
@@ -25,14 +31,15 @@ static const double DOUBT = 1e-14;
 
 typedef struct grouping {
     const ebpo_mesh *mesh;
-    double distance, min[3];
+    double distance;
+    double min[3];   /* least coordinates of all vertices */
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
     uint32_t *map;   /* [vertex_count] vertex that replaces each vertex */
     uint32_t *slots; /* [mask + 1] last remaining vertex of the cells with each hash */
     uint32_t *chain; /* [vertex_count] previous remaining vertex in the same slot */
     uint64_t mask;
-    /* [threads] largest squared distance of a vertex from the one that replaces it */
+    /* [threads] largest squared distance of a vertex from the vertex that replaces it */
     double *moved;
 } grouping;
 
@@ -100,6 +107,7 @@ static double squared_distance(const double p[3], const double q[3])
     return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
 }
 
+/* Returns true if rounded squared distances can be compared. */
 static bool is_certain(double a, double b)
 {
     return a > 0x1p-900 && b > 0x1p-900 && a < 0x1p900 && b < 0x1p900 &&
@@ -122,6 +130,7 @@ static int put_distance(double (*factor)[2], double sign, const double p[3], con
     return n;
 }
 
+/* Returns true if the distance of p and q is at most `distance`. */
 static bool is_within(const double p[3], const double q[3], double distance)
 {
     double square = squared_distance(p, q), limit = distance * distance, factor[13][2];
@@ -133,6 +142,8 @@ static bool is_within(const double p[3], const double q[3], double distance)
     return ebpo_sign_of_products(factor[0], n + 1) <= 0;
 }
 
+/* Returns true if a is nearer to p than b; at equal distances, if a comes first in the order of x,
+ * y and z. */
 static bool is_nearer(const double p[3], const double a[3], const double b[3])
 {
     double to_a = squared_distance(p, a), to_b = squared_distance(p, b), factor[24][2];
@@ -141,14 +152,14 @@ static bool is_nearer(const double p[3], const double a[3], const double b[3])
     int n = put_distance(factor, 1, p, a);
     n += put_distance(factor + n, -1, p, b);
     int sign = ebpo_sign_of_products(factor[0], n);
-    for (int k = 0; k < 3 && sign == 0;
-         k++) /* of two vertices at equal distances, take the first */
+    for (int k = 0; k < 3 && sign == 0; k++)
         sign = a[k] < b[k] ? -1 : a[k] > b[k];
     return sign < 0;
 }
 
 /* ---- the grid ---- */
 
+/* Returns a coordinate in cells of the grid. */
 static double cell_of(const grouping *g, double x, int axis)
 {
     return (0.5 * x - 0.5 * g->min[axis]) / g->distance;
@@ -160,6 +171,7 @@ static uint64_t slot_of(const grouping *g, const int64_t cell[3])
     return ebpo_hash_three(key) & g->mask;
 }
 
+/* Records that vertex v at p stays, and adds it to the grid. */
 static void keep_vertex(grouping *g, uint32_t v, const double p[3])
 {
     int64_t cell[3];
@@ -171,8 +183,8 @@ static void keep_vertex(grouping *g, uint32_t v, const double p[3])
     g->slots[slot] = v;
 }
 
-/* Returns a remaining vertex within the distance from p: the nearest one, or any if `nearest` is
- * false. */
+/* Returns a vertex that stays and is within the distance from p: the nearest such vertex, or any if
+ * `nearest` is false. Returns EBPO_NO_INDEX if there is none. */
 static uint32_t find_staying(const grouping *g, const double p[3], bool nearest)
 {
     int64_t low[3], high[3], c[3];
@@ -230,7 +242,7 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
         for (int k = 0; k < 3; k++) {
             if (!isfinite(p[k]))
                 return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
-                                      "vertex %llu has a non-finite coordinate; repair it",
+                                      "vertex %llu has a non-finite coordinate; repair the file",
                                       (unsigned long long)ebpo_mesh_source_vertex(mesh, v));
             g->min[k] = v == 0 || p[k] < g->min[k] ? p[k] : g->min[k];
             max[k] = v == 0 || p[k] > max[k] ? p[k] : max[k];
@@ -241,7 +253,7 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
     if (0.5 * g->distance >= g->extent)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
                               "a weld distance of %g is not less than the model's longest side, "
-                              "%g; give a smaller one, in the model's unit",
+                              "%g; give a smaller distance, in the model's unit",
                               g->distance, 2 * g->extent);
     if (g->distance < LEAST_DISTANCE || g->extent / g->distance > MAX_CELLS)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
@@ -251,8 +263,8 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Numbers the remaining vertices in ascending order, and maps each vertex to the number of the one
- * that replaces it. */
+/* Numbers the vertices that stay, in ascending order, and maps each vertex to the number of the
+ * vertex that replaces it. Returns how many vertices stay. */
 static uint64_t number_staying(grouping *g, uint32_t *from)
 {
     ebpo_workspace *workspace = g->mesh->workspace;

@@ -162,7 +162,7 @@ static const struct {
     { "t.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
       "line 6: face 0 names fewer than its 3" },
     { "t.off", "OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n",
-      "line 4: vertex 1 has no three coordinates" },
+      "line 4: vertex 1 has fewer than three coordinates" },
     { "t.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "the file ends before face 1" },
     { "t.off", "OFF\n3 1 0 2.5\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "line 2: counts of vertices" },
     { "t.stl", "not an stl file at all", "t.stl: " },
