@@ -18,8 +18,8 @@ typedef struct ebpo_big {
 
 /* Converts a finite double, exactly. */
 ebpo_big ebpo_big_of(double x);
-/* Return the truncated result. The relative error is at most 2^-510, except for sums of numbers of
- * opposite signs, whose error is at most 2^-510 of the larger operand. */
+/* These functions return the truncated result. The relative error is at most 2^-510, except for
+ * sums of numbers of opposite signs, whose error is at most 2^-510 of the larger operand. */
 ebpo_big ebpo_big_add(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_subtract(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_multiply(const ebpo_big *a, const ebpo_big *b);
@@ -27,7 +27,8 @@ ebpo_big ebpo_big_multiply(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_root(const ebpo_big *a);
 /* Returns a * 2^by. */
 ebpo_big ebpo_big_scale(const ebpo_big *a, int64_t by);
-/* Returns a * 2^-unit as a double, rounded towards 0; infinity or 0 when it is out of range. */
+/* Returns a * 2^-unit as a double, rounded towards 0. Beyond the range of doubles, returns infinity
+ * or 0. */
 double ebpo_big_double(const ebpo_big *a, int64_t unit);
 
 /* A complex number. */

@@ -1,23 +1,26 @@
-/* Bounds winding numbers of the discs of a border, at points and in boxes.
+/* Bounds winding numbers of the discs of a border, at points and in boxes. cap_tree.h explains the
+ * mesh S, its discs, the nodes of their tree, and the winding numbers k, w_S and w_D. A half angle
+ * is half of a solid angle.
  *
  * Discs. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
- * centre c and radius R. With r = |x - p|, the solid angle is the integral of f . dA,
- * f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 / r^3. For all p
- * of a box with the centre q and half the diagonal s, whose distance from the ball is g > 0, the
- * half angle therefore is at most a / (2 g^2), and differs from V . f(c) / 2 at q by at most
- * a (R + s) / g^3: the differences x - p form a convex set, in which the norm is at least g.
- * Triangles may also be bounded by pi each.
+ * centre c and radius R. With r = |x - p|, the solid angle at p is the integral of f . dA over the
+ * triangles, f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 /
+ * r^3. Let a box have the centre q and half the diagonal s, and a distance g > 0 from the ball. For
+ * every p in the box, the half angle is at most a / (2 g^2). It differs from V . f(c) / 2 at q by
+ * at most a (R + s) / g^3, because the differences x - p form a convex set, in which the norm is at
+ * least g. The half angle of a triangle is also at most pi.
  *
- * Border edges. Away from its faces, w_S is smooth, also on caps. The gradient of 4 pi w_S is the
- * integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of length l
- * at the distance d contributes at most l / d^2, and at most 2 / d, the value of a whole line. So
- * the border bounds how much 2 pi w_S varies in a box that no face touches: by s / 2 times the sum
- * over the edges. For a whole loop the variation is also at most a s / g^3, as above.
+ * Border edges. Away from the faces of S, w_S is smooth, also on caps. The gradient of 4 pi w_S is
+ * the integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of
+ * length l at the distance d contributes at most l / d^2, and at most 2 / d, the value of a whole
+ * line. So the border bounds how much 2 pi w_S varies in a box that no face touches: by s / 2 times
+ * the sum over the edges. For a whole loop the variation is also at most a s / g^3, for the same
+ * reason as above.
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V, whose error
- * `slack` bounds; radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
- * only between 2^-300 and 2^300, and lengths below 2^-500 or areas below 2^-900, which may
- * underflow, change the results by less than the constant that is added. */
+ * `slack` bounds. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
+ * only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900, which may underflow,
+ * change the results by less than the constants that are added (TINY, 2^-500). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -63,8 +66,8 @@ static double gap_between(const ebpo_cap_node *n, const ebpo_cap_box *q, const d
     return distance * (1 - 0x1p-40) - n->radius * ENLARGE;
 }
 
-/* Bounds the sum of a node's half angles. *gap_out: lower bound of its distance, if above
- * DISTANCE_MIN. */
+/* Bounds the sum of the half angles of a node's triangles. *gap_out: a lower bound of the distance
+ * between the node's ball and the box, or a value below DISTANCE_MIN. */
 static ebpo_bounded bound_node(const ebpo_cap_node *n, const ebpo_cap_box *q, double *gap_out)
 {
     const ebpo_bounded unknown = { 0, n->most };
@@ -87,8 +90,8 @@ static ebpo_bounded bound_node(const ebpo_cap_node *n, const ebpo_cap_box *q, do
                                                           : unknown;
 }
 
-/* Returns the half angle of a stretch's triangle at a point. Next to an edge, where doubles do not
- * suffice, in 512 bits. */
+/* Bounds the half angle of a stretch's triangle at a point. Computes in 512 bits if doubles do not
+ * suffice, which happens next to an edge. */
 static ebpo_bounded bound_triangle(const ebpo_cap_tree *t, const ebpo_cap_node *n,
                                    const double p[3])
 {
@@ -110,7 +113,7 @@ static inline void add_bounded(ebpo_bounded *sum, ebpo_bounded term)
 
 /* --- entries --- */
 
-/* Returns the node of an entry; `own` has space for a triangle's node. */
+/* Returns the node of an entry. If the entry is a single triangle, its node is written to *own. */
 static const ebpo_cap_node *node_of(const ebpo_cap_tree *t, uint32_t entry, ebpo_cap_node *own)
 {
     const ebpo_cap_node *n = &t->node[entry & ~EBPO_CAP_TRIANGLE];
@@ -120,15 +123,15 @@ static const ebpo_cap_node *node_of(const ebpo_cap_tree *t, uint32_t entry, ebpo
     return own;
 }
 
-/* Returns true if an entry has parts: it is not a single triangle. */
+/* Returns true if an entry has parts, that is, more than one triangle. */
 static bool has_parts(const ebpo_cap_tree *t, uint32_t entry)
 {
     const ebpo_cap_node *n = &t->node[entry & ~EBPO_CAP_TRIANGLE];
     return !(entry & EBPO_CAP_TRIANGLE) && (n->weight == 0 || n->to - n->from > 2);
 }
 
-/* Sets the parts of a node: those of a group; or the triangle of a stretch and its halves. Returns
- * their count. */
+/* Writes the parts of a node: the two nodes of a group; or the triangle of a stretch, and those of
+ * its two halves that have triangles. Returns the number of parts. */
 static uint32_t find_parts(const ebpo_cap_tree *t, uint32_t entry, uint32_t part[3])
 {
     const ebpo_cap_node *n = &t->node[entry];
@@ -260,7 +263,7 @@ static void refine_entry(ebpo_cap_front *f, uint32_t i)
     f->bound[i] = f->bound[f->count];
     if (has_parts(f->tree, entry))
         count = find_parts(f->tree, entry, part);
-    else /* the one triangle of a node, at a point */
+    else /* a node of one triangle, at a point: bound_triangle is more accurate than bound_node */
         part[0] = entry | EBPO_CAP_TRIANGLE;
     for (uint32_t k = 0; k < count; k++) {
         if (f->box.radius == 0 && part[k] & EBPO_CAP_TRIANGLE) {
@@ -299,10 +302,11 @@ bool ebpo_cap_front_refine(ebpo_cap_front *front)
 typedef struct varying {
     const ebpo_cap_tree *tree;
     const ebpo_cap_box *box;
-    double sum, most;
+    double sum;  /* upper bound of the variation of 2 pi w_S so far */
+    double most; /* the computation ends when `sum` is not below this */
 } varying;
 
-/* Adds the variation by a border edge. */
+/* Adds a bound of the variation that a border edge causes. */
 static void vary_by_edge(varying *v, uint64_t i, uint64_t j, double weight)
 {
     double from[3], edge[3];
@@ -333,7 +337,8 @@ static bool is_apart(const ebpo_cap_box *box, const ebpo_cap_node *n, double *ga
     return *gap > n->radius && *gap > DISTANCE_MIN && distance < DISTANCE_MAX;
 }
 
-/* Adds the variation by the path of a stretch. `at`: its node. Recursive, at most 32 deep. */
+/* Adds a bound of the variation that the path of a stretch causes. `at`: node of the stretch.
+ * Recursive, at most 32 deep. */
 static void vary_by_path(varying *v, uint64_t at)
 {
     const ebpo_cap_node *n = &v->tree->node[at];
@@ -355,7 +360,7 @@ static void vary_by_path(varying *v, uint64_t at)
         vary_by_edge(v, m, n->to, n->weight);
 }
 
-/* Adds the variation by whole loops. Recursive, at most 32 deep. */
+/* Adds a bound of the variation that the loops of a node cause. Recursive, at most 32 deep. */
 static void vary_by_loops(varying *v, uint64_t at)
 {
     const ebpo_cap_node *n = &v->tree->node[at];

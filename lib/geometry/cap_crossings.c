@@ -8,12 +8,13 @@
 #include "geometry/cap_triangles.h"
 #include "geometry/predicates.h"
 
+/* A segment from a point along an axis to coordinate `to`. */
 typedef struct cap_segment {
     const ebpo_cap_tree *tree;
-    const double *from;
+    const double *from; /* [3] */
     double to;
     int axis;
-    double low[3], high[3];
+    double low[3], high[3]; /* the segment's box */
 } cap_segment;
 
 /* Returns true if the ball around a node's caps is certainly apart from the box. */
@@ -82,7 +83,7 @@ int32_t ebpo_cap_path_crossings(const ebpo_cap_tree *tree, uint32_t entry, const
     return -sum;
 }
 
-/* Recursive, at most 64 deep. */
+/* Returns false if certainly no cap below a node touches the box. Recursive, at most 64 deep. */
 static bool is_near(const ebpo_cap_tree *t, uint64_t at, const double low[3], const double high[3])
 {
     const ebpo_cap_node *n = &t->node[at];

@@ -1,6 +1,7 @@
-/* Makes a tree over the caps of a border: loops in groups of two, and the stretches of each loop.
- * Each node has a ball around its triangles and sums over them (cap_bounds.c). Radii, lengths and
- * areas are upper bounds: they are enlarged by a factor of 1 + 2^-40. */
+/* Makes a tree over the caps of a border: groups of two nodes down to single loops, then the
+ * stretches of each loop. Each node has a ball around its triangles, and sums over its triangles
+ * for the bounds in cap_bounds.c. Radii, lengths and areas are upper bounds, because they are
+ * enlarged by a factor of 1 + 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,12 +20,12 @@ static const double ENLARGE = 1 + 0x1p-40;
 
 typedef struct growing {
     ebpo_cap_tree *tree;
-    const uint64_t *first;
-    const uint32_t *weight;
-    uint64_t *order; /* loops */
+    const uint64_t *first;  /* [loops + 1] first position of each loop */
+    const uint32_t *weight; /* [loops] */
+    uint64_t *order;        /* [loops] the loops, in the order of the tree */
 } growing;
 
-/* Sets the ball around positions. */
+/* Sets the node's ball to a ball around positions. */
 static void enclose_positions(ebpo_cap_node *n, double (*position)[3], uint64_t count)
 {
     double low[3], high[3], most = 0;
@@ -45,7 +46,7 @@ static void enclose_positions(ebpo_cap_node *n, double (*position)[3], uint64_t 
     n->radius = most * ENLARGE + 0x1p-500;
 }
 
-/* Adds the sums of a part. */
+/* Adds the sums of a part of the node. */
 static void add_part(ebpo_cap_node *n, const ebpo_cap_node *part)
 {
     n->area = (n->area + part->area) * (1 + 0x1p-50);
@@ -84,7 +85,7 @@ void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stre
     set_triangle(tree, out, m);
 }
 
-/* Adds a border edge to the length. */
+/* Adds the length of a border edge to a node. */
 static void add_edge(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t i, uint64_t j)
 {
     double edge[3];
@@ -92,8 +93,8 @@ static void add_edge(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t i, uint6
     n->length += n->weight * (ebpo_vec3_length(edge) * ENLARGE + 0x1p-500);
 }
 
-/* Makes the nodes of the stretch [i, j], in preorder: ebpo_cap_triangle. Recursive, at most 32
- * deep. */
+/* Makes the nodes of the stretch [i, j], in preorder, as ebpo_cap_triangle numbers triangles.
+ * Recursive, at most 32 deep. */
 static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weight)
 {
     ebpo_cap_node *n = &t->node[t->node_count++];
@@ -113,15 +114,15 @@ static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weig
     }
 }
 
-/* Returns twice the middle of a loop's first and middle vertex along the axis: a cheap centre. */
+/* Returns the mean coordinate of a loop's first and middle vertex on the axis: a cheap centre. */
 static double loop_key(const growing *g, uint64_t loop, int axis)
 {
     uint64_t a = g->first[loop], b = ebpo_cap_middle(a, g->first[loop + 1]);
     return g->tree->position[a][axis] / 2 + g->tree->position[b][axis] / 2;
 }
 
-/* Moves the loops with the least keys to the first half of order[begin .. end): quickselect; equal
- * keys are ordered by loop. */
+/* Moves the loops with the least keys to the first half of order[begin .. end), by quickselect.
+ * Loops with equal keys are ordered by their indices. */
 static void divide_loops(growing *g, uint64_t begin, uint64_t end, int axis)
 {
     uint64_t half = begin + (end - begin) / 2, low = begin, high = end - 1;
@@ -152,6 +153,7 @@ static void divide_loops(growing *g, uint64_t begin, uint64_t end, int axis)
     }
 }
 
+/* Returns the axis along which the keys of the loops differ most. */
 static int longest_axis(const growing *g, uint64_t begin, uint64_t end)
 {
     double side[3];
@@ -191,9 +193,9 @@ static void make_group(growing *g, uint64_t begin, uint64_t end)
     for (int k = 0; k < 3; k++)
         n->centre[k] = a->centre[k] / 2 + b->centre[k] / 2;
     ebpo_vec3_subtract(a->centre, n->centre, d);
-    double reach = ebpo_vec3_length(d) + a->radius;
+    double radius_a = ebpo_vec3_length(d) + a->radius;
     ebpo_vec3_subtract(b->centre, n->centre, d);
-    n->radius = fmax(reach, ebpo_vec3_length(d) + b->radius) * ENLARGE + 0x1p-500;
+    n->radius = fmax(radius_a, ebpo_vec3_length(d) + b->radius) * ENLARGE + 0x1p-500;
 }
 
 ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3], const uint64_t *first,

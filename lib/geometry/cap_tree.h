@@ -1,14 +1,15 @@
 /* Computes winding numbers of the discs that close the border of a mesh.
  *
- * The mesh S with holes and the caps C of its border (mesh/border.h) together have an integer
- * winding number k. The caps turn against their loops, so the winding number of S is
+ * Caps are triangles that close the holes of a mesh S: each loop of its border (mesh/border.h) has
+ * caps (geometry/cap_triangles.h). S and its caps together have an integer winding number k. The
+ * discs D are the caps with the opposite orientation, so that their boundary is the border in its
+ * direction. So the winding number of S is
  *
- *   w_S(p) = k(p) + w_D(p),
+ *   w_S(p) = k(p) + w_D(p).
  *
- * where D are the caps turned in the direction of the loops: the discs. w_D is a sum of solid
- * angles over few triangles. It is bounded by a tree and refined only as far as a decision needs
- * it. At a point on a cap k and w_D jump; both belong to the point shifted as in
- * ebpo_axis_crossing, and w_S has no jump there. */
+ * w_D is a sum of solid angles over few triangles. A tree gives bounds of this sum, which are
+ * refined only as far as a decision needs. At a point on a cap, k and w_D jump. There, both are
+ * taken at the point shifted as in ebpo_axis_crossing. w_S does not jump at caps. */
 #ifndef EBPO_GEOMETRY_CAP_TREE_H
 #define EBPO_GEOMETRY_CAP_TREE_H
 
@@ -16,19 +17,20 @@
 
 #include "geometry/solid_angle.h"
 
-/* A node of the tree: a stretch of a loop (geometry/cap_triangles.h) with all its triangles, or a
- * group of two nodes. The first node is the root. */
+/* A node of the tree: a stretch, that is, a path along a loop (geometry/cap_triangles.h), with all
+ * its triangles; or a group of two nodes. The first node is the root. */
 typedef struct ebpo_cap_node {
     double centre[3], radius; /* a ball around the triangles */
     double area;              /* upper bound of the sum of weight * area */
     double vector[3];         /* sum of weight * area * normal */
     double slack;             /* bound of the rounding error of `vector` */
-    double length;            /* upper bound of the sum of weight * length of the border edges: of a
-                               * stretch's path, and for a whole loop of its last edge too */
-    double most;              /* pi times the sum of weights: bound of the half angles' sum */
+    /* upper bound of the sum of weight * length over the border edges of the path; in a node of a
+     * whole loop, also over the loop's last edge */
+    double length;
+    double most;       /* pi times the sum of the weights: bounds the sum of the half angles */
     uint32_t from, to; /* a stretch: positions in ebpo_cap_tree.position; a group: its two nodes */
-    uint32_t weight;   /* 0: a group */
-    uint32_t spare;
+    uint32_t weight;   /* weight of the stretch's loop; 0: a group */
+    uint32_t spare;    /* unused */
 } ebpo_cap_node;
 
 typedef struct ebpo_cap_tree {
@@ -53,11 +55,13 @@ EBPO_MUST_USE ebpo_status ebpo_cap_tree_of_loops(ebpo_cap_tree *out, const ebpo_
                                                  ebpo_error *error);
 void ebpo_cap_tree_free(ebpo_cap_tree *tree);
 
-/* Sets `out` to a node of the triangle that belongs to a stretch alone. Its length is 0. */
+/* Sets `out` to a node of the one triangle of a stretch that does not belong to its halves. The
+ * length of this node is 0. */
 void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stretch,
                             ebpo_cap_node *out);
 
-/* Returns the crossings of the caps, which turn against the discs, as ebpo_axis_crossing does. */
+/* Returns the sum of the crossings of a segment with all caps, each as ebpo_axis_crossing defines
+ * it. */
 int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis);
 /* Returns false if certainly no cap touches the box. */
 bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3]);
@@ -75,8 +79,8 @@ ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding);
 ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                               double width);
 
-/* What is inside, by the winding number w and a threshold t in (0, 1): nonzero: |w| > t; positive:
- * w > t; evenodd: |w - e| > t, where e is the even integer nearest to w. */
+/* Defines which points are inside, by the winding number w and a threshold t in (0, 1). nonzero:
+ * |w| > t; positive: w > t; evenodd: |w - e| > t, where e is the even integer nearest to w. */
 typedef struct ebpo_cap_rule {
     uint8_t rule; /* ebpo_rule */
     double threshold;
@@ -84,7 +88,8 @@ typedef struct ebpo_cap_rule {
 
 typedef struct ebpo_cap_decision {
     bool inside;
-    bool tie; /* w equals the boundary of the rule, or 512 bits do not decide: counted as outside */
+    /* w_S equals a boundary of the rule, such as t, or 512 bits do not decide; `inside` is false */
+    bool tie;
     ebpo_bounded winding; /* bounds of w_S as far as they were needed */
 } ebpo_cap_decision;
 

@@ -1,17 +1,20 @@
-/* Decisions by winding numbers of meshes with holes.
+/* Decides by winding numbers whether points are inside a mesh with holes. cap_tree.h explains the
+ * rules and the winding numbers w = w_S and k.
  *
- * Bounds in doubles are refined until the rule gives one result for the whole interval. Where they
- * do not suffice, because the winding number equals the boundary s of the rule or nearly so, the
- * sign of w - s is found without any arctangent. Half angles are arguments of complex numbers
- * (geometry/solid_angle.h), so the product z of these numbers, each to the power of its weight, has
- * the argument 2 pi (w - k) up to whole turns, and since w is close to s,
+ * Bounds of w in doubles are refined until the rule gives one result for the whole interval.
+ * Doubles do not suffice if w equals a boundary s of the rule, or nearly so; s is an even integer
+ * plus or minus the threshold t. Then the sign of w - s is found without any arctangent. Half
+ * angles are arguments of complex numbers (geometry/solid_angle.h). So the product z of these
+ * numbers, each to the power of its weight, has the argument 2 pi (w - k) up to whole turns.
+ * Because w is close to s,
  *
  *   sign(w - s) = sign(Im(z exp(-2 pi i s))).
  *
- * The product is computed in 512 bits; its relative error is the sum of those of its factors. The
- * argument of z exp(-2 pi i s) is then known within twice that error. exp(2 pi i t) is a product of
- * exp(2 pi i / 2^j) over the bits of t; these follow from one another by square roots (half
- * angles). Below 2^-64 of a turn they have lost fewer than 100 bits. */
+ * The product is computed in 512 bits. Its relative error is the sum of the relative errors of its
+ * factors, and the argument of z exp(-2 pi i s) is known within twice this error. exp(2 pi i t) is
+ * the product of exp(2 pi i / 2^j) over the bits of t. Each of these factors follows from the
+ * previous one by square roots (half angles). The factors below 2^-64 of a turn have lost fewer
+ * than 100 bits. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,8 +35,8 @@ static bool rule_holds(const ebpo_cap_rule *r, double w)
     return fabs(w - 2 * nearbyint(w / 2)) > r->threshold;
 }
 
-/* Returns the boundary of the rule that is nearest to w, as an even integer plus `*side` times the
- * threshold. */
+/* Returns the boundary of the rule that is nearest to w: an even integer plus *side (1 or -1) times
+ * the threshold. */
 static double nearest_boundary(const ebpo_cap_rule *r, double w, int *side)
 {
     double even = r->rule == EBPO_RULE_EVENODD ? 2 * nearbyint(w / 2) : 0;
@@ -45,7 +48,7 @@ int ebpo_cap_rule_result(const ebpo_cap_rule *rule, double low, double high)
 {
     double t = rule->threshold, middle = low / 2 + high / 2,
            even = rule->rule == EBPO_RULE_EVENODD ? 2 * nearbyint(middle / 2) : 0;
-    bool apart = low > even + t || high < even + t;
+    bool apart = low > even + t || high < even + t; /* no boundary is in [low, high] */
     if (rule->rule != EBPO_RULE_POSITIVE)
         apart = apart && (low > even - t || high < even - t);
     if (rule->rule == EBPO_RULE_EVENODD) /* the boundaries around the next even integers */
@@ -63,8 +66,8 @@ ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding)
                                        0x1p-50 * fabs(middle) };
 }
 
-/* Returns the next tolerance of a pass; negative after the last one, in which all triangles are
- * summed. */
+/* Returns the tolerance of the next pass. The tolerance of the last pass is 0: all triangles are
+ * summed. After the last pass, returns -1. */
 static double next_tolerance(double tolerance)
 {
     return tolerance == 0 ? -1 : tolerance < 0x1p-40 ? 0 : tolerance * 0x1p-4;
@@ -82,11 +85,12 @@ ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int3
 /* --- 512 bits --- */
 
 typedef struct exact_sum {
-    ebpo_big_complex turn;
-    double error;       /* relative error of `turn` */
-    ebpo_bounded angle; /* sum of the half angles */
+    ebpo_big_complex turn; /* product z, whose argument is the sum of the half angles */
+    double error;          /* relative error of `turn` */
+    ebpo_bounded angle;    /* sum of the half angles, in doubles */
 } exact_sum;
 
+/* Adds `weight` times a half angle. */
 static void multiply_power(exact_sum *s, const ebpo_exact_angle *a, uint32_t weight)
 {
     ebpo_big_complex power = a->turn;
@@ -101,7 +105,8 @@ static void multiply_power(exact_sum *s, const ebpo_exact_angle *a, uint32_t wei
     s->angle.error += weight * 0x1p-47 + 0x1p-52 * fabs(s->angle.middle);
 }
 
-/* Sums the half angles of all triangles. Returns false if one is not known: p is a corner of it. */
+/* Sums the half angles of all triangles. Returns false if p is a corner of a triangle, whose half
+ * angle is then undefined. */
 static bool sum_exactly(const ebpo_cap_tree *t, const double p[3], exact_sum *s)
 {
     *s = (exact_sum){ .turn = { ebpo_big_of(1), ebpo_big_of(0) } };
@@ -119,7 +124,7 @@ static bool sum_exactly(const ebpo_cap_tree *t, const double p[3], exact_sum *s)
     return true;
 }
 
-/* Returns exp(2 pi i t) for t in [2^-11, 1). */
+/* Returns exp(2 pi i t) for t in [2^-11, 1). `root` is exp(2 pi i / 2^j) for bit j of t. */
 static ebpo_big_complex turn_of(double t)
 {
     const ebpo_big one = ebpo_big_of(1);
@@ -179,7 +184,7 @@ static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double 
 
 /* --- decisions --- */
 
-/* Returns 1 or 0 if the bounds of a front decide, else -1. */
+/* Refines a front until its bounds decide. Returns 1 (inside) or 0, or -1 if they do not decide. */
 static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_cap_rule *rule,
                            ebpo_bounded *w)
 {
@@ -192,7 +197,7 @@ static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_ca
     return result;
 }
 
-/* Returns 1 or 0 if bounds in doubles decide, else -1. */
+/* Returns 1 (inside) or 0 if bounds in doubles decide, else -1. */
 static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                             const ebpo_cap_rule *rule, ebpo_bounded *w)
 {

@@ -11,9 +11,9 @@
 
 enum { EBPO_MAX_LEVEL = 20 };
 
-/* The root cell: [origin, origin + size] on each axis. Each axis has a power of two u. The origin
- * is an integer multiple of u, and the size an integer multiple of u * 2^grid_level. Every corner
- * at levels 0 .. grid_level is an exact double. size > 0 on every axis. */
+/* The root cell: [origin, origin + size] on each axis, size > 0. Each axis has a unit u, which is a
+ * power of two. The origin is an integer multiple of u, and the size an integer multiple of
+ * u * 2^grid_level. So every cell corner at levels 0 .. grid_level is an exact double. */
 typedef struct ebpo_box {
     double origin[3];
     double size[3];
@@ -44,8 +44,8 @@ static inline double ebpo_cell_face(const ebpo_box *box, int axis, int level, ui
 }
 
 /* Makes the root box around [min, max] (finite, min <= max). The box is strictly larger on every
- * side, and exact down to `grid_level` (0 .. 20). Returns false when coordinates are beyond 2^1000.
- */
+ * side, and has exact cell corners down to `grid_level` (0 .. 20). Returns false if coordinates are
+ * beyond 2^1000. */
 bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int grid_level);
 
 /* Returns true when a box that was read from a file has the properties that ebpo_box_make
@@ -171,8 +171,8 @@ static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3]
     return true;
 }
 
-/* Precomputed data to find the cells of one level: most points need no division and no cell face.
- */
+/* Precomputed data to find the cells of one level. For most points, ebpo_locator_find divides
+ * nothing and computes no cell face. */
 typedef struct ebpo_locator {
     ebpo_box box;
     int level;
@@ -193,7 +193,7 @@ static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
     return l;
 }
 
-/* Finds the cell of a point that is near a cell face or outside. */
+/* Completes ebpo_locator_find for a point that is near a cell face or outside the root cell. */
 bool ebpo_locator_decide(const ebpo_locator *locator, const double p[3], ebpo_position *out);
 
 /* Same as ebpo_locate, for the locator's level. */

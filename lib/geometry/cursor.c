@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+/* Makes a node the current node, at this depth. */
 static void arrive_at(ebpo_cursor *c, int depth, const ebpo_node *node)
 {
     c->depth = depth;
@@ -74,6 +75,7 @@ ebpo_status ebpo_cursor_next(ebpo_cursor *c, bool over, bool *more, ebpo_error *
     return status;
 }
 
+/* Returns true if the node's cell contains the cell. */
 static bool node_holds(const ebpo_node *node, ebpo_cell cell)
 {
     return node->cell.level <= cell.level &&

@@ -1,6 +1,7 @@
-/* A position in an octree, which moves to children and parents, to a cell or to a point. Works for
- * any holder of nodes. The cursor stores the path from the root, so that moves to a parent take no
- * time and nodes are not read again.
+/* Defines a cursor: a position in an octree, which moves to children and parents, to a cell or to a
+ * point. A cursor works for any holder of nodes (levels in memory, a file, or tables), through the
+ * holder's ebpo_node_source. The cursor stores the path from the root, so moves to a parent take
+ * almost no time, and nodes are not read again.
  *
  *     ebpo_cursor c;
  *     const ebpo_node *child;
@@ -21,15 +22,15 @@
 
 /* A cursor takes about 8 KB; avoid copies. */
 typedef struct ebpo_cursor {
-    const ebpo_node_source *source;
+    const ebpo_node_source *source; /* functions of the holder */
     void *holder;
-    int depth; /* depth below the root of the cursor */
+    int depth; /* depth of the current node below the root of the cursor */
     struct {
         ebpo_node node;
         bool requested; /* the children were requested: has_children is valid */
         bool has_children;
         ebpo_node child[8];
-    } at[EBPO_LEVELS_MAX];
+    } at[EBPO_LEVELS_MAX]; /* [depth + 1] the path from the root to the current node */
 } ebpo_cursor;
 
 /* Begins at `root`, which is the root of a tree or of any part of a tree. The cursor never moves

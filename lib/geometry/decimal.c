@@ -2,8 +2,8 @@
  * where it applies, and the fastest is tried first:
  * 1. Digits below 2^53, multiplied or divided by a power of ten up to 10^22. Both numbers are
  *   doubles, so one operation rounds once (Clinger, "How to read floating point numbers
- *   accurately", 1990). That double also decides the float, unless it is exactly between two
- *   floats: rounding twice may then err.
+ *   accurately", 1990). The float is this double, rounded again, unless the double is exactly
+ *   between two floats: then rounding twice may give the wrong float.
  * 2. Up to 19 digits, divided by a power of ten up to 10^27: a 128-bit quotient with its remainder,
  *   rounded by this code.
  * 3. The C library. */
@@ -148,8 +148,9 @@ static uint64_t power_of_five(int exponent)
     return five;
 }
 
-/* Computes digits / 10^e to `bits` bits. The quotient has at least 65 bits, so the bits below and
- * the remainder determine the rounding. */
+/* Converts by method 2 to a number of `bits` bits. The quotient q has at least 65 bits, so the bits
+ * of q below the last kept bit and the remainder determine the rounding. Returns false if this
+ * method does not apply. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -252,8 +253,9 @@ static bool prints_digits(float value, const char *digits, size_t count, int32_t
     return count == 1 || memcmp(exponent - (count - 1), digits + 1, count - 1) == 0;
 }
 
-/* Decides by printing whether the float, rounded to the text's last digit, gives the text. (A float
- * below a power of ten has one digit fewer before the last one than the power of ten.) */
+/* Decides by printing whether the float, rounded to the text's last digit, gives the text. (If the
+ * text is a power of ten, such as 1000, a lower float, such as 999.7, has one digit fewer up to
+ * this position, and is printed with one digit fewer.) */
 static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 {
     char digits[EBPO_NUMBER_LONGEST];

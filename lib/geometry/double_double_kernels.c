@@ -46,7 +46,7 @@ static inline double norm_1(const ebpo_pair a[3])
     return fabs(a[0].head) + fabs(a[1].head) + fabs(a[2].head);
 }
 
-/* The edges e and f from corner 0, and the normal n. */
+/* A triangle's edges e and f from corner 0, and its normal n = e x f. */
 typedef struct pair_plane {
     ebpo_pair e[3], f[3], n[3];
     ebpo_pair length2; /* |n|^2 */
@@ -62,6 +62,7 @@ static inline void make_plane(const double triangle[3][3], pair_plane *out)
     out->length2 = ebpo_pair_dot(out->n, out->n);
 }
 
+/* Computes the distance of p from a corner. */
 static inline void to_corner(const double p[3], const double corner[3], ebpo_measured *out)
 {
     ebpo_pair d[3];

@@ -1,6 +1,6 @@
-/* Double-double arithmetic for distances and rays, compiled once for each instruction set. With FMA
- * one instruction computes a product's rounding error. The error bounds hold in each build, so all
- * builds give the same decisions and results. All functions are pure. */
+/* Declares the double-double kernels of distances and rays, which are compiled once for each
+ * instruction set. With FMA one instruction computes a product's rounding error. The error bounds
+ * hold in each build, so all builds give the same decisions and results. All functions are pure. */
 #ifndef EBPO_GEOMETRY_DOUBLE_DOUBLE_KERNELS_H
 #define EBPO_GEOMETRY_DOUBLE_DOUBLE_KERNELS_H
 

@@ -1,5 +1,5 @@
-/* Exact arithmetic on doubles: a value is an unevaluated sum of doubles (an expansion). The
- * components do not overlap, are sorted from the smallest to the largest, and are not 0. Results
+/* Computes exactly with doubles: a value is an unevaluated sum of doubles (an expansion). The bits
+ * of the components do not overlap. Components are sorted by absolute value and are not 0. Results
  * are exact as long as nothing overflows or underflows; callers keep exponents in range (see
  * predicates.c). An expansion of n = 0 components is 0. Include strict_fp.h first. Source: Shewchuk
  * 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT, FAST-EXPANSION-SUM and SCALE-EXPANSION. */

@@ -1,6 +1,7 @@
 /* Reads the nodes of an octree in memory: as levels, and as a table of children.
  *
- * Levels store node types in groups of eight siblings, 16 bits each. A node is found by its rank:
+ * Levels store node types in groups of eight siblings, 16 bits for each group. A node is found by
+ * its rank:
  * the number of preceding nodes of its type in its level. Ranks are prefix sums of the counts in
  * the groups, and are computed once for each level. Contradictory counts are rejected.
  *
@@ -26,12 +27,14 @@ static inline uint64_t bits_of_bytes(uint64_t x)
     return (x + (x >> 4)) & NIBBLES;
 }
 
+/* Returns the sum of the eight bytes of x. */
 static inline uint64_t sum_of_bytes(uint64_t x)
 {
     return ((x & BYTES) + (x >> 8 & BYTES)) * UINT64_C(0x0001000100010001) >> 48;
 }
 
-/* Counts types of up to 128 groups, four in a word. Every byte of the sums stays below 256. */
+/* Adds the counts of black, leaf and gray nodes in at most 128 groups, four in a word. With at most
+ * 32 words, every byte of the sums is below 256. */
 static void count_words(const uint8_t *types, unsigned words, uint64_t counts[4])
 {
     uint64_t low = 0, high = 0, both = 0;
@@ -90,6 +93,8 @@ static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_no
     return EBPO_OK;
 }
 
+/* Computes out->before, and checks the level's counts of nodes. number: of the level, for messages.
+ */
 static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, int number,
                               ebpo_error *error)
 {
@@ -245,10 +250,11 @@ const ebpo_node_source ebpo_level_source = { source_children, source_planes, sou
 
 typedef struct painter {
     ebpo_node_table *table;
-    int bits;
+    int bits; /* the grid has 2^bits cells along each axis */
 } painter;
 
-/* Writes an entry to the grid; `cell` is relative to the table's root. */
+/* Writes an entry to the grid cells that its node contains, or the entries of its descendants if
+ * the node is larger than a grid cell. `cell`: cell of the node, relative to the table's root. */
 static void paint_grid(painter *p, uint32_t entry, ebpo_cell cell)
 {
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && cell.level < p->bits) {

@@ -1,5 +1,6 @@
-/* Node types in groups of eight siblings. A group is a 16-bit word with two bits for each octant;
- * octant 0 has the lowest bits. Level 0 has one group, of which only octant 0 exists. */
+/* Defines nodes of an octree, their types in groups of eight siblings, their ranks in levels, and
+ * tables of children. A group is a 16-bit word with two bits for each octant; octant 0 has the
+ * lowest bits. Level 0 has one group, in which only octant 0 exists. */
 #ifndef EBPO_GEOMETRY_LEVEL_NODES_H
 #define EBPO_GEOMETRY_LEVEL_NODES_H
 
@@ -21,6 +22,7 @@ static inline uint16_t ebpo_group_of(ebpo_node_type type, unsigned octant)
     return (uint16_t)((unsigned)type << 2 * octant);
 }
 
+/* Returns the word with another type of this octant. */
 static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node_type type)
 {
     return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
@@ -122,17 +124,17 @@ typedef struct ebpo_node_source {
                            ebpo_error *error);
 } ebpo_node_source;
 
-/* Ranks in one level of a tree in memory: the index of a group's first node of each type, of a
- * node's first plane, and of a leaf's first reference. Ranks are prefix sums, so that nodes can be
- * visited in any order. */
+/* Ranks in one level of a tree in memory: the index of a group's first node of each type, the index
+ * of a node's first plane, and the index of the first face in a leaf's list. Ranks are prefix sums,
+ * so nodes can be visited in any order. */
 
 typedef struct ebpo_level_ranks {
     /* [group_count] by type: number of nodes of this type in the preceding groups; NULL for white
      * and black nodes if the level has no winding numbers for them */
     uint64_t *before[4];
-    uint64_t *plane_first;      /* [gray_count] */
-    uint64_t *leaf_plane_first; /* [leaf_count], NULL without stored leaf planes */
-    uint64_t *ref_first;        /* [leaf_count], NULL without face lists */
+    uint64_t *plane_first;      /* [gray_count]; NULL without planes */
+    uint64_t *leaf_plane_first; /* [leaf_count]; NULL without stored leaf planes */
+    uint64_t *ref_first;        /* [leaf_count]; NULL without face lists */
 } ebpo_level_ranks;
 
 /* Makes ranks. EBPO_E_FORMAT when the level's counts contradict each other. On failure all memory
@@ -167,11 +169,11 @@ int32_t ebpo_level_winding(const ebpo_level_nodes *nodes, const ebpo_node *node)
 /* For cursors; the holder is an ebpo_level_nodes. */
 extern const ebpo_node_source ebpo_level_source;
 
-/* A decoded tree as a table of children: four bytes for each node, which refer to the node's
- * children by index. It is used for many successive queries, because the search for a point's node
- * is a loop of one line. */
-
-/* An entry has two bits for its kind and 30 bits for its value. */
+/* --- a decoded tree as a table of children ---
+ *
+ * The table has four bytes for each node, the node's entry, which refers to the node's children by
+ * index. It is used for many successive queries, because the search for a point's node is a loop of
+ * one line. An entry has two bits for its kind and 30 bits for its value. */
 typedef enum ebpo_entry_kind {
     EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: index of the leaf */
@@ -234,7 +236,7 @@ typedef struct ebpo_node_table {
     /* marks of parts of leaves and uniform nodes, octant by octant: query/holes.h */
     int32_t (*split)[8];
     uint32_t split_count;
-    /* cells near the border of a surface, and their lists of discs: geometry/cap_bounds.h */
+    /* cells near the border of a surface, and their lists of entries: geometry/cap_bounds.h */
     struct ebpo_near_cell *near;
     uint32_t near_count;
     uint32_t *disc;
@@ -262,6 +264,7 @@ typedef struct ebpo_descent {
     int level; /* level of the entry's node */
 } ebpo_descent;
 
+/* Returns the index of the grid cell that contains cell `at` of `fine_level`. */
 static inline uint64_t ebpo_grid_cell(const ebpo_node_table *table, int fine_level,
                                       const uint32_t at[3])
 {

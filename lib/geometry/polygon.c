@@ -1,12 +1,13 @@
 /* Cuts polygons in space and closed chains into triangles between their own corners.
  *
  * A polygon is projected along the axis on which its normal is largest. A convex polygon becomes a
- * fan; every other polygon is cut ear by ear, with exact tests. A corner is tested again only when
- * its own neighbours have changed, or when the corner that blocked its ear was cut off. Blocking
- * corners are searched for in a tree of boxes. So outlines of 100,000 corners and more are cut in
- * about n log n steps. Outlines that cross themselves get the triangles of least area in space, as
- * closed chains of holes do. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir,
- * "Filling gaps in the boundary of a polyhedron", 1995. */
+ * fan; every other polygon is cut ear by ear, with exact tests. The ear at a corner is the triangle
+ * of this corner and its two neighbours; it may be cut off if no other corner blocks it (is in the
+ * way). A corner is tested again only when its neighbours have changed, or when the corner that
+ * blocked its ear was cut off. A tree of boxes finds blocking corners. So outlines of 100,000
+ * corners and more are cut in about n log n steps. Outlines that cross themselves get the triangles
+ * of least area in space, as closed chains around holes do. Sources: Meisters, "Polygons have
+ * ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -29,7 +30,8 @@ static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_
     return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-/* Returns the cost of an existing edge: more than the area of any triangulation. */
+/* Returns the extra cost of a chord that is an existing edge of the mesh: more than the area of any
+ * triangulation. */
 static double chain_penalty(const ebpo_chain *c)
 {
     double length = 0;
@@ -42,6 +44,8 @@ static double chain_penalty(const ebpo_chain *c)
 
 /* ---- least area, by dynamic programming over sub-chains i .. j ---- */
 
+/* Computes for each sub-chain [i * n + j] the least cost of its triangulation, and the third corner
+ * of the triangle at the chord i - j. */
 static void fill_tables(const ebpo_chain *c, double *cost, uint16_t *apex)
 {
     uint64_t n = c->n;
@@ -107,10 +111,10 @@ typedef struct chain_ear {
 
 typedef struct cutting {
     const ebpo_chain *chain;
-    /* [n] previous and next point of the remaining chain; number of ears computed for each point */
-    uint32_t *before, *after, *version;
-    double normal[3]; /* area vector of the chain */
-    chain_ear *heap;  /* the least ear first */
+    uint32_t *before, *after; /* [n] previous and next point of the remaining chain */
+    uint32_t *version;        /* [n] number of changes of the ear at each point */
+    double normal[3];         /* area vector of the chain */
+    chain_ear *heap;          /* [count] ears, also outdated ones; the least ear is first */
     uint64_t count;
 } cutting;
 
@@ -226,7 +230,7 @@ typedef enum ear_rule {
 } ear_rule;
 
 typedef enum ears_result {
-    EBPO_EARS_CUT, /* everything was cut: every triangle turns counter-clockwise, or has no area */
+    EBPO_EARS_CUT, /* all corners were cut off: every triangle turns counter-clockwise or is flat */
     EBPO_EARS_STUCK, /* the outline crosses itself */
     EBPO_EARS_WORK   /* more steps than `limit` would be needed */
 } ears_result;
@@ -243,10 +247,10 @@ typedef struct box {
 } box;
 
 typedef struct outline {
-    const double (*at)[2];
-    bool touching;
-    uint32_t n, left; /* number of corners, and number of corners that are not cut off */
-    uint64_t work;
+    const double (*at)[2]; /* [n] positions of the corners */
+    bool touching;         /* the rule is EBPO_EARS_TOUCHING */
+    uint32_t n, remaining; /* number of corners, and number of corners that are not cut off */
+    uint64_t work;         /* number of steps */
 
     uint32_t *next, *previous; /* next is NONE for a corner that is cut off */
 
@@ -256,7 +260,8 @@ typedef struct outline {
     uint64_t words[LEVELS];
     int levels;
 
-    /* for each ear the corner that blocks it; for each corner the list of ears that it blocks */
+    /* for each corner, the corner that blocks its ear, or NONE; and the list of the corners whose
+     * ears it blocks */
     uint32_t *blocker, *first_blocked, *next_blocked, *previous_blocked;
 
     /* [2 * leaves] boxes around runs of corners, from index 1, and the number of corners in each
@@ -324,6 +329,7 @@ static uint32_t find_bit(const outline *o, uint64_t i)
 
 /* ---- ears that a corner blocks ---- */
 
+/* Removes the ear at b from the list of the corner that blocks it. */
 static void unblock_ear(outline *o, uint32_t b)
 {
     uint32_t x = o->blocker[b];
@@ -336,6 +342,7 @@ static void unblock_ear(outline *o, uint32_t b)
     o->blocker[b] = NONE;
 }
 
+/* Records that corner x blocks the ear at b. */
 static void block_ear(outline *o, uint32_t b, uint32_t x)
 {
     uint32_t after = o->first_blocked[x];
@@ -347,6 +354,7 @@ static void block_ear(outline *o, uint32_t b, uint32_t x)
         o->previous_blocked[after] = b;
 }
 
+/* Marks the ears that corner x blocks as ears to be tested. */
 static void test_blocked_again(outline *o, uint32_t x)
 {
     for (uint32_t b; (b = o->first_blocked[x]) != NONE; unblock_ear(o, b))
@@ -491,7 +499,7 @@ static uint32_t find_blocker(outline *o, tested_ear *e)
 {
     if (o->leaves)
         return blocker_in_tree(o, e);
-    o->work += o->left;
+    o->work += o->remaining;
     for (uint32_t i = o->next[e->corner[2]]; i != e->corner[0]; i = o->next[i])
         if (corner_blocks(o, e, i))
             return i;
@@ -503,6 +511,7 @@ static double least_of_3(double a, double b, double c)
     return a < b ? (a < c ? a : c) : (b < c ? b : c);
 }
 
+/* Returns the ear at b, before any test. */
 static tested_ear ear_at(const outline *o, uint32_t b)
 {
     tested_ear e = { .corner = { o->previous[b], b, o->next[b] } };
@@ -533,7 +542,7 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
 {
     int64_t winding = 0;
     uint32_t i = start;
-    o->work += o->left;
+    o->work += o->remaining;
     do {
         const double *p = o->at[i], *r = o->at[o->next[i]];
         if (p[1] <= q[1] && r[1] > q[1])
@@ -567,7 +576,7 @@ static bool is_spike(const outline *o, uint32_t b)
 /* Returns the first tip of a spike, from corner b on, or NONE. */
 static uint32_t find_spike(outline *o, uint32_t b)
 {
-    for (uint32_t i = 0; i < o->left; i++, b = o->next[b]) {
+    for (uint32_t i = 0; i < o->remaining; i++, b = o->next[b]) {
         o->work++;
         if (is_spike(o, b))
             return b;
@@ -577,6 +586,7 @@ static uint32_t find_spike(outline *o, uint32_t b)
 
 /* ---- cutting ---- */
 
+/* Cuts off corner b, and writes its triangle. Marks the ears whose tests may now differ. */
 static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
 {
     uint32_t a = o->previous[b], c = o->next[b];
@@ -586,7 +596,7 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
     o->next[a] = c;
     o->previous[c] = a;
     o->next[b] = NONE;
-    o->left--;
+    o->remaining--;
     unblock_ear(o, b);
     clear_bit(o, b);
     set_bit(o, a);
@@ -620,7 +630,7 @@ static bool is_ear(outline *o, uint32_t b)
 static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 {
     uint32_t done = 0, b = 0;
-    while (o->left > 3) {
+    while (o->remaining > 3) {
         if (o->work++ > limit)
             return EBPO_EARS_WORK;
         uint32_t found = find_bit(o, b);
@@ -663,6 +673,7 @@ static void *place_array(char **at, uint64_t bytes)
     return taken;
 }
 
+/* Divides the scratch memory into the arrays of the outline. */
 static void place_arrays(outline *o, void *scratch)
 {
     char *at = scratch;
@@ -689,7 +700,7 @@ static void place_arrays(outline *o, void *scratch)
 static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], uint32_t n,
                                ear_rule rule, uint64_t limit, void *scratch)
 {
-    outline o = { .at = at, .touching = rule == EBPO_EARS_TOUCHING, .n = n, .left = n };
+    outline o = { .at = at, .touching = rule == EBPO_EARS_TOUCHING, .n = n, .remaining = n };
     place_arrays(&o, scratch);
     for (int l = 0; l < o.levels; l++)
         memset(o.bits[l], 0, o.words[l] * sizeof **o.bits);
@@ -715,10 +726,10 @@ static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], u
 typedef struct polygon {
     const double (*corner)[3];
     double (*flat)[2]; /* projected so that the polygon runs counter-clockwise */
-    uint32_t n;
-    double scale; /* a power of two that prevents products of differences from overflow and
-                     underflow */
-    bool projected;
+    uint32_t n;        /* number of corners */
+    double scale;      /* a power of two that prevents products of differences from overflow and
+                        * underflow */
+    bool projected;    /* `flat` is set; false: the polygon has no normal */
 } polygon;
 
 uint64_t ebpo_polygon_scratch_bytes(uint64_t n)
@@ -816,8 +827,8 @@ static bool is_ascending(const double a[2], const double b[2])
     return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
 }
 
-/* Classifies the polygon. A polygon with only left turns need not be convex (for example, a
- * pentagram is not): also its direction along x must change only twice. */
+/* Classifies the polygon. A polygon with only left turns need not be convex (a pentagram is an
+ * example). It is convex if also its direction along x changes only twice. */
 static ebpo_polygon_kind classify_polygon(const polygon *p)
 {
     bool straight = false;
@@ -856,6 +867,7 @@ static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3]
     return empty ? EBPO_POLYGON_DEGENERATE : turned ? EBPO_POLYGON_GUESSED : EBPO_POLYGON_CONCAVE;
 }
 
+/* Computes the triangles of least area, or those of the smallest ears for long outlines. */
 static ebpo_polygon_kind guess_triangles(const polygon *p, uint32_t (*triangle)[3])
 {
     double(*point)[3] = ebpo_alloc(p->n, sizeof *point);

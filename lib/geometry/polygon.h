@@ -57,9 +57,9 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
  * polyhedron", 1995. */
 
 typedef enum ebpo_polygon_kind {
-    EBPO_POLYGON_CONVEX, /* a fan; all triangles are of this kind */
-    /* no reflex corners, but straight ones: cut ear by ear, so that no triangle is on a straight
-     * side */
+    EBPO_POLYGON_CONVEX, /* cut as a fan; every polygon of three corners is of this kind */
+    /* no reflex corners, but corners on straight sides: cut ear by ear, so that no triangle has all
+     * corners on one side */
     EBPO_POLYGON_FLAT,
     EBPO_POLYGON_CONCAVE, /* cut ear by ear; the outline may touch itself */
     EBPO_POLYGON_GUESSED, /* the outline crosses itself: triangles of least area */
@@ -75,6 +75,7 @@ typedef enum ebpo_polygon_kind {
  * position. */
 #define EBPO_POLYGON_WORK (UINT64_C(1) << 31)
 
+/* Greatest number of corners for the triangles of least area. */
 enum { EBPO_POLYGON_OPTIMAL = 64 };
 
 /* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when the number

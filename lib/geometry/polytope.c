@@ -71,6 +71,7 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
 
 /* --- polytopes and volumes --- */
 
+/* A vertex within this distance from a plane is treated as on the plane. */
 static const double tolerance = 1e-10;
 
 void ebpo_polytope_cube(ebpo_polytope *p)
@@ -111,6 +112,8 @@ double ebpo_polytope_volume(const ebpo_polytope *p)
     return sum / 6;
 }
 
+/* Computes the point of the edge a-b on the plane from which a and b have the signed distances da
+ * and db. */
 static void interpolate_crossing(const double a[3], double da, const double b[3], double db,
                                  double out[3])
 {
@@ -132,9 +135,11 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
  * polygon whose area is computed from its edges in any order. */
 typedef struct beyond {
     const ebpo_polytope *p;
-    /* area: twice the area of the cut, as a vector; origin: a point of the plane */
-    double dist[EBPO_POLYTOPE_VERTICES], fans, area[3], origin[3];
-    int farthest;
+    double dist[EBPO_POLYTOPE_VERTICES]; /* signed distance of each vertex; positive: beyond */
+    double fans;                         /* six times the volume of the fans' pyramids */
+    double area[3];                      /* twice the area of the cut, as a vector */
+    double origin[3];                    /* a point of the cut, valid if `started` */
+    int farthest;                        /* vertex with the greatest distance */
     bool started;
 } beyond;
 
@@ -160,6 +165,8 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
         c->area[k] += n[k];
 }
 
+/* Adds a corner of a face's part beyond the plane to the fan of the face. kept: number of corners
+ * so far; first, last: the first and the latest corner, relative to the farthest vertex. */
 static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
 {
     double v[3], n[3];
@@ -174,6 +181,7 @@ static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3],
     ++*kept;
 }
 
+/* Adds the part of a face beyond the plane, and the face's edge of the cut. */
 static void face_beyond(beyond *c, int f)
 {
     const ebpo_polytope *p = c->p;
@@ -263,6 +271,8 @@ static uint16_t add_vertex(cut *c, const double x[3], bool on)
     return (uint16_t)i;
 }
 
+/* Returns the vertex of c->out where the plane crosses the edge from the kept vertex `in` to the
+ * removed vertex `out`. */
 static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
 {
     if (c->dist[in] >= -tolerance)
@@ -283,6 +293,7 @@ static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
     return number;
 }
 
+/* Adds a corner to the loop that begins at loop_start, unless it equals the previous corner. */
 static void add_corner(cut *c, int loop_start, uint16_t v)
 {
     ebpo_polytope *o = c->out;
@@ -295,6 +306,7 @@ static void add_corner(cut *c, int loop_start, uint16_t v)
     o->corner[o->corner_count++] = v;
 }
 
+/* Ends the loop that begins at `start`. A loop with fewer than three corners is removed. */
 static void close_face(cut *c, int start, int32_t tag)
 {
     ebpo_polytope *o = c->out;
@@ -341,8 +353,9 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Closes the cap. A rim edge that is used in both directions is between two kept faces. The cap is
- * bounded by the other rim edges in reverse direction. */
+/* Adds the face on the cutting plane, the cap. A rim edge that is used in both directions is
+ * between two kept faces. The other rim edges, in reverse direction, bound the cap. Returns false
+ * if they do not form one closed loop. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];
@@ -391,7 +404,7 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     }
     if (most <= tolerance)
         return EBPO_CLIP_NONE;
-    if (least >= -1e-7)
+    if (least >= -1e-7) /* almost nothing would remain */
         return EBPO_CLIP_REFUSED;
     out.vertex_count = out.face_count = out.corner_count = 0;
     out.first[0] = 0;
@@ -489,6 +502,7 @@ void ebpo_half_spaces_add(ebpo_half_spaces *s, const uint32_t *codes, uint64_t c
     }
 }
 
+/* Returns true if the half-space contains the whole cell. */
 static bool keeps_cell(const ebpo_half_space *h)
 {
     int64_t most = 0;

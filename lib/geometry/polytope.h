@@ -1,19 +1,20 @@
-/* A plane code is a half-space in the coordinates of a node's cell, in 32 bits. It is decoded to
- * integers, so that no reader rounds.
+/* Defines plane codes, convex polytopes and envelopes. A plane code is a half-space in the
+ * coordinates of a node's cell, in 32 bits. It is decoded to integers, so that no reader rounds.
  *
  *   bits 0-9    u
  *   bits 10-19  v
  *   bits 20-31  q
  *
- * With U = u - 511, V = v - 511 in [-511, 511]: the normal is the point (U, V) of the octahedral
- * map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014)
- * stored as integers of 1-norm 511. With m the sum of the normal's negative components (the least
- * value of n . xi over the cell), the half-space is
+ * With U = u - 511, V = v - 511 in [-511, 511]: the normal n is the point (U, V) of the octahedral
+ * map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014),
+ * with integer components of 1-norm 511. Let xi be a point in cell coordinates (0 to 1 on each
+ * axis), and m the sum of the negative components of n, which is the least value of n . xi over the
+ * cell. The half-space is
  *
  *   4096 * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094
  *
  * So q counts 4096ths of the cell's width in direction n. A half-space with q = 4095 would keep the
- * whole cell; this value means no plane. */
+ * whole cell, so this value means no plane. */
 #ifndef EBPO_GEOMETRY_POLYTOPE_H
 #define EBPO_GEOMETRY_POLYTOPE_H
 
@@ -102,8 +103,8 @@ bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytop
 /* Copies only the used part of the struct. */
 void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
-/* Sets the bit 2 * axis + side for each vertex on that face of the cube. The result does not depend
- * on the rounding of vertices. */
+/* For each vertex, sets the bits 2 * axis + side of the cube's faces on which the vertex is. The
+ * result does not depend on the rounding of vertices. */
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES]);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);

@@ -121,7 +121,7 @@ static ebpo_status check_rotation(const ebpo_pose *pose, double error_bound, ebp
     return EBPO_OK;
 }
 
-ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const double reach[3],
+ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const double largest[3],
                              ebpo_error *error)
 {
     out->error_bound = error_bound_of(pose->rotation);
@@ -134,11 +134,11 @@ ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const doub
         double size = fabs(pose->translation[i]);
         for (int k = 0; k < 3; k++) {
             out->matrix[i][k] = pose->scale * pose->rotation[i][k];
-            size += fabs(out->matrix[i][k]) * reach[k];
+            size += fabs(out->matrix[i][k]) * largest[k];
         }
         if (!(size <= max_coordinate))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "pose: the model would reach to %.3g on axis %d, at most %.3g is "
+                             "pose: the model would largest to %.3g on axis %d, at most %.3g is "
                              "allowed",
                              size, i, max_coordinate);
     }

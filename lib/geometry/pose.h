@@ -29,12 +29,12 @@ typedef struct ebpo_posing {
     double error_bound; /* greatest component of |R^T R - 1|, plus rounding */
 } ebpo_posing;
 
-/* Checks a pose, for vertices whose coordinates have absolute values of at most reach[axis].
+/* Checks a pose, for vertices whose coordinates have absolute values of at most largest[axis].
  *
  * EBPO_E_ARGUMENT: a number is not finite, the matrix is not a rotation (the message gives the
  * deviation) or is a mirror, or the scale or a posed coordinate is out of range. */
 EBPO_MUST_USE ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose,
-                                           const double reach[3], ebpo_error *error);
+                                           const double largest[3], ebpo_error *error);
 
 /* Applies the pose. The result is finite and within 2^1000. Files that use this function must
  * include core/strict_fp.h first, so that its operations are never contracted. */

@@ -283,6 +283,8 @@ static double expansion_size(const double *e, int n)
     return n == 0 ? 0 : fabs(sum) - 64 * 0x1p-53 * fabs(e[n - 1]);
 }
 
+/* Returns the sign of the determinant of exact differences. Computes with the heads first. If the
+ * tails could change the sign, computes again with heads and tails. */
 static int expansion_determinant_sign(ebpo_pair m[3][3], bool heads_exact)
 {
     ebpo_difference d[3][3];

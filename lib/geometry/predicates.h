@@ -55,8 +55,9 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
 /* Returned instead of a sign when coordinates are too large or too small for expansions. */
 enum { EBPO_SIGN_UNKNOWN = 2 };
 
-/* Compute in exact arithmetic on doubles, in tens to hundreds of nanoseconds, without allocation.
- * Same results as the functions above without "_expansion", or EBPO_SIGN_UNKNOWN. */
+/* These functions use exact arithmetic on doubles. They take tens to hundreds of nanoseconds, and
+ * allocate nothing. They return the results of the functions without "_expansion" in their names,
+ * or EBPO_SIGN_UNKNOWN. */
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
                             const double d[3]);
@@ -66,9 +67,9 @@ int ebpo_sign_of_products_expansion(const double *factor, int n);
  * coordinates must be in the range of ebpo_orient3d_expansion. */
 int ebpo_determinant_expansion(ebpo_pair m[3][3]);
 
-/* Compute in integers of any size. Same results and ranges as the functions above without "_exact".
- * Each call allocates through GMP, which ends the program when memory is short (a few kilobytes
- * suffice). */
+/* These functions use integers of any size. They return the results of the functions without
+ * "_exact" in their names. Each call allocates through GMP, which ends the program when memory is
+ * short (a few kilobytes suffice). */
 int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3], const double d[3]);
 int ebpo_sign_of_products_exact(const double *factor, int n);

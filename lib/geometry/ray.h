@@ -1,4 +1,4 @@
-/* A ray or segment, and its intersection with a triangle. */
+/* Intersects a ray or segment with a triangle. */
 #ifndef EBPO_GEOMETRY_RAY_H
 #define EBPO_GEOMETRY_RAY_H
 

@@ -34,7 +34,7 @@ typedef struct stretch {
 
 /* --- integers --- */
 
-/* Lowers *unit to an exponent e for which x is an integer times 2^e. */
+/* Lowers *unit to an exponent e for which each of x[n] is an integer times 2^e. */
 static void lower_unit(int *unit, const double *x, int n)
 {
     for (int i = 0; i < n; i++) {
@@ -129,6 +129,7 @@ static int main_axis(const integer_scene *s)
     return axis;
 }
 
+/* Extends the interval by a value of the parameter. */
 static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denominator)
 {
     mpq_t t;

@@ -25,8 +25,8 @@
 #include "geometry/ray.h"
 #include "geometry/double_double_kernels.h"
 
-/* Used instead of the sign of the determinant of direction, corner i and corner i + 1 (relative to
- * the origin) if this sign is not certain. */
+/* Replaces the sign of the determinant of direction, corner i and corner i + 1 (relative to the
+ * origin) if this sign is not certain. */
 enum { SIDE_OPEN = 2 };
 
 /* Returns true if the exact a is certainly less than the exact b. Both arguments are rounded. */
@@ -69,8 +69,8 @@ static bool all_in_range(const ebpo_segment *ray, const double triangle[3][3], d
            in_range(ray->direction, 3, least, largest) && in_range(triangle[0], 9, least, largest);
 }
 
-/* Returns true if every value is zero or within the range in which products of four can be computed
- * exactly. */
+/* Returns true if every value is 0 or within the range in which products of four values can be
+ * computed exactly. */
 static bool ray_in_range(const ebpo_segment *ray, const double triangle[3][3])
 {
     return all_in_range(ray, triangle, 0x1p-172, 0x1p225);
@@ -260,8 +260,8 @@ static void find_crossings(crossings *c, const ebpo_segment *ray, const double t
     }
 }
 
-/* Intersects a line that is in the triangle's plane or in one plane with a triangle without area,
- * for input that ray_in_range accepts. */
+/* Intersects a ray whose line is in the plane of the triangle, or in one plane with a triangle
+ * without area. The input must satisfy ray_in_range. Returns false if expansions cannot decide. */
 static bool intersect_within_plane(const ebpo_segment *ray, const double triangle[3][3],
                                    ebpo_ray_intersection *out)
 {
@@ -514,6 +514,7 @@ static inline bool on_line(const double d[3], const corner *c)
     return c->exact && are_parallel(d, c->head);
 }
 
+/* Decides the signs that are SIDE_OPEN, exactly. sign[i]: side of the edge from e[i]. */
 static void close_sides(const double d[3], const corner e[3], int sign[3])
 {
     for (int i = 0; i < 3; i++) {

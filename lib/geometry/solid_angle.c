@@ -65,7 +65,8 @@ static int shifted_sign(const double p[3], const double a[3], const double b[3],
     return -sign;
 }
 
-/* Cuts an interval around the argument `angle`, near pi or -pi, by the exact sign. */
+/* Returns the part, up to pi or -pi, of the interval around the argument `angle`. sign: exact sign
+ * of the argument. */
 static ebpo_bounded cut_at_pi(double angle, double error, int sign)
 {
     double low = fabs(angle) - error;
@@ -144,8 +145,9 @@ static ebpo_big big_length(const big_vector *a)
     return ebpo_big_root(&square);
 }
 
-/* Completes the result. `sign` is the exact sign of the imaginary part of the shifted point;
- * `all` bounds the terms of both parts. */
+/* Completes the result. `sign`: exact sign of the imaginary part for the shifted point; `all`
+ * bounds the terms of the real and of the imaginary part. Returns false if 512 bits do not suffice.
+ */
 static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
 {
     /* in this common unit the greater part is in [1/2, 1) */
@@ -172,8 +174,8 @@ static bool angle_on_edge(const double p[3], const double a[3], const double b[3
     big_vector d = { { ebpo_big_of(first == 0), ebpo_big_of(first == 1), ebpo_big_of(0) } };
     ebpo_big across = ebpo_big_multiply(&square, &h.x[first]),
              part = ebpo_big_multiply(&e.x[first], &along), sine = big_determinant(&e, &d, &h),
-             reach = big_length(&h);
-    ebpo_big all = ebpo_big_multiply(&square, &reach);
+             distance = big_length(&h);
+    ebpo_big all = ebpo_big_multiply(&square, &distance);
     out->turn.real = ebpo_big_subtract(&part, &across);
     out->turn.imaginary =
         ebpo_normal_sign(first, a, b, c) == 0 ? ebpo_big_of(0) : ebpo_big_multiply(&length, &sine);

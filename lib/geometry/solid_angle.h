@@ -1,4 +1,4 @@
-/* Solid angles of triangles, with error bounds.
+/* Computes solid angles of triangles, with error bounds.
  *
  * The half angle of the triangle (a, b, c) at p is half of its signed solid angle, in [-pi, pi]:
  * positive when p is on the side from which the triangle turns clockwise. The half angles of a
@@ -29,8 +29,8 @@ typedef struct ebpo_bounded {
  * give any value. */
 double ebpo_argument(double y, double x);
 
-/* Returns the half angle. The error is pi when p is so close to an edge that doubles do not
- * suffice. */
+/* Returns the half angle. Its error is pi if p is so close to an edge that doubles do not suffice.
+ */
 ebpo_bounded ebpo_half_angle(const double p[3], const double a[3], const double b[3],
                              const double c[3]);
 

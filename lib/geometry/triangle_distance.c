@@ -98,8 +98,8 @@ static int exponent_of(const double (*a)[3], int count, const double b[3])
 }
 
 typedef struct far_triangle {
-    bounded_number corner[3][3],
-        edge[3][3]; /* corners are relative to p; corners and edges have separate units */
+    bounded_number corner[3][3];      /* relative to p, in units of 2^exponent */
+    bounded_number edge[3][3];        /* in units of 2^edge_exponent */
     bounded_number along[3], back[3]; /* corner k . edge k; corner k + 1 . edge k */
     int exponent, edge_exponent;
 } far_triangle;
@@ -190,8 +190,8 @@ static ebpo_feature find_far_feature(const double p[3], const double triangle[3]
     return feature;
 }
 
-/* Compares the distances of two corners, by |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)).
- */
+/* Compares the distances of two corners a and b from p: *sign is the sign of |p - a|^2 - |p - b|^2
+ * = (a - b) . ((a - p) + (b - p)). Returns false if the sign is not certain. */
 static bool compare_far_corners(const double p[3], const double a[3], const double b[3], int *sign)
 {
     const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
@@ -223,9 +223,9 @@ static void keep_feature(double t[3][3], ebpo_feature feature)
     memcpy(t[2], to, sizeof to);
 }
 
-/* Handles two features in one plane across an axis. The order of their distances from p is the same
- * as from the projection of p to that plane. Returns true if p was replaced by its projection.
- * Reduces a and b to their features. */
+/* Reduces the triangles a and b to their nearest features. If both features are in one plane
+ * perpendicular to an axis, replaces p by its projection to this plane, and returns true. The order
+ * of the distances of the features from the projection is the order of their distances from p. */
 static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
                         ebpo_feature of_b)
 {
@@ -383,8 +383,8 @@ static void bound_relation(const relation *r, ebpo_distance_bounds *out)
     out->hi = d + error;
 }
 
-/* Scales p and the triangle by a power of two so that the largest coordinate is in 1/2 .. 1.
- * Returns the exponent that undoes it. */
+/* Scales p and the triangle by a power of two 2^-e so that the largest coordinate is in 1/2 .. 1.
+ * Returns e. */
 static int scale_all(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
 {
     double most = 0;
@@ -419,8 +419,8 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     }
     multiply_relation(&r);
     bound_relation(&r, out);
-    /* Scaling to larger numbers is exact; scaling to smaller ones may have lost parts below
-     * 2^-1074. */
+    /* Scaling to larger numbers is exact. Scaling to smaller numbers may have lost parts below
+     * 2^-1074, for which the bounds are widened. */
     out->feature = find_far_feature(p, triangle, NULL);
     out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
     out->lo = out->lo > 0 ? out->lo : 0;
@@ -450,8 +450,7 @@ typedef struct nearest {
     int unit;
     ebpo_vectorz p, corner[3], edge[3], normal; /* corners relative to p */
     mpz_t square, denominator;                  /* squared distance in squared units */
-    ebpo_vectorz offset;                        /* nearest point minus p, times offset_denominator
-                                                 */
+    ebpo_vectorz offset; /* nearest point minus p, times offset_denominator */
     mpz_t offset_denominator;
     ebpo_feature feature;
     mpz_t t, u;     /* scratch */
@@ -491,6 +490,7 @@ static void set_points(nearest *n, const double p[3], const double triangle[3][3
     ebpo_vectorz_cross(&n->normal, &n->edge[0], &n->edge[1]);
 }
 
+/* Returns true, with the result, if the nearest point is in the interior. */
 static bool try_interior(nearest *n)
 {
     ebpo_vectorz_dot(n->denominator, &n->normal, &n->normal);
@@ -512,7 +512,8 @@ static bool try_interior(nearest *n)
 }
 
 /* Replaces the current feature by a corner or edge that is nearer. If both are equally near, keeps
- * the feature that is a corner. */
+ * the feature with the lower number, so a corner before an edge. `first`: there is no current
+ * feature. *taken: the feature was replaced. */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {
@@ -718,8 +719,8 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     return true;
 }
 
-/* Returns false if double-double arithmetic does not decide. *known: the normal was requested and
- * is set. */
+/* Computes the nearest point by double-double arithmetic. Returns false if it does not decide.
+ * *known: the normal was requested and is set. */
 static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, double *normal, bool *known,
                              ebpo_triangle_nearest *out)

@@ -91,9 +91,10 @@ static int projections_separated(const projection *f, const projection *g)
 
 /* --- faces without area: the segment between their least and greatest corners --- */
 
+/* The ends of a segment. */
 typedef struct ends {
     double at[2][3];
-    bool point;
+    bool point; /* both ends are equal */
 } ends;
 
 static ends ends_of(const double corner[3][3])
@@ -144,7 +145,8 @@ static bool segments_intersect(const ends *s, const ends *t)
     return segments_cross(s, t);
 }
 
-/* Returns true if the segment intersects the triangle, which has an area. */
+/* Returns true if the segment intersects the triangle. `axis`: an axis along which the projected
+ * triangle has an area. */
 static bool segment_intersects_triangle(const ends *s, const double t[3][3], int axis)
 {
     int side[2], around[3];
@@ -234,8 +236,9 @@ static int corner_alone(const int side[3])
     return 0;
 }
 
-/* Reorders the corners cyclically so that the corner that is alone comes first. Returns true if
- * this corner is below another one: the other face's plane must then be flipped. */
+/* Reorders the corners cyclically so that the corner that is alone on its side of the other face's
+ * plane comes first. Returns true if this corner is below another corner; then the other face's
+ * plane must be flipped. */
 static bool reorder_corners(const int side[3], int corner[3])
 {
     corner[0] = corner_alone(side);

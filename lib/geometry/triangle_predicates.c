@@ -1,4 +1,4 @@
-/* Predicates on a triangle, built only from orientation predicates, so that they are exact.
+/* Computes predicates on a triangle from orientation predicates only, so that they are exact.
  *
  * Crossings of a segment along an axis: both ends are shifted by infinitely small amounts, so that
  * no case is degenerate (Edelsbrunner and Muecke, "Simulation of Simplicity", 1990).

@@ -1,5 +1,5 @@
-/* Vectors of three doubles, in plain floating-point arithmetic. Each function has a fixed order of
- * operations, on which results depend: sums are computed from x to z. */
+/* Computes with vectors of three doubles, in plain floating-point arithmetic. Each function has a
+ * fixed order of operations, on which results depend: sums are computed from x to z. */
 #ifndef EBPO_GEOMETRY_VEC3_H
 #define EBPO_GEOMETRY_VEC3_H
 
@@ -34,7 +34,7 @@ static inline void ebpo_vec3_copy(const double a[3], double out[3])
 /* Returns the length, which overflows or underflows if its square does. */
 static inline double ebpo_vec3_length(const double v[3]) { return sqrt(ebpo_vec3_dot(v, v)); }
 
-/* Return the least and the greatest of three numbers. */
+/* These functions return the least and the greatest of three numbers. */
 
 static inline double ebpo_min3(double a, double b, double c)
 {
