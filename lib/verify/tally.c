@@ -59,6 +59,7 @@ static void record_violation(ebpo_tally *tally, ebpo_verify_kind kind,
     }
 }
 
+/* Prints the place and the text, and counts the violation. */
 static void record_arguments(ebpo_tally *tally, ebpo_verify_kind kind,
                              const ebpo_verify_place *place, const char *format, va_list args)
 {

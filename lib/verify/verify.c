@@ -1,7 +1,8 @@
 /* Verifies a file: runs all checks in order, and makes the report. The folder `verify` checks the
  * results of other folders, so it uses no code of `construct`, of the writer or of `query`, and has
  * its own vector functions. It computes cells, half-spaces and clipping with other methods than the
- * builder; both share only the exact predicates (tests/lint/test_layers.py checks the folders).
+ * builder. The verifier and the builder share only the exact predicates (tests/lint/test_layers.py
+ * checks this).
  *
  * The order of the checks:
  * 1. chunk directory and chunk checksums (verify_chunks.c)
@@ -12,8 +13,9 @@
  * 6. unused bytes
  * Damage that is found while reading is a violation, not an error of the call.
  *
- * This file also checks the colours of gray nodes, from the root down. It does not round the mean
- * colour to a byte: two products decide if the stored byte is nearest to the mean. */
+ * This file also checks the colours of gray nodes, from the root down. The colour of a gray node is
+ * the mean of the colours of the faces below it. The check does not round the mean to a byte: two
+ * products decide if the stored byte is nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -41,15 +43,17 @@ typedef struct colour_sums {
     ebpo_wide of[4]; /* weight times red, green and blue; weight */
 } colour_sums;
 
-typedef struct node_check {
+/* The check of all colours. */
+typedef struct colour_check {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     ebpo_colours colours;
     bool by_face;    /* use colours of faces; false: of vertices */
     double longest;  /* longest side of the root cell */
     uint64_t leaves; /* number of visited leaves */
-} node_check;
+} colour_check;
 
+/* Adds the colour of a corner. */
 static void add_corner(uint64_t weight, const uint8_t *rgba, colour_sums *sum)
 {
     for (int k = 0; k < 3; k++)
@@ -59,7 +63,7 @@ static void add_corner(uint64_t weight, const uint8_t *rgba, colour_sums *sum)
 
 /* Adds a face with the weight 1 + 2^32 times its doubled area, relative to the squared longest
  * side. */
-static void add_face(const node_check *j, uint64_t face, colour_sums *sum)
+static void add_face(const colour_check *j, uint64_t face, colour_sums *sum)
 {
     const ebpo_mesh *mesh = &j->view->tree->mesh;
     double at[3][3], edge[2][3], across[3];
@@ -85,7 +89,7 @@ static void add_face(const node_check *j, uint64_t face, colour_sums *sum)
                    sum);
 }
 
-static void add_leaf(node_check *j, const ebpo_reference_node *leaf, colour_sums *sum)
+static void add_leaf(colour_check *j, const ebpo_reference_node *leaf, colour_sums *sum)
 {
     const ebpo_level *level = &j->view->tree->level[leaf->cell.level];
     uint32_t count;
@@ -98,7 +102,8 @@ static void add_leaf(node_check *j, const ebpo_reference_node *leaf, colour_sums
         ebpo_release_pages(j->view->workspace);
 }
 
-/* Returns true if byte - 1/2 <= mean < byte + 1/2. */
+/* Returns true if the stored byte of a channel is nearest to the mean: byte - 1/2 <= mean < byte +
+ * 1/2. */
 static bool is_nearest(const colour_sums *sum, int channel, uint32_t byte)
 {
     /* twice the sum plus the weight, compared with 2 * byte * weight and 2 * (byte + 1) * weight */
@@ -108,7 +113,8 @@ static bool is_nearest(const colour_sums *sum, int channel, uint32_t byte)
            ebpo_wide_less(doubled, ebpo_wide_times(weight, 2 * (uint64_t)byte + 2));
 }
 
-static void check_node(const node_check *j, const ebpo_reference_node *node, const colour_sums *sum)
+static void check_node(const colour_check *j, const ebpo_reference_node *node,
+                       const colour_sums *sum)
 {
     uint32_t colour = j->view->tree->level[node->cell.level].gray_colours[node->rank];
     bool correct = true;
@@ -121,8 +127,8 @@ static void check_node(const node_check *j, const ebpo_reference_node *node, con
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-/* Checks the colours of a node and of all nodes below, and adds its sums to *above. */
-static void check_subtree_colours(node_check *j, const ebpo_reference_node *node,
+/* Checks the colours of a node and of all nodes below, and adds the sums of its faces to *above. */
+static void check_subtree_colours(colour_check *j, const ebpo_reference_node *node,
                                   colour_sums *above)
 {
     colour_sums sum = { { { 0, 0 } } };
@@ -138,7 +144,8 @@ static void check_subtree_colours(node_check *j, const ebpo_reference_node *node
         above->of[i] = ebpo_wide_plus(above->of[i], sum.of[i]);
 }
 
-static bool vertices_differ(const node_check *j)
+/* Returns true if the vertices have colours that are not all equal. */
+static bool vertices_differ(const colour_check *j)
 {
     const uint8_t *rgba = j->colours.vertex;
     for (uint64_t i = 1; rgba && i < j->view->tree->mesh.vertex_count; i++)
@@ -153,7 +160,7 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_reference_tree *v
                                  ebpo_error *error)
 {
     const ebpo_tree *tree = view->tree;
-    node_check j = { .tally = tally, .view = view };
+    colour_check j = { .tally = tally, .view = view };
     if (!(tree->info.parts & EBPO_PART_COLOURS) || !view->has_mesh || tree->info.pruned)
         return EBPO_OK;
     ebpo_status status = ebpo_mesh_colours(&tree->mesh, &j.colours, error);
@@ -205,7 +212,7 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
 }
 
 /* Returns true if the file is the cause of the failure, not this machine or the call. */
-static bool is_finding(ebpo_status status)
+static bool is_damage(ebpo_status status)
 {
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
 }
@@ -224,13 +231,14 @@ static ebpo_status check_content(const ebpo_file *file, const ebpo_verify_option
     ebpo_error failure = EBPO_ERROR_INIT;
     ebpo_read_options read = read_options_of(options);
     ebpo_status status = ebpo_file_check_content(file, &read, &failure);
-    if (status == EBPO_OK || is_finding(status)) {
+    if (status == EBPO_OK || is_damage(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", failure.message);
         return EBPO_OK;
     }
     return ebpo_fail_with(error, &failure);
 }
 
+/* Reads the tree and runs all its checks. */
 static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *options,
                               ebpo_tally *tally, ebpo_error *error)
 {
@@ -238,14 +246,14 @@ static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *
     ebpo_read_options read = read_options_of(options);
     ebpo_tree tree = { 0 };
     ebpo_status status = ebpo_file_read_tree(file, &read, &tree, &failure);
-    if (status == EBPO_OK || is_finding(status))
+    if (status == EBPO_OK || is_damage(status))
         ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", failure.message);
     if (status == EBPO_OK) {
         status = verify_tree_of(tally, file, &tree, options, error);
         ebpo_tree_free(&tree);
         return status;
     }
-    return is_finding(status) ? EBPO_OK : ebpo_fail_with(error, &failure);
+    return is_damage(status) ? EBPO_OK : ebpo_fail_with(error, &failure);
 }
 
 static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options *options,
@@ -259,7 +267,7 @@ static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options
     if (ebpo_file_info(file)->pruned)
         return ebpo_check_source(tally, file, NULL, false, options->source, &read, error);
     ebpo_status status = ebpo_file_read_source_mesh(file, &read, &stored, &ordered, &failure);
-    if (is_finding(status)) {
+    if (is_damage(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", failure.message);
         return EBPO_OK;
     }

@@ -1,12 +1,15 @@
-/* Verifies the border of a surface, and the winding numbers of surface and caps.
+/* Verifies the border of a surface, and the winding numbers of the surface together with its caps
+ * (triangles that close the holes).
  *
- * - The loops are the boundary of the faces as a chain. Each directed edge gets a random value of
- *   the positions of its ends, with a sign for its direction. The values of the faces' edges, less
- *   those of the loops' edges times their weights, have the sum 0; otherwise the sum is 0 with a
- *   probability of only 2^-64.
- * - The area of the caps is the stated one.
- * - Winding numbers are compared with rays through all faces and all caps, which are listed here
- *   from the loops, by a method that shares nothing with the builder. */
+ * - The loops must be the boundary of the faces: for each edge, the uses by faces in one direction
+ *   minus the uses in the other direction must equal the weights of the loops that contain it. For
+ *   this check, each directed edge gets a pseudo-random value, computed from the positions of its
+ *   ends. The value of the opposite edge is its negative. The sum over the faces' edges must equal
+ *   the sum over the loops' edges, times the weights. If the loops are wrong, the sums are equal
+ *   with a probability of only 2^-64.
+ * - The area of the caps must be the area that the header states.
+ * - Winding numbers are compared with rays through all faces and all caps. This file computes the
+ *   caps from the loops, by a method that shares nothing with the builder. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -22,6 +25,7 @@
 #include "verify/verify_labels.h"
 #include "verify/verify_parts.h"
 
+/* Returns a pseudo-random value for a position. */
 static uint64_t value_of_position(const double p[3])
 {
     uint64_t value = 0;
@@ -42,6 +46,7 @@ static uint64_t value_of_edge(const double a[3], const double b[3])
            ebpo_random_mix(to + 3 * ebpo_random_mix(from));
 }
 
+/* Returns the sum of the values of all edges of all faces. */
 static uint64_t value_of_faces(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
@@ -55,6 +60,7 @@ static uint64_t value_of_faces(const ebpo_mesh *mesh)
     return sum;
 }
 
+/* Returns the sum of the values of the loops' edges, times the loops' weights. */
 static uint64_t value_of_loops(const ebpo_border_loops *loops)
 {
     uint64_t sum = 0, first = 0;
@@ -70,13 +76,13 @@ static uint64_t value_of_loops(const ebpo_border_loops *loops)
 
 /* --- caps --- */
 
-/* A list of cap faces; corners are numbers of points. */
+/* A list of caps. */
 typedef struct cap_list {
     const ebpo_border_loops *loops;
-    uint32_t *corner; /* [count][3] */
+    uint32_t *corner; /* [count][3] indices of points of the loops */
     uint64_t count, capacity;
-    double area;
-    bool no_memory;
+    double area;    /* sum of the areas of all caps */
+    bool no_memory; /* caps are missing */
 } cap_list;
 
 static double area_of(const double *a, const double *b, const double *c)
@@ -93,8 +99,9 @@ static double area_of(const double *a, const double *b, const double *c)
     return sqrt(sum) / 2;
 }
 
-/* Lists the caps of the points first .. last and the chord between these two, each `weight` times,
- * turned against the loop. The depth is at most 32. */
+/* Lists the caps between the path from point `first` to point `last` and the chord of these two
+ * points, each `weight` times, with the orientation opposite to the loop. Recursive, at most 32
+ * deep. */
 static void list_caps(cap_list *c, uint64_t first, uint64_t last, uint32_t weight)
 {
     if (last < first + 2 || c->no_memory)
@@ -170,7 +177,7 @@ ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_points *points,
                            .faces = caps.corner };
         status = ebpo_rays_follow(points, &mesh, &view->box, threads, progress, error);
         for (uint64_t i = 0; i < points->count && status == EBPO_OK; i++)
-            points->point[i].stored -= points->point[i].found;
+            points->point[i].stored -= points->point[i].found; /* now of the surface alone */
     }
     free(caps.corner);
     return status;

@@ -34,7 +34,8 @@ typedef struct open_edge_ends {
 } open_edge_ends;
 
 typedef struct gates_reader {
-    const uint8_t *low, *more, *end;   /* next vertex byte; next further byte; end of these */
+    const uint8_t *low;                /* next first byte of a vertex */
+    const uint8_t *more, *end;         /* next further byte of a vertex; end of the further bytes */
     open_edge_ends open[OPEN_MAX + 1]; /* newest last */
     size_t count;                      /* number of open edges */
     uint64_t used;                     /* number of vertices used so far */
@@ -67,23 +68,23 @@ static void pass_edge(gates_reader *t, uint64_t a, uint64_t b)
 /* Reads a vertex. Returns false if the chunk is invalid. */
 static bool read_vertex(gates_reader *t, uint64_t *vertex)
 {
-    uint64_t number = *t->low++;
-    if (number > 240)
+    uint64_t code = *t->low++;
+    if (code > 240)
         return false;
-    if (number == 240) {
+    if (code == 240) {
         if (t->end - t->more < 4)
             return false;
-        number = t->more[0] + 256u * t->more[1] + 65536u * t->more[2] + 16777216ull * t->more[3];
+        code = t->more[0] + 256u * t->more[1] + 65536u * t->more[2] + 16777216ull * t->more[3];
         t->more += 4;
-    } else if (number >= 224) {
+    } else if (code >= 224) {
         if (t->more == t->end)
             return false;
-        number = 224 + 256 * (number - 224) + *t->more++;
+        code = 224 + 256 * (code - 224) + *t->more++;
     }
-    if (number > t->used)
+    if (code > t->used)
         return false;
-    *vertex = t->used - number;
-    t->used += number == 0;
+    *vertex = t->used - code;
+    t->used += code == 0;
     return true;
 }
 
@@ -97,8 +98,14 @@ static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
     return t->count;
 }
 
-/* Reads a face across the open edge `gate` (1: the newest). `third`: code of its third vertex and
- * of its first corner. Returns false if the chunk is invalid. */
+/* Reads a face across the open edge `gate` (1: the newest). `third`: three times the kind of the
+ * face's third vertex c, plus the position of the gate in the face. Returns false if the chunk is
+ * invalid. Kinds of c, where the gate runs from a to b:
+ *   0: a new vertex
+ *   1: the end of the newest open edge that begins at b
+ *   2: the beginning of the newest open edge that ends at a
+ *   3: a vertex that is stored as read_vertex reads it
+ *   4 and more: the beginning of an open edge; 4: the newest */
 static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t *face)
 {
     uint64_t c = 0;
@@ -243,7 +250,7 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* An array and its chunks in HDF5's index. */
+/* An array and its chunks by HDF5's index. */
 typedef struct indexed {
     const ebpo_array_in *array;
     uint32_t number; /* the array's number in the list */
@@ -260,7 +267,8 @@ typedef struct offset_comparison {
     ebpo_head head;
     indexed array[INDEXED_MAX];
     unsigned arrays;
-    uint64_t *list, rows; /* [rows] the array's number in the upper 32 bits, bytes in the lower */
+    /* [rows] the list: the array's number in the upper 32 bits, the chunk's bytes in the lower */
+    uint64_t *list, rows;
 } offset_comparison;
 
 /* Reads HDF5's index of an array, if the file has it. `number`: the array's number in the
@@ -304,6 +312,7 @@ static ebpo_status index_all(offset_comparison *c, ebpo_error *error)
     return status;
 }
 
+/* Reads the list, /subtrees/chunk_directory. */
 static ebpo_status read_list(offset_comparison *c, ebpo_error *error)
 {
     const ebpo_array_in *a = &c->file->root_array[EBPO_A_CHUNK_DIRECTORY];
@@ -369,7 +378,7 @@ static void compare_directory(offset_comparison *c)
 ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
                                      const ebpo_verify_options *options, ebpo_error *error)
 {
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     (void)options;
     if (!file->has_directory)
         return EBPO_OK;
@@ -379,12 +388,12 @@ ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
     c->tally = tally;
     c->file = file;
     c->head = (ebpo_head)EBPO_HEAD_INIT;
-    ebpo_status status = ebpo_head_open(&c->head, &ebpo_reader_own(file)->in, &own);
+    ebpo_status status = ebpo_head_open(&c->head, &ebpo_reader_own(file)->in, &failure);
     if (status == EBPO_OK)
-        status = index_all(c, &own);
-    status = ebpo_head_close(&c->head, status, &own);
+        status = index_all(c, &failure);
+    status = ebpo_head_close(&c->head, status, &failure);
     if (status == EBPO_OK)
-        status = read_list(c, &own);
+        status = read_list(c, &failure);
     if (status == EBPO_OK)
         compare_directory(c);
     for (unsigned i = 0; i < c->arrays; i++)
@@ -392,8 +401,8 @@ ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
     free(c->list);
     free(c);
     if (status != EBPO_E_FORMAT)
-        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
-    CHECK(false, "%s", own.message);
+        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &failure);
+    CHECK(false, "%s", failure.message);
     return EBPO_OK;
 }
 
@@ -416,6 +425,7 @@ static ebpo_status add_range(survey *s, ebpo_range range, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Adds the chunks of an array to the used bytes. */
 static ebpo_status add_array(survey *s, const ebpo_array_in *a, ebpo_head_rows rows,
                              ebpo_error *error)
 {
@@ -450,6 +460,7 @@ static ebpo_status add_arrays(survey *s, ebpo_error *error)
     return status;
 }
 
+/* Adds the superblock, headers and indexes to the used bytes. */
 static ebpo_status add_metadata(survey *s, ebpo_error *error)
 {
     ebpo_range *kept, superblock = { 0, EBPO_HEAD_SUPERBLOCK_BYTES };
@@ -490,6 +501,7 @@ static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled
     return status;
 }
 
+/* Counts the bytes between the used bytes, and those of them that are not zero (*filled). */
 static ebpo_status inspect_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
 {
     uint64_t file_end = ebpo_reader_own(s->file)->in.source.size;
@@ -514,32 +526,37 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
 {
     ebpo_input *in = &ebpo_reader_own(file)->in;
     survey s = { .file = file, .progress = progress, .head = EBPO_HEAD_INIT };
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     *spare = *filled = 0;
     if (ebpo_input_prefetches(in))
         return EBPO_OK;
-    ebpo_status status = ebpo_head_open(&s.head, in, &own);
+    ebpo_status status = ebpo_head_open(&s.head, in, &failure);
     if (status == EBPO_OK) {
         ebpo_head_keep_ranges(&s.head);
-        status = add_arrays(&s, &own);
+        status = add_arrays(&s, &failure);
     }
     if (status == EBPO_OK)
-        status = add_metadata(&s, &own);
-    status = ebpo_head_close(&s.head, status, &own);
+        status = add_metadata(&s, &failure);
+    status = ebpo_head_close(&s.head, status, &failure);
     if (status == EBPO_OK)
-        status = inspect_gaps(&s, spare, filled, &own);
+        status = inspect_gaps(&s, spare, filled, &failure);
     free(s.range);
     /* damage is not reported here: the checks that read the damaged data report it */
-    return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
+    return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &failure);
 }
 
 /* --- chunk checksums --- */
 
-enum { SUM_BYTES = 4, UNKNOWN = 20000 }; /* UNKNOWN: greater than all numbers of arrays */
+enum {
+    SUM_BYTES = 4,  /* size of a checksum */
+    UNKNOWN = 20000 /* greater than all numbers of arrays */
+};
 
 typedef struct checksum_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
+    /* [rows] /chunk_checksums: the array's number in the upper 32 bits, the checksum in the lower
+     */
     const uint64_t *list;
     uint64_t rows;
 } checksum_comparison;
@@ -620,20 +637,21 @@ static ebpo_status compare_checksums(checksum_comparison *c, ebpo_error *error)
 ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
-    /* in a remote file, each chunk would take a request, so only the library's own check is made */
+    /* in a remote file, each chunk would take a request, so only the library's failure check is
+     * made */
     if (!file->has_checksums || ebpo_input_prefetches(&ebpo_reader_own(file)->in))
         return EBPO_OK;
-    ebpo_status status = ebpo_file_locate(file, NULL, &own);
+    ebpo_status status = ebpo_file_locate(file, NULL, &failure);
     if (status == EBPO_OK)
-        status = ebpo_long_chunk_read(file, a, &list, &own);
+        status = ebpo_long_chunk_read(file, a, &list, &failure);
     checksum_comparison c = { tally, file, list, a->shape.rows };
     if (status == EBPO_OK)
-        status = compare_checksums(&c, &own);
+        status = compare_checksums(&c, &failure);
     free(list);
     if (status != EBPO_E_FORMAT)
-        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
-    CHECK(false, "%s", own.message);
+        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &failure);
+    CHECK(false, "%s", failure.message);
     return EBPO_OK;
 }

@@ -17,7 +17,9 @@
 #include "mesh/mesh_parts.h"
 #include "verify/verify_geometry.h"
 
-enum { CORNERS = 9 }; /* of a clipped face: three, and at most one more for each cell face */
+enum {
+    CORNERS = 9
+}; /* a clipped face has three corners, and at most one more for each cell face */
 
 typedef struct polygon {
     int count;
@@ -169,6 +171,7 @@ typedef struct local_face {
     unsigned contained; /* bit i: corner i is in the closed cell; exact */
 } local_face;
 
+/* The relation of a face and a cell on some axes; UNSURE: not certain in floating point. */
 typedef enum verdict { APART, INTERSECT, UNSURE } verdict;
 
 ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell)
@@ -232,6 +235,7 @@ static verdict edge_axis(const local_face *p, const double edge[3], int i, int l
     return compare_intervals(a < b ? a : b, a < b ? b : a, low, high, error);
 }
 
+/* Compares the intervals on the normal of the face. */
 static verdict normal_axis(const local_face *p, double edge[3][3])
 {
     double value = 0, low = 0, high = 0, error = slack;
@@ -455,7 +459,7 @@ static bool corner_beyond(const local_face *face, const double n[3], double boun
     return false;
 }
 
-/* Returns true if plane i cuts off no point of the face in the cell. */
+/* Returns true if plane i cuts off no point of the face in the cell. The 1-norm of n is 511. */
 static bool face_keeps(ebpo_tally *tally, const ebpo_node_planes *planes, int i,
                        const ebpo_frame *frame, const ebpo_corners *face, const local_face *local)
 {

@@ -5,7 +5,8 @@
  * winding number of its lowest corner; the winding numbers of its other corners follow from signed
  * crossings along the cell's edges. The 64 corners of a gray node's children are 27 points. The
  * corners of the root have the winding number 0. These links connect every cell to the root. So all
- * winding numbers are correct if no link is violated and the lists are complete (verify_lists.c).
+ * winding numbers are correct if no link is violated and the leaves list all their faces
+ * (verify_lists.c).
  * - By rays through the whole mesh, for all cells or an even sample. The points are sorted into
  * columns along x, and each face is tested against the points in its columns. So faces are read
  * once, in their order, and only the points are in memory. */
@@ -25,15 +26,18 @@
 
 /* --- rays --- */
 
-enum { SIDE_MAX = 2048, FACE_GRAIN = 1 << 14 };
+enum {
+    SIDE_MAX = 2048,     /* greatest number of columns along y and along z */
+    FACE_GRAIN = 1 << 14 /* number of faces for each call of a thread's function */
+};
 
-/* A grid of columns along x, side by side in y and z. */
+/* Columns along x. They are the cells of a grid in y and z. */
 typedef struct columns {
     const ebpo_mesh *mesh;
-    double low[2], scale[2];
-    uint64_t side;
-    uint64_t *first;       /* [side * side + 1] start of each column's points */
-    ebpo_ray_point *point; /* column after column */
+    double low[2], scale[2]; /* in y and z: least coordinates; reciprocals of the box's sides */
+    uint64_t side;           /* number of columns along y and along z */
+    uint64_t *first;         /* [side * side + 1] start of each column's points */
+    ebpo_ray_point *point;   /* column after column */
 } columns;
 
 bool ebpo_rays_add(ebpo_ray_points *points, const ebpo_ray_point *point)
@@ -71,6 +75,7 @@ static uint64_t column_of_point(const columns *c, const ebpo_ray_point *p)
     return column_of(c, 1, p->at[2]) * c->side + column_of(c, 0, p->at[1]);
 }
 
+/* The columns from[i] .. to[i] in y (i = 0) and z (i = 1). */
 typedef struct column_range {
     uint64_t from[2], to[2];
 } column_range;
@@ -130,6 +135,7 @@ static void count_hits(const columns *c, const ebpo_corners *face, uint64_t begi
     }
 }
 
+/* Tests each face of the range against the points in its columns. */
 static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -183,8 +189,8 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
 
 /* --- selection of the cells to check by rays --- */
 
-/* By default, all cells are checked if there are at most CELLS_ALL, else SAMPLES_MANY;
- * SAMPLES_LEAST if these would take too long. */
+/* By default, all cells are checked if there are at most CELLS_ALL; with more cells, SAMPLES_MANY
+ * cells. If the checks of this number of cells would take too long, SAMPLES_LEAST cells. */
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
 /* Number of tests of a face against a point that takes too long: some seconds. */
 static const double ray_work_affordable = 4e8;

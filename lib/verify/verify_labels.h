@@ -27,7 +27,7 @@ typedef struct ebpo_ray_points {
     uint64_t count, capacity;
 } ebpo_ray_points;
 
-/* Returns false when out of memory. */
+/* Appends a point. Returns false when out of memory. */
 EBPO_MUST_USE bool ebpo_rays_add(ebpo_ray_points *points, const ebpo_ray_point *point);
 
 /* Sets `found` of all points to their exact winding numbers in the whole mesh. The points are

@@ -32,6 +32,7 @@ typedef struct face_list {
     uint64_t first; /* first new face */
 } face_list;
 
+/* Returns the face list of a leaf. */
 static face_list list_of(const ebpo_reference_tree *view, const ebpo_reference_node *leaf)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
@@ -86,6 +87,7 @@ static void check_extra(ebpo_tally *tally, const ebpo_reference_tree *view,
             check_near(tally, view, leaf, (uint32_t)(list->first + i));
 }
 
+/* Checks the list of a leaf. `faces`: all faces that touch the leaf, ascending. */
 static void check_leaf(ebpo_tally *tally, const ebpo_reference_tree *view,
                        const ebpo_reference_node *leaf, const uint32_t *faces, uint64_t count)
 {
@@ -132,20 +134,19 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
                                              : "the face touches a black cell");
 }
 
-/* Greatest limit of a `gathering` (below) that uses a list of faces. With greater limits, it uses
- * bits. */
-enum { LIST_LIMIT_MAX = 1 << 16 };
-
 /* The different faces that the leaves below a node list. Faces are gathered only until there are
  * more than `limit`. They are kept in a list of at most about twice `limit` entries, which may
- * contain repetitions. If the limit is large, one bit for each face of the mesh is used instead. */
+ * contain repetitions. If `limit` exceeds LIST_LIMIT_MAX, one bit for each face of the mesh
+ * replaces the list. */
 typedef struct gathering {
-    uint32_t *faces;
-    uint8_t *listed; /* bits; NULL if `faces` is used */
+    uint32_t *faces; /* [count] the list */
+    uint8_t *listed; /* the bits; NULL: the list is used */
     uint64_t count, capacity, limit;
     bool more; /* there are more different faces than `limit` */
     bool short_of_memory;
 } gathering;
+
+enum { LIST_LIMIT_MAX = 1 << 16 };
 
 static int compare_numbers(const void *a, const void *b)
 {
@@ -207,6 +208,7 @@ static void gather_list(gathering *g, const face_list *list)
         g->faces[g->count++] = (uint32_t)(list->first + i);
 }
 
+/* Adds the lists of all leaves below a node, until there are more faces than the limit. */
 static void gather_below(gathering *g, const ebpo_reference_tree *view,
                          const ebpo_reference_node *node)
 {

@@ -74,8 +74,9 @@ EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *f
 /* Checks that the loops agree with the header, and that they are the border of the faces. Returns
  * false if they do not. */
 bool ebpo_check_border_loops(ebpo_tally *tally, const ebpo_tree *tree);
-/* Checks the area of the caps, and subtracts from the stored numbers of all points the winding
- * number of the caps. Requires ebpo_check_border_loops. */
+/* Checks the area of the caps (triangles that close the holes). Subtracts the winding number of the
+ * caps from the stored winding number of each point, so that the difference is the winding number
+ * of the faces. Requires ebpo_check_border_loops. */
 EBPO_MUST_USE ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_points *points,
                                                  const ebpo_reference_tree *view, unsigned threads,
                                                  const ebpo_progress *progress, ebpo_error *error);

@@ -34,6 +34,7 @@ static const char *vertex_bytes(const ebpo_mesh *mesh, uint64_t i)
            i * vertex_size(mesh);
 }
 
+/* Copies a mesh with its attributes. */
 static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspace *workspace,
                              ebpo_error *error)
 {
@@ -65,7 +66,7 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
 }
 
 /* Returns the repair steps of the record. (If faces were flipped without the step `orient`, the
- * step was `flip`, which flips all faces.) */
+ * step `flip` has flipped all faces.) */
 static unsigned steps_of(const ebpo_repair_record *to_repeat)
 {
     return (to_repeat->weld ? EBPO_REPAIR_WELD : 0) | (to_repeat->orient ? EBPO_REPAIR_ORIENT : 0) |
@@ -74,47 +75,51 @@ static unsigned steps_of(const ebpo_repair_record *to_repeat)
            (to_repeat->fill_holes ? EBPO_REPAIR_FILL : 0);
 }
 
-/* Repeats the recorded repairs on a copy of the source. If the number of flipped faces differs from
- * the recorded number, repeats the repairs as earlier versions of the program did, which flipped
- * fewer faces. */
+/* Repeats the recorded repairs on a copy of the source; *repeated receives their record. If the
+ * number of flipped faces differs from the recorded number, repeats the repairs as earlier versions
+ * of the program did, which flipped fewer faces. */
 static ebpo_status repair_again(ebpo_mesh *mesh, const ebpo_mesh *source,
-                                const ebpo_repair_record *to_repeat, ebpo_repair_record *did,
+                                const ebpo_repair_record *to_repeat, ebpo_repair_record *repeated,
                                 ebpo_workspace *workspace, ebpo_error *error)
 {
-    const ebpo_repair_record fresh = *did;
+    const ebpo_repair_record fresh = *repeated;
     ebpo_status status = copy_mesh(mesh, source, workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_repair(mesh, steps_of(to_repeat), to_repeat->weld_distance, did, error);
-    if (status != EBPO_OK || !to_repeat->orient || did->flipped_faces == to_repeat->flipped_faces)
+        status =
+            ebpo_mesh_repair(mesh, steps_of(to_repeat), to_repeat->weld_distance, repeated, error);
+    if (status != EBPO_OK || !to_repeat->orient ||
+        repeated->flipped_faces == to_repeat->flipped_faces)
         return status;
-    *did = fresh;
+    *repeated = fresh;
     ebpo_mesh_free(mesh);
     status = copy_mesh(mesh, source, workspace, error);
     return status == EBPO_OK ? ebpo_mesh_repair(mesh, steps_of(to_repeat) | EBPO_REPAIR_EARLIER,
-                                                to_repeat->weld_distance, did, error)
+                                                to_repeat->weld_distance, repeated, error)
                              : status;
 }
 
 static void check_record(ebpo_tally *tally, const ebpo_repair_record *stored,
-                         const ebpo_repair_record *did)
+                         const ebpo_repair_record *repeated)
 {
-    CHECK(stored->welded_vertices == did->welded_vertices,
+    CHECK(stored->welded_vertices == repeated->welded_vertices,
           "%" PRIu64 " welded vertices are recorded, but repeating the repair welds %" PRIu64,
-          stored->welded_vertices, did->welded_vertices);
-    CHECK(stored->weld_moved == did->weld_moved && stored->collapsed_faces == did->collapsed_faces,
+          stored->welded_vertices, repeated->welded_vertices);
+    CHECK(stored->weld_moved == repeated->weld_moved &&
+              stored->collapsed_faces == repeated->collapsed_faces,
           "welding by up to %g is recorded, but repeating the repair moves vertices by up to %g",
-          stored->weld_moved, did->weld_moved);
-    CHECK(stored->dropped_faces == did->dropped_faces,
+          stored->weld_moved, repeated->weld_moved);
+    CHECK(stored->dropped_faces == repeated->dropped_faces,
           "%" PRIu64 " dropped faces are recorded, but repeating the repair drops %" PRIu64,
-          stored->dropped_faces, did->dropped_faces);
-    CHECK(stored->flipped_faces == did->flipped_faces &&
-              stored->unorientable_components == did->unorientable_components,
+          stored->dropped_faces, repeated->dropped_faces);
+    CHECK(stored->flipped_faces == repeated->flipped_faces &&
+              stored->unorientable_components == repeated->unorientable_components,
           "%" PRIu64 " flipped faces are recorded, but repeating the repair flips %" PRIu64,
-          stored->flipped_faces, did->flipped_faces);
-    CHECK(stored->filled_holes == did->filled_holes && stored->added_faces == did->added_faces &&
-              stored->unfilled_holes == did->unfilled_holes,
+          stored->flipped_faces, repeated->flipped_faces);
+    CHECK(stored->filled_holes == repeated->filled_holes &&
+              stored->added_faces == repeated->added_faces &&
+              stored->unfilled_holes == repeated->unfilled_holes,
           "%" PRIu64 " faces filling holes are recorded, but repeating the repair adds %" PRIu64,
-          stored->added_faces, did->added_faces);
+          stored->added_faces, repeated->added_faces);
 }
 
 static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_mesh *b)
@@ -150,17 +155,17 @@ static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
 
-/* Compares row i of the file's array with row number[i] of the source's array, or with row i if
- * `number` is NULL. Skips faces that repairs have added: their source indices are source->rows and
- * more. */
+/* Compares row i of the file's array with row source_row[i] of the source's array, or with row i if
+ * `source_row` is NULL. Skips faces that repairs have added: their source indices are source->rows
+ * and more. */
 static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
-                         const ebpo_attribute *stored, const uint32_t *number,
+                         const ebpo_attribute *stored, const uint32_t *source_row,
                          ebpo_workspace *workspace)
 {
     bool textures = ebpo_attribute_is_of_textures(stored);
     uint64_t differ = 0;
     EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, stored->rows) {
-        uint64_t at = number ? number[i] : i;
+        uint64_t at = source_row ? source_row[i] : i;
         differ += at < source->rows && !ebpo_attribute_same_row(source, at, stored, i) &&
                   !(textures && image_unknown(source, at, stored, i));
     }
@@ -169,9 +174,9 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
           differ, stored->names, stored->element);
 }
 
-/* Returns the source indices of an array's rows, or NULL if row i is row i of the
- * source. This is true for elements other than vertices and faces: each part contains all rows. */
-static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_maps *maps)
+/* Returns the source indices of an array's rows, or NULL if row i of the file is row i of the
+ * source. For elements other than vertices and faces, every file has all rows of the source. */
+static const uint32_t *source_rows(const ebpo_attribute *array, const ebpo_maps *maps)
 {
     if (maps && ebpo_attribute_is_of(array, "vertex"))
         return maps->vertex_source;
@@ -189,7 +194,7 @@ static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const
     for (uint64_t i = 0; a && b && i < a->count; i++) {
         bool match = k < b->count && same_head(&a->array[i], &b->array[k]);
         if (match)
-            compare_rows(tally, &a->array[i], &b->array[k++], source_numbers(&a->array[i], maps),
+            compare_rows(tally, &a->array[i], &b->array[k++], source_rows(&a->array[i], maps),
                          stored->workspace);
         else if (ebpo_attribute_is_of_mesh(&a->array[i]))
             CHECK(false, "the attribute %s of %s is not in the source's order", a->array[i].names,
@@ -255,19 +260,20 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
 }
 
 /* Computes (*out)[i]: the index in `whole` of the face with the source index i, or EBPO_NO_INDEX if
- * it was dropped. Leaves *out NULL if both indices are the same. *numbers: number of source
- * indices. */
-static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
+ * the face was dropped. If source indices are the indices in `whole`, *out remains NULL.
+ * *source_count: number of source indices. */
+static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64_t *source_count,
                                   ebpo_error *error)
 {
     const struct ebpo_arrangement *order = whole->arrangement;
-    *numbers = whole->face_count + (order ? order->dropped_faces : 0);
+    *source_count = whole->face_count + (order ? order->dropped_faces : 0);
     if (!order)
         return EBPO_OK;
-    uint32_t *positions = *out = ebpo_array_alloc(whole->workspace, *numbers, sizeof *positions);
+    uint32_t *positions = *out =
+        ebpo_array_alloc(whole->workspace, *source_count, sizeof *positions);
     if (!positions)
-        return ebpo_workspace_fail(whole->workspace, *numbers * sizeof *positions, error);
-    ebpo_array_fill(whole->workspace, positions, 0xff, *numbers * sizeof *positions);
+        return ebpo_workspace_fail(whole->workspace, *source_count * sizeof *positions, error);
+    ebpo_array_fill(whole->workspace, positions, 0xff, *source_count * sizeof *positions);
     EBPO_FOR_ITEMS_SCATTERED(whole->workspace, i, 0, whole->face_count)
         positions[order->face_source[i]] = (uint32_t)i;
     return EBPO_OK;
@@ -275,11 +281,11 @@ static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64
 
 /* Returns true if face i of the part has the same corners as the face of `whole` with its source
  * index. */
-static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint64_t numbers,
+static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint64_t source_count,
                          const ebpo_mesh *part, const ebpo_maps *maps, uint64_t i)
 {
     uint64_t number = maps->face_source[i];
-    if (number >= numbers || (positions && positions[number] == EBPO_NO_INDEX))
+    if (number >= source_count || (positions && positions[number] == EBPO_NO_INDEX))
         return false;
     const uint32_t *corners = whole->faces + 3 * (positions ? positions[number] : number);
     for (uint64_t c = 0; c < 3; c++)
@@ -296,12 +302,12 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
     ebpo_mesh part = { 0 };
     ebpo_maps maps = { .vertex_source = NULL };
     uint32_t *positions = NULL;
-    uint64_t numbers = 0;
+    uint64_t source_count = 0;
     ebpo_status status = ebpo_file_read_mesh(file, read, &part, error);
     if (status == EBPO_OK)
         status = ebpo_file_read_maps(file, read, &maps, error);
     if (status == EBPO_OK)
-        status = list_positions(whole, &positions, &numbers, error);
+        status = list_positions(whole, &positions, &source_count, error);
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
                                    "the source and the file have different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
@@ -315,7 +321,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
                                      " of the source has another position in the file",
                                      maps.vertex_source[i]);
         EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.face_count)
-            if (!same_corners(whole, positions, numbers, &part, &maps, i))
+            if (!same_corners(whole, positions, source_count, &part, &maps, i))
                 ebpo_tally_violation(
                     tally, EBPO_VERIFY_SOURCE,
                     &(ebpo_verify_place){ 0, maps.face_source[i], EBPO_NO_PLANE },
@@ -328,6 +334,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
     return status;
 }
 
+/* Checks the source file's digest and size. Returns true if they match or are unknown. */
 static bool check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *source)
 {
     static const uint8_t none[32];
@@ -382,8 +389,8 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (check_digest(tally, info, source) && was_rounded(info, source)) {
-        /* no further comparison, as rounding may have made vertices equal and may have changed how
-         * polygons are cut into triangles */
+        /* no further comparison, as rounding may have expected vertices equal and may have changed
+         * how polygons are cut into triangles */
         CHECK(false, "coordinates were rounded to single precision by an earlier version; convert "
                      "again");
         return EBPO_OK;
@@ -397,32 +404,35 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     ebpo_mesh repaired = { 0 };
     const ebpo_repair_record *to_repeat = &info->repair_record;
     bool unchanged = steps_of(to_repeat) == 0;
-    ebpo_repair_record did = { .weld = info->repair_record.weld,
-                               .orient = info->repair_record.orient,
-                               .fill_holes = info->repair_record.fill_holes };
+    ebpo_repair_record repeated = { .weld = info->repair_record.weld,
+                                    .orient = info->repair_record.orient,
+                                    .fill_holes = info->repair_record.fill_holes };
     ebpo_status status =
         unchanged ? EBPO_OK
-                  : repair_again(&repaired, source, to_repeat, &did, read->workspace, error);
+                  : repair_again(&repaired, source, to_repeat, &repeated, read->workspace, error);
     if (status == EBPO_E_ARGUMENT) { /* the file's record is invalid */
-        CHECK(false, "welding within %g is recorded, but the source cannot be welded within it",
+        CHECK(false,
+              "welding within %g is recorded, but the source cannot be welded within this distance",
               to_repeat->weld_distance);
         ebpo_mesh_free(&repaired);
         return EBPO_OK;
     }
-    const ebpo_mesh *made = unchanged ? source : &repaired;
+    const ebpo_mesh *expected = unchanged ? source : &repaired;
     if (status == EBPO_OK)
-        check_record(tally, &info->repair_record, &did);
+        check_record(tally, &info->repair_record, &repeated);
     bool mapped = info->parts & EBPO_PART_MAPS; /* without maps, source indices are unknown */
     bool by_number = is_part(info) || (info->repair_record.dropped_faces && mapped);
     if (status == EBPO_OK && stored && info->repair_record.dropped_faces && !is_part(info))
-        CHECK(made->vertex_count == stored->vertex_count && made->face_count == stored->face_count,
+        CHECK(expected->vertex_count == stored->vertex_count &&
+                  expected->face_count == stored->face_count,
               "the repaired source has %" PRIu64 " vertices and %" PRIu64
               " faces, the file %" PRIu64 " and %" PRIu64,
-              made->vertex_count, made->face_count, stored->vertex_count, stored->face_count);
+              expected->vertex_count, expected->face_count, stored->vertex_count,
+              stored->face_count);
     if (status == EBPO_OK && stored && !by_number)
-        status = compare_meshes(tally, made, stored, ordered, error);
+        status = compare_meshes(tally, expected, stored, ordered, error);
     else if (status == EBPO_OK && mapped)
-        status = compare_some(tally, file, made, read, error);
+        status = compare_some(tally, file, expected, read, error);
     else if (status == EBPO_OK && stored)
         CHECK(mapped, "the file has a part of the source, but no maps that identify this part");
     ebpo_mesh_free(&repaired);

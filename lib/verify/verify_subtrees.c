@@ -56,12 +56,11 @@ static const char *const level_names[] = { "gray nodes",
 typedef struct recount {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
-    int level; /* level of the subtrees' roots */
-    /* the arrays of /subtrees, as stored */
-    unsigned columns, rows_of_chunk; /* of `counts`: columns, and rows of a chunk */
-    const uint32_t *counts;
-    const uint64_t *index;
-    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of /subtrees/shared_chunks */
+    int level;                       /* level of the subtrees' roots */
+    const uint32_t *counts;          /* [subtrees][columns] /subtrees/counts, as stored */
+    unsigned columns, rows_of_chunk; /* columns of `counts`, and rows in each of its chunks */
+    const uint64_t *index;           /* [chunks][columns] /subtrees/index, as stored */
+    uint64_t subtrees, shared_rows;  /* shared_rows: number of rows of /subtrees/shared_chunks */
     /* numbers of subtrees, faces and vertices so far */
     uint64_t subtree, faces, vertices;
     uint64_t shared_done;          /* sum of the numbers of shared chunks so far */
@@ -88,8 +87,8 @@ static void check_row(recount *c)
     ebpo_tally *tally = c->tally;
     const uint32_t *stated = c->counts + c->subtree * c->columns;
     int level;
-    c->row[SHARED_FACES] =
-        stated[SHARED_FACES]; /* not checked: a hint, like the chunks that the list names */
+    /* these two numbers are not checked: they are hints, as is /subtrees/shared_chunks */
+    c->row[SHARED_FACES] = stated[SHARED_FACES];
     c->row[SHARED_VERTICES] = stated[SHARED_VERTICES];
     c->shared_done += c->row[SHARED_FACES] + c->row[SHARED_VERTICES];
     for (unsigned k = 0; k < c->columns; k++) {
@@ -125,6 +124,8 @@ static void count_faces(recount *c, uint64_t count)
     c->vertices = used;
 }
 
+/* Counts a leaf. `row`: counts of the leaf's level in the current subtree; NULL: not in a subtree.
+ */
 static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
 {
     const ebpo_level *level = &c->view->tree->level[leaf->cell.level];
@@ -148,6 +149,7 @@ static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *ro
         count_faces(c, level->leaf_new[leaf->rank]);
 }
 
+/* Counts a node and the nodes below it. */
 static void visit_node(recount *c, const ebpo_reference_node *node);
 
 static void visit_children(recount *c, const ebpo_reference_node *node)

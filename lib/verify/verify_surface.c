@@ -1,7 +1,9 @@
-/* Verifies the simplified surface (format-spec/surface.md).
+/* Verifies the simplified surface (format-spec/surface.md). A patch is a set of triangles that
+ * replaces the faces of one node, with an error: the greatest distance between the patch and these
+ * faces.
  *
- * - Each patch belongs to a gray node or a leaf, and replaces the node's faces. If a child of a
- *   node has a patch, the node has a patch, and so do all its children with faces.
+ * - Each patch belongs to a gray node or a leaf. If a child of a node has a patch, the node must
+ *   have a patch, and all its children with faces must have patches.
  * - The error is tested at points: at the vertices and centres of all triangles of a patch, and of
  *   some of the faces that the patch replaces, evenly spaced in the file. A uniform grid finds the
  *   triangles near a point. Exact bounds of the distance from these triangles are compared with the
@@ -22,7 +24,10 @@
 #include "mesh/mesh_parts.h"
 #include "verify/verify_parts.h"
 
-enum { SIDE_MAX = 128, SAMPLED_FACES = 4096 };
+enum {
+    SIDE_MAX = 128,      /* greatest number of grid cells along an axis */
+    SAMPLED_FACES = 4096 /* about the number of tested faces of a patch */
+};
 
 #define CHECK(...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, __VA_ARGS__)
 
@@ -31,9 +36,10 @@ enum { SIDE_MAX = 128, SAMPLED_FACES = 4096 };
 typedef struct node_walk {
     ebpo_tally *tally;
     const ebpo_tree *tree;
+    /* by level: numbers of groups and of leaves so far */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
-    uint64_t face;  /* new faces of the leaves so far */
-    uint64_t found; /* patches of visited nodes */
+    uint64_t face;  /* number of new faces of the leaves so far */
+    uint64_t found; /* number of visited nodes with a patch */
 } node_walk;
 
 /* Returns the row of a node's patch, or NULL. */
@@ -86,10 +92,10 @@ static bool visit_node(node_walk *w, ebpo_octcode code, ebpo_node_type type)
 /* Triangles in a uniform grid. */
 typedef struct triangle_grid {
     ebpo_workspace *workspace;
-    double low[3], step[3];
-    int side;
-    uint64_t *begin;    /* [side^3 + 1] */
-    uint32_t *triangle; /* by cell */
+    double low[3], step[3]; /* lowest corner of the grid; sides of a cell */
+    int side;               /* number of cells along each axis */
+    uint64_t *begin;        /* [side^3 + 1] begin of each cell's triangles in `triangle` */
+    uint32_t *triangle;     /* indices of triangles, cell by cell */
 } triangle_grid;
 
 /* Triangles of a patch, or faces of the model. */
@@ -110,7 +116,7 @@ static void get_triangle(const triangle_list *list, uint64_t i, double out[3][3]
             ebpo_mesh_position(list->mesh, list->mesh->faces[3 * (list->first + i) + k], out[k]);
 }
 
-/* Gets the range of cells of an interval. */
+/* Computes the range of cells from[k] .. to[k] that the box [low, high] intersects. */
 static void cell_range(const triangle_grid *g, const double low[3], const double high[3],
                        int from[3], int to[3])
 {
@@ -134,6 +140,7 @@ static void triangle_range(const triangle_grid *g, const triangle_list *list, ui
     cell_range(g, low, high, from, to);
 }
 
+/* Executes a statement for the index `cell` of each cell in a range. */
 #define FOR_CELLS(grid, from, to, cell)                                                          \
     for (int z_ = (from)[2]; z_ <= (to)[2]; z_++)                                                \
         for (int y_ = (from)[1]; y_ <= (to)[1]; y_++)                                            \
@@ -165,6 +172,7 @@ static void free_grid(triangle_grid *g)
     ebpo_array_free(g->workspace, g->triangle);
 }
 
+/* Sorts the triangles into a grid. Returns false when memory is short. */
 static bool make_grid(triangle_grid *g, const triangle_list *list, ebpo_workspace *workspace)
 {
     int from[3], to[3];
@@ -209,6 +217,7 @@ static bool is_near_cells(const triangle_grid *g, const triangle_list *list, con
     return false;
 }
 
+/* Returns true unless the point is certainly farther than `limit` from all triangles. */
 static bool is_near(const triangle_grid *g, const triangle_list *list, const double p[3],
                     double limit)
 {
@@ -225,8 +234,8 @@ static bool is_near(const triangle_grid *g, const triangle_list *list, const dou
     return is_near_cells(g, list, p, limit, from, to);
 }
 
-/* Returns the number of tested points of the list `of` that are farther than `limit` from the list
- * `from`. */
+/* Tests the corners and the centre of every `every`-th triangle of the list `of`. Returns the
+ * number of these points that are farther than `limit` from the list `from`, whose grid is g. */
 static uint64_t count_far(const triangle_list *of, uint64_t every, const triangle_grid *g,
                           const triangle_list *from, double limit)
 {
@@ -243,6 +252,7 @@ static uint64_t count_far(const triangle_list *of, uint64_t every, const triangl
     return far;
 }
 
+/* Checks the error of a patch. */
 static ebpo_status check_error(ebpo_tally *tally, const ebpo_tree *tree, uint64_t index,
                                ebpo_workspace *workspace, ebpo_error *error)
 {
@@ -250,14 +260,14 @@ static ebpo_status check_error(ebpo_tally *tally, const ebpo_tree *tree, uint64_
     ebpo_status status = ebpo_surface_decode(&tree->surface, &tree->info, index, &patch, error);
     if (status != EBPO_OK)
         return status;
-    triangle_list mine = { .count = patch.triangle_count, .patch = &patch }, faces = {
+    triangle_list replacement = { .count = patch.triangle_count, .patch = &patch }, faces = {
         .count = patch.face_count, .mesh = &tree->mesh, .first = patch.first_face
     };
-    triangle_grid of_mine = { 0 }, of_faces = { 0 };
-    if (make_grid(&of_mine, &mine, NULL) && make_grid(&of_faces, &faces, workspace)) {
-        uint64_t far =
-            count_far(&mine, 1, &of_faces, &faces, patch.error) +
-            count_far(&faces, 1 + patch.face_count / SAMPLED_FACES, &of_mine, &mine, patch.error);
+    triangle_grid of_replacement = { 0 }, of_faces = { 0 };
+    if (make_grid(&of_replacement, &replacement, NULL) && make_grid(&of_faces, &faces, workspace)) {
+        uint64_t far = count_far(&replacement, 1, &of_faces, &faces, patch.error) +
+                       count_far(&faces, 1 + patch.face_count / SAMPLED_FACES, &of_replacement,
+                                 &replacement, patch.error);
         CHECK(far == 0,
               "surface: octcode %" PRIu64 ": %" PRIu64 " points are farther than the error %.9g",
               tree->surface.patch[EBPO_PATCH_COLUMNS * index + EBPO_PATCH_OCTCODE], far,
@@ -265,7 +275,7 @@ static ebpo_status check_error(ebpo_tally *tally, const ebpo_tree *tree, uint64_
     } else {
         status = ebpo_workspace_fail(workspace, patch.face_count * 16, error);
     }
-    free_grid(&of_mine);
+    free_grid(&of_replacement);
     free_grid(&of_faces);
     ebpo_patch_free(&patch);
     return status;

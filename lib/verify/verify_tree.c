@@ -28,7 +28,7 @@
 
 /* --- finding nodes --- */
 
-/* Adds the numbers of items of a group to *sum. */
+/* Adds the numbers of nodes, planes and references of a group to *sum. */
 static void add_group(ebpo_reference_group *sum, const ebpo_reference_tree *view,
                       const ebpo_level *level, uint64_t group, unsigned octants)
 {
@@ -198,7 +198,11 @@ int64_t ebpo_reference_winding(const ebpo_reference_tree *view, const ebpo_refer
 
 /* --- nesting --- */
 
-enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
+enum {
+    NODES_PER_LEVEL = 256, /* number of sampled cells of a level */
+    POINTS_PER_NODE = 8,   /* number of corners, and of random points, of a sampled cell */
+    POINT_BITS = 16        /* coordinates of points are in units of 2^-POINT_BITS of the cell */
+};
 
 /* Checks that the plane codes of the level's nodes of a type are valid. */
 static void check_codes(ebpo_tally *tally, const ebpo_reference_tree *view, int l,
@@ -276,6 +280,7 @@ static bool point_kept_below(const chain *c, int from, int to, const int64_t poi
                                     ebpo_wide_signed_product(d, 1 << POINT_BITS));
 }
 
+/* Compares a point of the deepest cell of a chain with all planes of the cells above. */
 static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, const chain *c,
                         const int64_t point[3])
 {
@@ -375,7 +380,10 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view)
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* --- structure: the arrays are consistent --- */
+/* --- structure: the arrays are consistent ---
+ *
+ * These functions return false after a violation, because other checks could then read beyond the
+ * ends of arrays. */
 
 static bool head_shape(ebpo_tally *tally, const ebpo_info *info)
 {
@@ -524,7 +532,8 @@ static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
     return CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
 }
 
-/* Checks that the other required arrays are present. Counts a check only when it fails. */
+/* Checks that the required arrays which no other function checks are present. Counts a check only
+ * if it fails. */
 static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
@@ -607,6 +616,7 @@ typedef struct descent {
                                          file), by level */
 } descent;
 
+/* Counts a check of a node, and a violation if `holds` is false. */
 static void record_check(descent *d, const ebpo_reference_node *node, bool holds, const char *text)
 {
     d->tally->checks[EBPO_VERIFY_STRUCTURE]++;
@@ -665,6 +675,7 @@ static void check_gray(descent *d, const ebpo_reference_node *node)
                  "the node is gray, but none of its children is gray or a leaf");
 }
 
+/* Checks that all corners of faces are within the root box. */
 static void check_vertices(ebpo_tally *tally, const ebpo_reference_tree *view)
 {
     const ebpo_mesh *mesh = &view->tree->mesh;

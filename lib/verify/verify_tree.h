@@ -1,5 +1,6 @@
 /* Finds the nodes of a tree in memory, and checks nesting and structure. This implementation is
- * separate from the library's own, because the verifier checks the latter's results. */
+ * separate from the library's other code for trees, because the verifier checks the results of that
+ * code. */
 #ifndef EBPO_VERIFY_VERIFY_TREE_H
 #define EBPO_VERIFY_VERIFY_TREE_H
 
@@ -16,10 +17,10 @@ typedef struct ebpo_reference_group {
     uint64_t planes, refs, leaf_planes;
 } ebpo_reference_group;
 
-/* A tree, with what is needed to find nodes by rank (the number of a node among the nodes of its
- * level and type). */
+/* A view of a tree: the tree, and data to find nodes by rank (the number of a node among the nodes
+ * of its level and type). */
 typedef struct ebpo_reference_tree {
-    const ebpo_tree *tree; /* the caller's */
+    const ebpo_tree *tree; /* borrowed from the caller */
     ebpo_box box;
     bool has_mesh, has_planes, has_leaf_planes;
     ebpo_reference_group *groups[EBPO_LEVELS_MAX]; /* [group_count] for each level */
@@ -67,6 +68,7 @@ const uint32_t *ebpo_reference_refs(const ebpo_reference_tree *view,
  * node (in the whole cell). */
 int64_t ebpo_reference_winding(const ebpo_reference_tree *view, const ebpo_reference_node *node);
 
+/* Returns true if points with this winding number are inside by the file's rule. */
 static inline bool ebpo_reference_inside(const ebpo_reference_tree *view, int64_t winding)
 {
     switch (view->tree->info.rule) {

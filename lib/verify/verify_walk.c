@@ -20,9 +20,14 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_labels.h"
 
-/* FACE_GRAIN: faces of a task. A subtree that one thread visits has at most a SUBTREES_WANTED-th of
- * all faces; this limit is between SUBTREE_FACES and SUBTREE_FACES_MAX. */
-enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREE_FACES_MAX = 1 << 18, SUBTREES_WANTED = 64 };
+enum {
+    FACE_GRAIN = 4096, /* number of faces for each call of a thread's function */
+    /* A subtree that one thread visits has at most a SUBTREES_WANTED-th of all faces. This limit is
+     * raised to SUBTREE_FACES or lowered to SUBTREE_FACES_MAX. */
+    SUBTREES_WANTED = 64,
+    SUBTREE_FACES = 1024,
+    SUBTREE_FACES_MAX = 1 << 18
+};
 
 /* A stack of face indices: the faces of a node, then those of its child, and so on down. */
 typedef struct face_stack {
@@ -31,7 +36,7 @@ typedef struct face_stack {
     uint64_t capacity;
 } face_stack;
 
-/* What one thread uses alone. */
+/* The state of one thread. */
 typedef struct worker {
     ebpo_tally tally;
     face_stack stack;
@@ -46,17 +51,17 @@ typedef struct upper_node {
     ebpo_reference_node node;
     uint32_t *faces; /* faces that touch the node; NULL after the node has been visited */
     uint64_t face_count;
-    uint64_t children; /* index in `upper` of the first of eight; 0: root of a subtree */
-    ebpo_node_windings corners;
+    uint64_t children;          /* index in `upper` of the first of eight; 0: root of a subtree */
+    ebpo_node_windings corners; /* winding numbers of the corners, set after the visit */
 } upper_node;
 
 typedef struct walk {
     const ebpo_reference_tree *view;
     const ebpo_verify_options *options;
     unsigned threads;
-    ebpo_label_plan plan;
-    bool rays;
-    worker *workers;
+    ebpo_label_plan plan; /* cells to check by rays */
+    bool rays;            /* cells are checked by rays */
+    worker *workers;      /* [threads] */
     upper_node *upper;
     uint64_t upper_count, upper_capacity;
     uint64_t *subtrees; /* [subtree_count] indices in `upper` of the subtrees' roots */
@@ -64,7 +69,8 @@ typedef struct walk {
     uint64_t subtree_limit; /* maximum number of faces of a subtree's root */
     /* the node whose faces are distributed to all threads */
     const upper_node *shared;
-    uint8_t *shared_octants;
+    uint8_t
+        *shared_octants; /* for each of its faces, the children that the face touches, as bits */
 } walk;
 
 /* The cells of a gray node and of its children. */
@@ -103,6 +109,7 @@ static unsigned near_octants(const family *f, const ebpo_corners *face)
     return octants & 255;
 }
 
+/* Returns the children that a face of the node touches, as bits. */
 static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
 {
     unsigned near = near_octants(f, face), touched = 0;
@@ -134,8 +141,8 @@ static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *
 
 /* Checks that a gray node has too many faces for a leaf. `touching`: number of faces that touch the
  * node. */
-static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_node *node,
-                        uint64_t touching)
+static void check_face_limit(const walk *w, ebpo_tally *tally, const ebpo_reference_node *node,
+                             uint64_t touching)
 {
     uint64_t limit = w->view->tree->info.leaf_faces;
     if (limit == 0 || !w->view->has_mesh ||
@@ -201,6 +208,7 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_referen
     return EBPO_OK;
 }
 
+/* Makes space for `need` faces. Returns false when memory is short. */
 static bool stack_reserve(face_stack *s, uint64_t need)
 {
     if (need <= s->capacity)
@@ -217,7 +225,8 @@ static bool stack_reserve(face_stack *s, uint64_t need)
     return true;
 }
 
-/* Visits a node and all nodes below it. Its faces are [first, first + count) on the stack. */
+/* Visits a node and all nodes below it. The faces that touch the node are [first, first + count) on
+ * the stack. */
 static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_node *node,
                              uint64_t first, uint64_t count, ebpo_node_windings *corners,
                              ebpo_error *error)
@@ -231,7 +240,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_n
     family_make(&f, &w->view->box, node);
     ebpo_node_planes_of(&self->planes, w->view, node);
     visit_faces(w, self, node, &f, s->faces + first, s->octants + first, count);
-    check_worth(w, &self->tally, node, count);
+    check_face_limit(w, &self->tally, node, count);
     ebpo_node_windings children[8];
     for (unsigned octant = 0; octant < 8; octant++) {
         uint64_t in_child = 0;
@@ -295,7 +304,7 @@ static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
     ebpo_status status =
         ebpo_parallel_for(w->threads, NULL, n->face_count, FACE_GRAIN, shared_task, w,
                           &w->options->progress, "verifying upper levels", error);
-    check_worth(w, &w->workers[0].tally, &n->node, n->face_count);
+    check_face_limit(w, &w->workers[0].tally, &n->node, n->face_count);
     n->children = w->upper_count;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         status = add_child(w, at, octant, error);
@@ -343,7 +352,7 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Visits a subtree. If it is a leaf, its faces, which may be very many, are not copied to the
+/* Visits a subtree. The faces of a root that is a leaf may be very many; they are not copied to the
  * stack. */
 static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
 {
