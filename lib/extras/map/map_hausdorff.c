@@ -1,11 +1,12 @@
 /* Computes guaranteed bounds of the greatest distance from a mesh's faces, including their
  * interior, to a model (a one-sided Hausdorff distance).
  *
- * The method is branch and bound over triangles, which are divided into four. If a point moves, its
- * distance changes by at most the length of the motion. So the distance of each point of a triangle
- * is at most the distance of a corner plus the length of the longer edge at this corner. A round
- * divides the triangles with the greatest bounds together, so the result does not depend on the
- * number of threads. */
+ * The method is branch and bound over triangles, which are divided into four quarters at the
+ * middles of their edges. If a point moves, its distance from the model changes by at most the
+ * length of the motion. So the distance of each point of a triangle is at most the distance of a
+ * corner plus the length of the longer edge at this corner. This sum is the triangle's bound. Faces
+ * are searched in batches, and a batch in rounds. A round divides all triangles with great bounds,
+ * and their number does not depend on the number of threads, so the result does not either. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,14 +20,18 @@
 #include "core/parallel.h"
 #include "extras/map/map_lattice.h"
 
-/* Number of faces that are searched together (a batch), and maximum number of triangles of a round.
- * Further triangles are not divided, and their bounds are final. */
-enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
+enum {
+    BATCH_FACES = 1 << 17,   /* number of faces that are searched together (a batch) */
+    TRIANGLES_MAX = 1 << 20, /* greatest number of triangles in the list of a round; further
+                              * triangles are not divided, and their bounds are final */
+    PIECE_TRIANGLES = 256    /* number of triangles that a thread divides at a time */
+};
 
+/* A face, or a part of a face that divisions have made. */
 typedef struct triangle {
-    double corner[3][3],
-        distance[3]; /* distance: unsigned distance of each corner from the model */
-    double upper;    /* upper bound of the distance of the triangle's points */
+    double corner[3][3]; /* positions */
+    double distance[3];  /* unsigned distance of each corner from the model */
+    double upper;        /* upper bound of the distance of the triangle's points */
 } triangle;
 
 typedef struct triangles {
@@ -37,20 +42,21 @@ typedef struct triangles {
 typedef struct search {
     ebpo_map_queries queries;
     const ebpo_mesh *mesh;
-    const double *distances;
-    ebpo_map_hausdorff_options o;
+    const double *distances; /* [mesh->vertex_count] signed or unsigned distance of each vertex */
+    ebpo_map_hausdorff_options options; /* the caller's options, or the defaults */
     double slack;             /* upper bound of the rounding errors of positions and lengths */
     ebpo_map_hausdorff range; /* bounds of the result so far */
-    uint64_t allowed;         /* greatest value of range.queries at the end of the current batch */
+    uint64_t allowed;         /* no division begins in the current batch after range.queries has
+                               * this value */
     triangles current, next;  /* triangles of this round and of the next round */
-    uint64_t divided;         /* number of triangles that this round divides: the
-                               * first ones of `current` */
+    uint64_t divided;         /* number of triangles that this round divides: the first ones of
+                               * `current` */
     double (*middle)[3][3];   /* [divided] middles of the edges from each corner to the next one */
     double (*middle_distance)[3]; /* [divided] distances of these middles from the model */
-    uint64_t middle_capacity, distance_capacity;
+    uint64_t middle_capacity, distance_capacity; /* of middle and middle_distance, in triangles */
 } search;
 
-/* Returns an upper bound of the distance of two points. */
+/* Returns an upper bound of the distance of two points: the factor 1 + 2^-48 covers rounding. */
 static double distance_above(const double a[3], const double b[3])
 {
     double d[3] = { a[0] - b[0], a[1] - b[1], a[2] - b[2] };
@@ -74,15 +80,15 @@ static void set_upper_bound(const search *s, triangle *t)
     t->upper += s->slack;
 }
 
-/* Returns true if a triangle with this upper bound can change the result by more than the
- * tolerance. */
+/* Returns true if a triangle must be divided: if its upper bound is greater than the result's lower
+ * bound by more than the tolerance, and greater than all bounds that are final. */
 static bool needs_division(const search *s, double upper)
 {
-    return upper > s->range.lo * (1 + s->o.tolerance) && upper > s->range.hi;
+    return upper > s->range.lo * (1 + s->options.tolerance) && upper > s->range.hi;
 }
 
-/* Adds a triangle that can change the result to a list of triangles to divide. If there are too
- * many triangles or queries, makes its bound final instead. */
+/* Adds a triangle to a list of triangles, if the triangle must be divided. If the list is full or
+ * no more queries are allowed, makes the triangle's bound final and does not add the triangle. */
 static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!needs_division(s, t->upper))
@@ -97,7 +103,7 @@ static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, 
     return EBPO_OK;
 }
 
-/* Raises the lower bound of the result to the distance of a point, if that is greater. */
+/* Raises the lower bound of the result to the distance of a point, if this distance is greater. */
 static void raise_lower_bound(search *s, double distance, const double location[3])
 {
     if (distance <= s->range.lo)
@@ -108,11 +114,12 @@ static void raise_lower_bound(search *s, double distance, const double location[
 
 /* --- a round --- */
 
+/* Computes the middles of the edges of triangles begin .. end - 1, and the middles' distances. */
 static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
     search *s = context;
-    ebpo_distance_result results[3 * 256];
+    ebpo_distance_result results[3 * PIECE_TRIANGLES];
     for (uint64_t i = begin; i < end; i++)
         for (int k = 0; k < 3; k++)
             for (int c = 0; c < 3; c++)
@@ -126,22 +133,24 @@ static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-/* Makes quarter `which` of triangle i. 0 to 2: the quarter at this corner; 3: the quarter in the
- * middle. */
-static void child_of(const search *s, uint64_t i, int which, triangle *out)
+/* Makes a quarter of triangle i. which: 0 to 2 for the quarter at this corner, or 3 for the quarter
+ * in the middle. Edge e leads from corner e to the next corner. */
+static void quarter_of(const search *s, uint64_t i, int which, triangle *out)
 {
     const triangle *t = &s->current.item[i];
     for (int k = 0; k < 3; k++) {
-        bool corner = which < 3 && k == which; /* false: corner k is the middle of an edge */
+        bool is_corner = k == which; /* false: the quarter's corner k is the middle of an edge */
         int edge = which == 3 ? k : k == (which + 1) % 3 ? which : (which + 2) % 3;
-        memcpy(out->corner[k], corner ? t->corner[k] : s->middle[i][edge], sizeof out->corner[k]);
-        out->distance[k] = corner ? t->distance[k] : s->middle_distance[i][edge];
+        memcpy(out->corner[k], is_corner ? t->corner[k] : s->middle[i][edge],
+               sizeof out->corner[k]);
+        out->distance[k] = is_corner ? t->distance[k] : s->middle_distance[i][edge];
     }
 }
 
-/* Chooses the triangles that this round divides: those with bounds of at least half of the greatest
- * bound, because dividing the others does not improve the result yet. Moves them to the front, and
- * sets s->divided to their number. */
+/* Chooses the triangles that this round divides, moves them to the front of s->current, and sets
+ * s->divided to their number. These are triangles whose bounds are at least half of the greatest
+ * bound: divisions of triangles with smaller bounds do not improve the result yet. A division needs
+ * three queries, and the remaining number of queries limits the number of divisions. */
 static void choose_triangles(search *s)
 {
     double most = 0;
@@ -157,7 +166,8 @@ static void choose_triangles(search *s)
         }
 }
 
-/* Replaces the triangles that this round divides by their quarters. */
+/* Replaces the triangles that this round divides by their quarters, and omits each triangle that
+ * need not be divided any more. */
 static ebpo_status divide_triangles(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -169,7 +179,7 @@ static ebpo_status divide_triangles(search *s, ebpo_error *error)
     for (uint64_t i = 0; i < s->divided && status == EBPO_OK; i++)
         for (int which = 0; which < 4 && status == EBPO_OK; which++) {
             triangle t;
-            child_of(s, i, which, &t);
+            quarter_of(s, i, which, &t);
             set_upper_bound(s, &t);
             status = keep_triangle(s, &s->next, &t, error);
         }
@@ -181,6 +191,7 @@ static ebpo_status divide_triangles(search *s, ebpo_error *error)
     return status;
 }
 
+/* Divides the triangles of s->current in rounds, until no triangle must be divided. */
 static ebpo_status refine_triangles(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -191,8 +202,8 @@ static ebpo_status refine_triangles(search *s, ebpo_error *error)
             !ebpo_grow(&s->middle_distance, &s->distance_capacity, s->divided,
                        sizeof *s->middle_distance))
             return ebpo_fail_memory(error, s->divided * sizeof *s->middle);
-        status = ebpo_parallel_for(s->queries.threads, NULL, s->divided, 256, query_middles, s,
-                                   &none, "", error);
+        status = ebpo_parallel_for(s->queries.threads, NULL, s->divided, PIECE_TRIANGLES,
+                                   query_middles, s, &none, "", error);
         if (status == EBPO_OK)
             status = divide_triangles(s, error);
     }
@@ -201,6 +212,7 @@ static ebpo_status refine_triangles(search *s, ebpo_error *error)
 
 /* --- all faces --- */
 
+/* Gets the position of a vertex. */
 static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 {
     for (uint64_t c = 0; c < 3; c++)
@@ -208,13 +220,15 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
                           : m->xyz64[3 * (uint64_t)vertex + c];
 }
 
-static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
+/* Searches a batch: faces begin .. end - 1. The allowed number of queries is shared by the batches
+ * in proportion to their numbers of faces. */
+static ebpo_status search_batch(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     /* share of the faces that have been searched at the end of this batch */
     double share = (double)end / (double)s->mesh->face_count;
-    s->allowed =
-        end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
+    s->allowed = end == s->mesh->face_count ? s->options.queries
+                                            : (uint64_t)((double)s->options.queries * share);
     s->current.count = 0;
     for (uint64_t f = begin; f < end && status == EBPO_OK; f++) {
         triangle t;
@@ -229,23 +243,26 @@ static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_e
     return status == EBPO_OK ? refine_triangles(s, error) : status;
 }
 
+/* Searches all faces in batches, and completes the bounds in s->range. */
 static ebpo_status search_all(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     const ebpo_mesh *m = s->mesh;
-    for (uint64_t f = 0; f < m->face_count; f += FACES_AT_A_TIME) {
-        uint64_t end = f + FACES_AT_A_TIME < m->face_count ? f + FACES_AT_A_TIME : m->face_count;
-        if (!ebpo_progress_step(&s->o.progress, "searching faces", f, m->face_count, error))
+    for (uint64_t f = 0; f < m->face_count; f += BATCH_FACES) {
+        uint64_t end = f + BATCH_FACES < m->face_count ? f + BATCH_FACES : m->face_count;
+        if (!ebpo_progress_step(&s->options.progress, "searching faces", f, m->face_count, error))
             return EBPO_E_CANCELLED;
-        status = inspect_faces(s, f, end, error);
+        status = search_batch(s, f, end, error);
         if (status != EBPO_OK)
             return status;
     }
-    s->range.hi = fmax(s->range.hi, s->range.lo * (1 + s->o.tolerance) + s->slack);
+    /* triangles that were not divided because of the tolerance have at most this bound */
+    s->range.hi = fmax(s->range.hi, s->range.lo * (1 + s->options.tolerance) + s->slack);
     return EBPO_OK;
 }
 
-/* Checks the faces, sets the lower bound from the distances of vertices, and sets s->slack. */
+/* Checks the faces, sets the result's lower bound to the greatest distance of a vertex, and sets
+ * s->slack. */
 static ebpo_status begin_search(search *s, ebpo_error *error)
 {
     const ebpo_mesh *m = s->mesh;
@@ -264,19 +281,21 @@ static ebpo_status begin_search(search *s, ebpo_error *error)
             most = fmax(most, fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))));
             raise_lower_bound(s, fabs(s->distances[v]), p);
         }
-    s->slack = most * 0x1p-49 + 0x1p-1060;
+    s->slack = most * 0x1p-49 + 0x1p-1060; /* the second number covers subnormal numbers */
     return EBPO_OK;
 }
 
+/* Sets s->options to the caller's options, or to the defaults if `given` is NULL, and checks them.
+ */
 static ebpo_status check_hausdorff_options(search *s, const ebpo_map_hausdorff_options *given,
                                            ebpo_error *error)
 {
-    s->o = (ebpo_map_hausdorff_options)EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_map_hausdorff_options, &s->o, given, error);
-    if (status == EBPO_OK && !(s->o.tolerance > 0 && isfinite(s->o.tolerance)))
+    s->options = (ebpo_map_hausdorff_options)EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_map_hausdorff_options, &s->options, given, error);
+    if (status == EBPO_OK && !(s->options.tolerance > 0 && isfinite(s->options.tolerance)))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "expected a tolerance that is finite and above 0");
-    if (s->o.queries == 0)
-        s->o.queries = 16 * s->mesh->face_count;
+    if (s->options.queries == 0)
+        s->options.queries = 16 * s->mesh->face_count;
     return status;
 }
 
@@ -296,7 +315,7 @@ ebpo_status ebpo_map_bound_hausdorff(ebpo_model *model, const ebpo_mesh *mesh,
     if (status != EBPO_OK)
         return status;
     query_options.unsigned_distance = true;
-    query_options.threads = s.o.threads;
+    query_options.threads = s.options.threads;
     status = ebpo_map_queries_make(&s.queries, model, &query_options, error);
     if (status == EBPO_OK)
         status = search_all(&s, error);

@@ -40,7 +40,7 @@ ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_queries){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* fails for a model without distances before other memory is allocated */
+    /* the call for no points fails early if the model has no distances */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;
@@ -66,14 +66,16 @@ ebpo_status ebpo_map_query(ebpo_map_queries *queries, unsigned worker, const dou
 
 typedef struct points_job {
     ebpo_map_queries queries;
-    const double *points;
-    const uint64_t *order; /* order along the Morton curve; NULL: input order */
-    double *distances;
+    const double *points;  /* [3 * number of points] */
+    const uint64_t *order; /* indices of points in the order along the Morton curve, where
+                            * consecutive points are close to each other; NULL: input order */
+    double *distances;     /* [number of points] the result, in input order */
 } points_job;
 
 /* Returns the index, in the input, of the point that is evaluated at position i of the order. */
-static uint64_t place_of(const points_job *j, uint64_t i) { return j->order ? j->order[i] : i; }
+static uint64_t index_of(const points_job *j, uint64_t i) { return j->order ? j->order[i] : i; }
 
+/* Computes the distances of the points at positions begin .. end - 1 of the order. */
 static ebpo_status query_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -84,11 +86,11 @@ static ebpo_status query_piece(void *context, uint64_t begin, uint64_t end, unsi
     ebpo_status status =
         points && results ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *results);
     for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
-        memcpy(points[i], j->points + 3 * place_of(j, begin + i), sizeof points[i]);
+        memcpy(points[i], j->points + 3 * index_of(j, begin + i), sizeof points[i]);
     if (status == EBPO_OK)
         status = ebpo_map_query(&j->queries, worker, points[0], count, results, error);
     for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
-        j->distances[place_of(j, begin + i)] = results[i].distance;
+        j->distances[index_of(j, begin + i)] = results[i].distance;
     free(points);
     free(results);
     return status;
@@ -106,9 +108,11 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
     if (status != EBPO_OK)
         return status;
     ebpo_box box = ebpo_model_box(model);
+    /* A model that is wholly in memory loads no subtrees, so that the order does not matter. The
+     * order is also NULL if memory is short: the input order is slower, but gives the same results.
+     */
     uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
-    job.order = order; /* NULL if memory is short: the input order is slower, but gives the same
-                        * results */
+    job.order = order;
     status = ebpo_map_queries_make(&job.queries, model, &o, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(job.queries.threads, NULL, count, EBPO_MAP_PIECE, query_piece,
@@ -120,19 +124,21 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
 
 /* --- lattices --- */
 
-/* BRICK: number of points along a side of a brick. SLAB_VALUES: greatest number of values of a slab
- * that has more than one layer. */
-enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
-#define POINTS_MAX (UINT64_C(1) << 40)
+enum {
+    BRICK = 16,           /* number of points along a side of a brick; 16^3 = EBPO_MAP_PIECE */
+    SLAB_VALUES = 8 << 20 /* greatest number of values of a slab that has more than one layer */
+};
+#define POINTS_MAX (UINT64_C(1) << 40) /* greatest number of points of a lattice */
 
 typedef struct slab_job {
     ebpo_map_queries queries;
     const ebpo_lattice *lattice;
     uint64_t first, layers; /* first layer and number of layers of the slab */
-    uint64_t bricks[3];     /* number of bricks along each axis */
-    double *values;         /* [layers][count[1]][count[0]] */
+    uint64_t bricks[3];     /* number of bricks of the slab along each axis */
+    double *values;         /* [layers][count[1]][count[0]] distances of the slab's points */
 } slab_job;
 
+/* Computes the position of a point of the lattice from its indices along the axes. */
 static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, double out[3])
 {
     for (int c = 0; c < 3; c++)
@@ -144,6 +150,7 @@ typedef struct brick {
     uint64_t low[3], high[3]; /* on each axis, indices low .. high - 1 of points in the slab */
 } brick;
 
+/* Returns the brick of the slab with this number; numbers first count along axis 0. */
 static brick brick_of(const slab_job *j, uint64_t number)
 {
     const uint64_t size[3] = { j->lattice->count[0], j->lattice->count[1], j->layers };
@@ -156,6 +163,7 @@ static brick brick_of(const slab_job *j, uint64_t number)
     return b;
 }
 
+/* Computes the points of a brick, and returns their number. */
 static uint64_t fill_points(const slab_job *j, const brick *b, double (*points)[3])
 {
     uint64_t count = 0;
@@ -166,6 +174,7 @@ static uint64_t fill_points(const slab_job *j, const brick *b, double (*points)[
     return count;
 }
 
+/* Copies the distances of a brick's points, in the order of fill_points, to j->values. */
 static void keep_distances(const slab_job *j, const brick *b, const ebpo_distance_result *results)
 {
     const uint64_t *size = j->lattice->count;
@@ -175,6 +184,7 @@ static void keep_distances(const slab_job *j, const brick *b, const ebpo_distanc
                 j->values[(z * size[1] + y) * size[0] + x] = (results++)->distance;
 }
 
+/* Computes the distances of the points of bricks begin .. end - 1. */
 static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -195,7 +205,7 @@ static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, uns
     return status;
 }
 
-/* Checks the number of points, and that the lattice's corners are finite. Finite corners mean that
+/* Checks the number of points, and checks that the eight corners of the lattice are finite. Then
  * all points are finite, because each coordinate is monotonic in the three indices. */
 static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
 {
@@ -205,8 +215,7 @@ static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
     if (!ebpo_mul_ok(l->count[0], l->count[1], &points) ||
         !ebpo_mul_ok(points, l->count[2], &points) || points > POINTS_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the lattice has more than 2^40 points; use "
-                         "fewer");
+                         "the lattice has more than 2^40 points; use fewer points");
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         point_of(l, corner & 1 ? l->count[0] - 1 : 0, corner & 2 ? l->count[1] - 1 : 0,
@@ -226,12 +235,13 @@ static uint64_t layers_of_slab(const ebpo_lattice *l)
     return layers < l->count[2] ? layers : l->count[2];
 }
 
+/* Computes the distances of all points of the slab, with progress reports in points. */
 static ebpo_status map_slab(slab_job *j, const ebpo_map_options *o, ebpo_error *error)
 {
     const uint64_t size[3] = { j->lattice->count[0], j->lattice->count[1], j->layers };
-    uint64_t plane = size[0] * size[1], bricks = 1;
-    ebpo_pass pass = { &o->progress, j->first * plane, (j->first + j->layers) * plane,
-                       j->lattice->count[2] * plane };
+    uint64_t layer_points = size[0] * size[1], bricks = 1;
+    ebpo_pass pass = { &o->progress, j->first * layer_points, (j->first + j->layers) * layer_points,
+                       j->lattice->count[2] * layer_points };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     for (int c = 0; c < 3; c++) {
         j->bricks[c] = (size[c] + BRICK - 1) / BRICK;
@@ -253,10 +263,11 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
         status = check_lattice(lattice, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t plane = lattice->count[0] * lattice->count[1], most = layers_of_slab(lattice);
-    job.values = ebpo_alloc(most * plane, sizeof *job.values);
+    uint64_t most = layers_of_slab(lattice),
+             slab_values = most * lattice->count[0] * lattice->count[1];
+    job.values = ebpo_alloc(slab_values, sizeof *job.values);
     status = job.values ? ebpo_map_queries_make(&job.queries, model, &o, error)
-                        : ebpo_fail_memory(error, most * plane * sizeof *job.values);
+                        : ebpo_fail_memory(error, slab_values * sizeof *job.values);
     while (status == EBPO_OK && job.first < lattice->count[2]) {
         uint64_t remaining = lattice->count[2] - job.first;
         job.layers = remaining < most ? remaining : most;
@@ -276,11 +287,11 @@ ebpo_status ebpo_lattice_of_box(const double low[3], const double high[3], const
     EBPO_DEFAULT_FP;
     *out = (ebpo_lattice){ .count = { count[0], count[1], count[2] } };
     for (int c = 0; c < 3; c++) {
-        bool one = count[c] == 1;
+        bool one = count[c] == 1; /* then the point is in the middle of the box */
         if (!isfinite(low[c]) || !isfinite(high[c]) || !(low[c] < high[c]) ||
             !isfinite(high[c] - low[c]))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "a box needs a finite low corner below a finite high one");
+                             "a box needs a finite low corner below a finite high corner");
         out->origin[c] = one ? low[c] + (high[c] - low[c]) / 2 : low[c];
         out->step[c][c] =
             one ? high[c] - low[c] : (high[c] - low[c]) / (double)(count[c] ? count[c] - 1 : 1);

@@ -1,9 +1,9 @@
 /* Maps distances to colours, and adds distances with their colours as attributes of a mesh's
  * vertices.
  *
- * The diverging palette is computed in the colour space OKLab (B. Ottosson, 2020), whose lightness
- * agrees with perception. The matrices below define OKLab. The other palette is the palette of the
- * thesis EBP 2017.
+ * There are two palettes. The diverging palette is computed in the colour space OKLab (B. Ottosson,
+ * 2020), whose lightness agrees with perception; the matrices below define OKLab. The thesis
+ * palette is the palette of the thesis EBP 2017.
  *
  * Existing vertex attributes named distance, red, green or blue are replaced. */
 #include "core/strict_fp.h"
@@ -26,11 +26,13 @@ const char *ebpo_map_palette_name(ebpo_map_palette palette)
     return (unsigned)palette < EBPO_MAP_PALETTES ? palette_names[palette] : NULL;
 }
 
+/* Returns the byte for a share of the greatest intensity: 0 for 0, 255 for 1. */
 static uint8_t byte_of(double share)
 {
     return share <= 0 ? 0 : share >= 1 ? 255 : (uint8_t)(share * 255 + 0.5);
 }
 
+/* Returns the intensity in sRGB, which is not linear, for a linear intensity (IEC 61966-2-1). */
 static double srgb_of(double linear)
 {
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
@@ -56,9 +58,11 @@ static void rgb_of_oklab(double light, double a, double b, uint8_t rgb[3])
 }
 
 /* Computes a colour of the diverging palette. share: distance / range, -1 to 1. The hues are 255
- * and 50 degrees, which colour-blind readers can distinguish. */
+ * degrees inside and 50 degrees outside, which colour-blind readers can distinguish. Distance 0 is
+ * light grey, and colours are darker and stronger for greater distances. */
 static void palette_diverging(double share, uint8_t rgb[3])
 {
+    /* cosine and sine of the hues inside and outside */
     static const double cosine[2] = { -0.2588190451, 0.6427876097 },
                         sine[2] = { -0.9659258263, 0.7660444431 };
     double far = fabs(share), chroma = 0.12 * far * (2 - far), light = 0.93 - 0.48 * far;
@@ -66,8 +70,8 @@ static void palette_diverging(double share, uint8_t rgb[3])
     rgb_of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
 }
 
-/* Computes a colour of the thesis' palette: from red at distance 0 over yellow, green and cyan to
- * blue at the range. */
+/* Computes a colour of the thesis palette: from red close to distance 0 over yellow, green and cyan
+ * to blue at the range. Distance 0 is black. */
 static void palette_thesis(double share, uint8_t rgb[3])
 {
     double far = fabs(share), hue = 4 * far; /* 0 red, 1 yellow, 2 green, 3 cyan, 4 blue */
@@ -87,7 +91,7 @@ void ebpo_map_colour(ebpo_map_palette palette, double distance, double range, ui
     if (!isfinite(distance) || !(range > 0))
         return;
     double share = fmax(-1, fmin(1, distance / range));
-    if (share == 0 && distance != 0)
+    if (share == 0 && distance != 0) /* the quotient underflows, but this is not distance 0 */
         share = copysign(0x1p-1022, distance);
     if (palette == EBPO_MAP_THESIS)
         palette_thesis(share, rgb);
@@ -97,6 +101,7 @@ void ebpo_map_colour(ebpo_map_palette palette, double distance, double range, ui
 
 /* --- attributes --- */
 
+/* Returns true if `names`, whose words are separated by spaces, contains `name`. */
 static bool has_name(const char *names, const char *name)
 {
     size_t length = strlen(name);
@@ -109,7 +114,7 @@ static bool has_name(const char *names, const char *name)
     return false;
 }
 
-/* Returns true if a is an attribute of vertices that the new attributes replace. */
+/* Returns true if the new attributes replace a. */
 static bool is_replaced(const ebpo_attribute *a)
 {
     static const char *const names[] = { "distance", "red", "green", "blue" };
@@ -119,7 +124,7 @@ static bool is_replaced(const ebpo_attribute *a)
     return false;
 }
 
-/* Adds an attribute of all vertices; returns NULL without memory. */
+/* Adds an attribute of all vertices, and returns it; returns NULL if memory is short. */
 static ebpo_attribute *add_attribute(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
                                      uint32_t columns)
 {
@@ -150,14 +155,15 @@ ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_pa
             ebpo_attributes_remove(mesh->attributes, i);
     if (mesh->attributes && mesh->attributes->count > EBPO_ATTRIBUTE_ARRAYS - 2)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the mesh has too many attributes to add more; omit some");
+                         "the mesh has too many attributes to add two more; omit some of them");
     ebpo_attribute *colour =
         mesh->attributes ? add_attribute(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3) : NULL;
-    uint8_t *rgb = colour ? colour->values : NULL; /* adding another attribute moves *colour */
+    /* The address of the values is taken now, because the next call can move the attribute. */
+    uint8_t *rgb = colour ? colour->values : NULL;
     ebpo_attribute *distance =
         colour ? add_attribute(mesh, "distance", EBPO_ATTRIBUTE_FLOAT64, 1) : NULL;
     if (!distance)
-        return ebpo_fail_memory(error, mesh->vertex_count * 11);
+        return ebpo_fail_memory(error, mesh->vertex_count * (3 + sizeof *distances));
     memcpy(distance->values, distances, mesh->vertex_count * sizeof *distances);
     for (uint64_t i = 0; i < mesh->vertex_count; i++)
         ebpo_map_colour(palette, distances[i], range, rgb + 3 * i);

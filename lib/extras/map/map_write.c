@@ -6,8 +6,8 @@
  *
  * A lattice is written layer by layer, as NRRD (teem, "Definition of NRRD File Format") or as a
  * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). Each format has a function that
- * begins the file and one that writes layers; VTKHDF also has one that ends it. The file is
- * replaced atomically. */
+ * begins the file and a function that writes layers; VTKHDF also has a function that ends the file.
+ * The file is written under a temporary name first, and replaces an older file atomically. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -26,13 +26,18 @@
 #include "io/publish.h"
 #include "mesh/sum.h"
 
+/* The values are divided by their sizes into three bins of small, ordinary and large values, whose
+ * limits are 2^-400 and 2^400 (see add_to). The unit of values in bin i is 2^(MAP_BIN_UNIT (i -
+ * 1)). In this unit, all values are between 2^-474 and 2^424, so that their squares are normal
+ * numbers.
+ */
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
 /* The state of statistics while values are added. Percentiles are computed separately. */
 typedef struct map_sums {
     ebpo_map_stats stats; /* only counts, min and max are set */
-    /* Sums of small, ordinary and large values: the unit of bin i is 2^(MAP_BIN_UNIT (i - 1)). The
-     * unit of sums of squares is the square of that. */
+    /* Sums of the values in each bin, of their absolute values, and of their squares. The unit of
+     * sums of squares is the square of the bin's unit. */
     ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
 } map_sums;
 
@@ -41,11 +46,12 @@ typedef struct map_file {
     const ebpo_lattice *lattice;
     const char *shown; /* name of the file for messages */
     const char *path;  /* for VTKHDF: name of the temporary file */
-    FILE *stream;      /* for NRRD */
-    ebpo_h5_out out;   /* for VTKHDF */
-    ebpo_h5_id values; /* for VTKHDF: the dataset of distances */
+    FILE *stream;      /* for NRRD: the temporary file; NULL: not open */
+    ebpo_h5_out out;   /* for VTKHDF: the temporary file */
+    ebpo_h5_id values; /* for VTKHDF: the dataset of distances; -1: not open */
 } map_file;
 
+/* The percentiles of the statistics, in percent. */
 static const double percents[EBPO_MAP_PERCENTILES] = { 1, 5, 25, 50, 75, 95, 99 };
 
 double ebpo_map_percent(int index)
@@ -55,7 +61,7 @@ double ebpo_map_percent(int index)
 
 /* --- sums --- */
 
-/* Returns new sums, which free() frees; NULL without memory. */
+/* Returns new sums, which free() frees; NULL if memory is short. */
 static map_sums *map_sums_new(void)
 {
     map_sums *s = ebpo_alloc_zero(1, sizeof *s);
@@ -64,7 +70,8 @@ static map_sums *map_sums_new(void)
     return s;
 }
 
-/* Adds a value, or its square, to the bin for its absolute value, in the unit of this bin. */
+/* Adds a value to the bin for its absolute value, in the unit of this bin. square: adds the square
+ * of the value. */
 static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
@@ -73,7 +80,7 @@ static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
     ebpo_sum_add(&bins[bin], square ? scaled * scaled : scaled);
 }
 
-/* Returns the sum of all bins divided by `count`, in units of 2^unit. square: the bins have sums of
+/* Returns the sum of all bins divided by `count`, in the unit 2^unit. square: the bins have sums of
  * squares. */
 static double mean_of(const ebpo_sum bins[MAP_BINS], bool square, uint64_t count, int unit)
 {
@@ -84,6 +91,7 @@ static double mean_of(const ebpo_sum bins[MAP_BINS], bool square, uint64_t count
     return sum;
 }
 
+/* Adds values; a value that is not finite is only counted. */
 static void map_sums_add(map_sums *s, const double *values, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
@@ -103,7 +111,8 @@ static void map_sums_add(map_sums *s, const double *values, uint64_t count)
     }
 }
 
-/* Returns the statistics if no value is finite: counts, and NAN for all other members. */
+/* Returns the statistics if no value is finite: counts, and NAN in all members that are distances.
+ */
 static ebpo_map_stats stats_of_nothing(const ebpo_map_stats *s)
 {
     ebpo_map_stats out = *s;
@@ -112,7 +121,7 @@ static ebpo_map_stats stats_of_nothing(const ebpo_map_stats *s)
     return out;
 }
 
-/* Returns the statistics, except percentiles, of the values that have been added. */
+/* Returns the statistics of the values that have been added; percentiles are NAN. */
 static ebpo_map_stats map_sums_stats(const map_sums *s)
 {
     ebpo_map_stats out = s->stats.count ? s->stats : stats_of_nothing(&s->stats);
@@ -120,7 +129,7 @@ static ebpo_map_stats map_sums_stats(const map_sums *s)
         out.percentile[i] = out.percentile_unsigned[i] = NAN;
     if (!out.count)
         return out;
-    int unit;
+    int unit; /* means are computed in the unit 2^unit, where no value is above 1 */
     out.farthest = fmax(fabs(out.min), fabs(out.max));
     frexp(out.farthest, &unit);
     double mean = mean_of(s->sum, false, out.count, unit),
@@ -134,37 +143,40 @@ static ebpo_map_stats map_sums_stats(const map_sums *s)
 
 /* --- percentiles --- */
 
+/* Compares two values for qsort. */
 static int compare_values(const void *x, const void *y)
 {
     const double a = *(const double *)x, b = *(const double *)y;
     return (a > b) - (a < b);
 }
 
-/* Sorts values and computes their percentiles. */
-static void pick_percentiles(double *sorted, uint64_t count, double out[EBPO_MAP_PERCENTILES])
+/* Sorts values and computes their percentiles: the p-th percentile is the smallest value that at
+ * least p percent of the values do not exceed. */
+static void pick_percentiles(double *values, uint64_t count, double out[EBPO_MAP_PERCENTILES])
 {
-    qsort(sorted, count, sizeof *sorted, compare_values);
+    qsort(values, count, sizeof *values, compare_values);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++) {
         double rank = ceil(percents[i] / 100 * (double)count);
-        out[i] = sorted[rank < 1 ? 0 : (uint64_t)rank - 1];
+        out[i] = values[rank < 1 ? 0 : (uint64_t)rank - 1];
     }
 }
 
+/* Computes the percentiles of the finite values, whose number is out->count. */
 static ebpo_status add_percentiles(const double *values, uint64_t count, ebpo_map_stats *out,
                                    ebpo_error *error)
 {
-    double *sorted = ebpo_alloc(out->count, sizeof *sorted);
+    double *finite = ebpo_alloc(out->count, sizeof *finite);
     uint64_t n = 0;
-    if (!sorted)
-        return ebpo_fail_memory(error, out->count * sizeof *sorted);
+    if (!finite)
+        return ebpo_fail_memory(error, out->count * sizeof *finite);
     for (uint64_t i = 0; i < count; i++)
         if (isfinite(values[i]))
-            sorted[n++] = values[i];
-    pick_percentiles(sorted, n, out->percentile);
+            finite[n++] = values[i];
+    pick_percentiles(finite, n, out->percentile);
     for (uint64_t i = 0; i < n; i++)
-        sorted[i] = fabs(sorted[i]);
-    pick_percentiles(sorted, n, out->percentile_unsigned);
-    free(sorted);
+        finite[i] = fabs(finite[i]);
+    pick_percentiles(finite, n, out->percentile_unsigned);
+    free(finite);
     return EBPO_OK;
 }
 
@@ -190,6 +202,7 @@ ebpo_status ebpo_map_describe(const double *values, uint64_t count, ebpo_map_sta
 
 /* --- NRRD: a header of text and raw numbers --- */
 
+/* Writes a vector in the notation of NRRD. */
 static void put_vector(FILE *to, const double v[3])
 {
     fprintf(to, " (%.17g,%.17g,%.17g)", v[0], v[1], v[2]);
@@ -214,15 +227,17 @@ static ebpo_status map_nrrd_begin(map_file *f, ebpo_error *error)
     return ferror(to) ? ebpo_fail_errno(error, f->shown, "writing the header") : EBPO_OK;
 }
 
+/* Writes the next layers to an NRRD file, as little-endian numbers. */
 static ebpo_status map_nrrd_layers(map_file *f, const double *values, uint64_t first,
                                    uint64_t layers, ebpo_error *error)
 {
+    enum { BUFFER_VALUES = 512 };
     uint64_t count = layers * f->lattice->count[0] * f->lattice->count[1];
-    (void)first; /* layers come in order */
+    (void)first; /* the layers follow those that have been written */
     for (uint64_t i = 0; i < count;) {
-        uint8_t bytes[8 * 512];
+        uint8_t bytes[8 * BUFFER_VALUES];
         unsigned n = 0;
-        for (; n < 512 && i < count; n++, i++) {
+        for (; n < BUFFER_VALUES && i < count; n++, i++) {
             uint64_t bits;
             memcpy(&bits, &values[i], sizeof bits);
             ebpo_store64(bytes + 8 * n, bits);
@@ -237,6 +252,7 @@ static ebpo_status map_nrrd_layers(map_file *f, const double *values, uint64_t f
 
 static const char values_path[] = "/VTKHDF/PointData/distance";
 
+/* Returns the length of a vector, without overflow or underflow of squares. */
 static double length_of(const double v[3])
 {
     double most = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -262,7 +278,7 @@ static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double di
     }
     for (int i = 0; i < 3; i++) {
         const double *a = axis[i], *b = axis[(i + 1) % 3];
-        if (fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > 1e-9)
+        if (fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > 1e-9) /* the cosine of the angle */
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "VTKHDF needs steps at right angles; write NRRD");
         for (int c = 0; c < 3; c++)
@@ -271,7 +287,7 @@ static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double di
     return EBPO_OK;
 }
 
-/* Writes the attributes of an image. */
+/* Writes the attributes of an image to the group `id`. */
 static ebpo_status put_image_attributes(map_file *f, ebpo_h5_id id, ebpo_error *error)
 {
     static const int64_t version[2] = { 1, 0 };
@@ -295,6 +311,7 @@ static ebpo_status put_image_attributes(map_file *f, ebpo_h5_id id, ebpo_error *
     return status;
 }
 
+/* Makes a group. with_attributes: writes the attributes of the image to the group. */
 static ebpo_status put_group(map_file *f, const char *path, bool with_attributes, ebpo_error *error)
 {
     ebpo_h5_id id = -1;
@@ -305,12 +322,14 @@ static ebpo_status put_group(map_file *f, const char *path, bool with_attributes
     return status;
 }
 
+/* Gets the lattice's dimensions in the order of a dataset in HDF5: the slowest axis (2) first. */
 static void dims_of(const ebpo_lattice *l, uint64_t dims[3])
 {
     for (int i = 0; i < 3; i++)
         dims[i] = l->count[2 - i];
 }
 
+/* Begins a VTKHDF file: writes the groups and makes the dataset of distances. */
 static ebpo_status map_vtkhdf_begin(map_file *f, ebpo_error *error)
 {
     uint64_t dims[3];
@@ -325,6 +344,7 @@ static ebpo_status map_vtkhdf_begin(map_file *f, ebpo_error *error)
     return status;
 }
 
+/* Writes layers to the dataset of distances. */
 static ebpo_status map_vtkhdf_layers(map_file *f, const double *values, uint64_t first,
                                      uint64_t layers, ebpo_error *error)
 {
@@ -333,6 +353,7 @@ static ebpo_status map_vtkhdf_layers(map_file *f, const double *values, uint64_t
     return ebpo_h5_put_layers(&f->out, values_path, f->values, dims, first, layers, values, error);
 }
 
+/* Closes the dataset and the file. */
 static ebpo_status map_vtkhdf_end(map_file *f, ebpo_error *error)
 {
     ebpo_h5_close_id(&f->out, f->values);
@@ -345,9 +366,10 @@ static ebpo_status map_vtkhdf_end(map_file *f, ebpo_error *error)
 typedef struct writing {
     map_file file;
     ebpo_map_format format;
-    map_sums *sums;
+    map_sums *sums; /* sums of the values that have been written, for the statistics */
 } writing;
 
+/* Writes layers whose distances ebpo_map_lattice has computed, and adds them to the statistics. */
 static ebpo_status receive_layers(void *user, const double *values, uint64_t first, uint64_t layers,
                                   ebpo_error *error)
 {
@@ -358,6 +380,7 @@ static ebpo_status receive_layers(void *user, const double *values, uint64_t fir
                                       : map_vtkhdf_layers(&w->file, values, first, layers, error);
 }
 
+/* Begins the temporary file in the chosen format. */
 static ebpo_status write_begin(writing *w, ebpo_publish *publish, ebpo_error *error)
 {
     w->file.shown = publish->shown;
