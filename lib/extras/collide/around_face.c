@@ -1,12 +1,12 @@
 /* Finds which sides of a posed face are in the interior of each of two models. The face belongs to
- * one of these models, and is cut into pieces along the faces of both models that intersect it
+ * one of these models. All faces of both models that intersect the face cut it into pieces
  * (face_pieces.h). At a point of each piece, the winding numbers of both models show which sides of
  * the piece are in each model.
  *
  * All decisions are exact: coordinates of points are fractions, and posed coordinates are the
- * doubles that geometry/pose.h defines. Only the faces near a point are read from the models'
- * hierarchies, so a model may be loaded subtree by subtree. Proofs: docs/develop/collision.md,
- * "Relation of two models". */
+ * doubles that geometry/pose.h defines. Only faces close to a point or face are read from the
+ * models' hierarchies, so a model may be loaded subtree by subtree. Proofs:
+ * docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include "extras/collide/around_face.h"
@@ -28,9 +28,9 @@ ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *lookup,
     ebpo_status status = EBPO_OK;
     *two = (ebpo_two_models){ 0 };
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        int caller = (int)q->swapped ^ i;
-        const ebpo_pose *pose = caller ? &q->options.pose_b : &q->options.pose_a;
-        two->faces[i] = &lookup->side[caller];
+        int callers = (int)q->swapped ^ i; /* index of the query's model i in the caller's order */
+        const ebpo_pose *pose = callers ? &q->options.pose_b : &q->options.pose_a;
+        two->faces[i] = &lookup->side[callers];
         two->solid[i] = q->model[i]->info->solid;
         two->rule[i] = q->model[i]->info->rule;
         status = ebpo_posed_solid_make(&two->model[i], q->model[i], pose, error);
@@ -75,18 +75,18 @@ ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t fac
 
 /* --- faces that intersect a face --- */
 
-/* The cutting of a face by other faces. */
+/* The search for the faces that cut a face. */
 typedef struct cut_search {
     const ebpo_two_models *two;
-    ebpo_face_cuts *pieces;
+    ebpo_face_cuts *pieces; /* receives the cuts */
     double low[3], high[3]; /* box of the cut face */
-    int model;              /* model whose faces are visited */
+    int model;              /* index of the model whose faces are visited */
     uint64_t cut_index;     /* index of the cut face, which does not cut itself; EBPO_NO_FACE: the
                              * cut face belongs to the other model */
 } cut_search;
 
 /* Returns true if the box of the face t intersects the box of the cut face. */
-static bool near_box(const cut_search *c, const double t[3][3])
+static bool boxes_intersect(const cut_search *c, const double t[3][3])
 {
     for (int k = 0; k < 3; k++)
         if (ebpo_max3(t[0][k], t[1][k], t[2][k]) < c->low[k] ||
@@ -95,7 +95,8 @@ static bool near_box(const cut_search *c, const double t[3][3])
     return true;
 }
 
-/* Adds the cuts of those triangles whose boxes intersect the box of the cut face. */
+/* Adds the cuts of those triangles whose boxes intersect the box of the cut face. Returns true, so
+ * that all triangles are visited. */
 static bool add_cuts(void *user, const ebpo_triangles *triangles)
 {
     const cut_search *c = user;
@@ -105,7 +106,7 @@ static bool add_cuts(void *user, const ebpo_triangles *triangles)
             continue;
         for (int k = 0; k < 3; k++)
             ebpo_posing_apply(&c->two->model[c->model].posing, triangles->corners[i][k], t[k]);
-        if (near_box(c, (const double(*)[3])t))
+        if (boxes_intersect(c, (const double(*)[3])t))
             ebpo_face_cuts_add(c->pieces, (const double(*)[3])t, c->model);
     }
     return true;
@@ -136,15 +137,15 @@ static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m,
 /* A visit of all pieces of a face. */
 typedef struct piece_visit {
     ebpo_two_models *two;
-    const ebpo_face_cuts *pieces;
-    int m; /* model of the face */
-    ebpo_around_fn visit;
+    const ebpo_face_cuts *pieces; /* the cuts of the face */
+    int m;                        /* index of the model to which the face belongs */
+    ebpo_around_fn visit;         /* the function that is called for each piece, and its argument */
     void *user;
     bool only_at_target; /* visit only pieces that contain the target of `pieces` */
 } piece_visit;
 
-/* Returns true if a point of the face, shifted as in ebpo_exact_winding, is in front of the face.
- */
+/* ebpo_exact_winding shifts a point by an infinitesimal vector. Returns true if this vector leads
+ * from a point of the face to the front of the face. */
 static bool shift_is_front(const ebpo_face_cuts *f)
 {
     int sign = 0;
@@ -153,43 +154,45 @@ static bool shift_is_front(const ebpo_face_cuts *f)
     return sign > 0;
 }
 
-/* Sets *in to the sides of a piece that are in the interior of solid i. */
-static ebpo_status sides_of_solid(const piece_visit *l, const ebpo_piece *piece, int i,
+/* Sets *in to the sides of a piece that are in the interior of solid i. The winding numbers behind
+ * the piece and in front of it differ by `jump`, to which the face itself contributes 1. */
+static ebpo_status sides_of_solid(const piece_visit *v, const ebpo_piece *piece, int i,
                                   unsigned *in, ebpo_error *error)
 {
-    ebpo_two_models *two = l->two;
-    int32_t winding, jump = piece->jump[i] + (i == l->m);
+    ebpo_two_models *two = v->two;
+    int32_t winding, jump = piece->jump[i] + (i == v->m);
     ebpo_status status =
         ebpo_exact_winding(&two->model[i], two->context[i], piece->x, &winding, error);
-    int32_t front = shift_is_front(l->pieces) ? winding : winding - jump;
+    int32_t front = shift_is_front(v->pieces) ? winding : winding - jump;
     *in = (ebpo_rule_inside(two->rule[i], front) ? EBPO_SIDE_FRONT : 0u) |
           (ebpo_rule_inside(two->rule[i], front + jump) ? EBPO_SIDE_BACK : 0u);
     return status;
 }
 
+/* Finds which sides of a piece are in each model, and calls the function v->visit. Returns
+ * EBPO_E_CANCELLED if this function returns false, because it needs no more pieces. */
 static ebpo_status visit_around_piece(void *user, const ebpo_piece *piece, ebpo_error *error)
 {
-    const piece_visit *l = user;
+    const piece_visit *v = user;
     ebpo_around around;
     ebpo_status status = EBPO_OK;
-    if (l->only_at_target && !piece->at_target)
+    if (v->only_at_target && !piece->at_target)
         return EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        if (l->two->solid[i])
-            status = sides_of_solid(l, piece, i, &around.in[i], error);
+        if (v->two->solid[i])
+            status = sides_of_solid(v, piece, i, &around.in[i], error);
         else
-            around.in[i] = piece->covered[i] || i == l->m ? EBPO_SIDE_BOTH : 0;
+            around.in[i] = piece->covered[i] || i == v->m ? EBPO_SIDE_BOTH : 0;
     }
-    if (status == EBPO_OK && !l->visit(l->user, &around))
+    if (status == EBPO_OK && !v->visit(v->user, &around))
         return EBPO_E_CANCELLED;
     return status;
 }
 
-/* Visits the pieces. visit_around_piece returns EBPO_E_CANCELLED if the visitor needs no more
- * pieces, which is not a failure. */
-static ebpo_status visit_pieces(piece_visit *l, ebpo_face_cuts *pieces, ebpo_error *error)
+/* Visits the pieces. EBPO_E_CANCELLED ends the visit early, which is not a failure. */
+static ebpo_status visit_pieces(piece_visit *v, ebpo_face_cuts *pieces, ebpo_error *error)
 {
-    ebpo_status status = ebpo_face_pieces_visit(pieces, visit_around_piece, l, error);
+    ebpo_status status = ebpo_face_pieces_visit(pieces, visit_around_piece, v, error);
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 
@@ -203,19 +206,20 @@ ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face, e
         return status;
     ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, false);
     status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
-    piece_visit l = { two, &two->pieces, m, visit, user, false };
-    return status == EBPO_OK ? visit_pieces(&l, &two->pieces, error) : status;
+    piece_visit v = { two, &two->pieces, m, visit, user, false };
+    return status == EBPO_OK ? visit_pieces(&v, &two->pieces, error) : status;
 }
 
 /* --- points of the models with their boundaries --- */
 
-/* Faces of a model near a point, by their indices in the file. */
+/* Faces of a model whose boxes may contain a point. */
 typedef struct faces_at {
-    uint64_t *face;
+    uint64_t *face; /* [count] indices of the faces in the file */
     uint64_t count, capacity;
-    bool no_memory;
+    bool no_memory; /* an allocation has failed */
 } faces_at;
 
+/* Adds the indices of triangles. Returns false if memory is short. */
 static bool record_faces(void *user, const ebpo_triangles *triangles)
 {
     faces_at *n = user;
@@ -241,61 +245,65 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
     return status;
 }
 
-/* The query if model m contains a point, by the faces at this point. */
+/* The query if model m contains a point, by the faces of model m that contain the point. */
 typedef struct face_query {
     ebpo_two_models *two;
     int m;
-    bool in; /* the model contains the point: at it, a side of a piece is in the model */
+    bool in; /* the model contains the point: a side of a piece that has the point is in the model
+              */
     bool on; /* a face with an area contains the point */
 } face_query;
 
+/* Sets q->in if a side of a piece is in model m. Returns false then, because further pieces cannot
+ * change the result. */
 static bool record_side(void *user, const ebpo_around *around)
 {
-    face_query *a = user;
-    a->in = around->in[a->m] != 0;
-    return !a->in;
+    face_query *q = user;
+    q->in = around->in[q->m] != 0;
+    return !q->in;
 }
 
-/* Examines a face that may contain the point x. Sets a->on if the face contains the point, and
- * a->in if, in addition, a side of the face at this point is in the model. */
-static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
+/* Examines a face that may contain the point x. Sets q->on if the face contains the point, and
+ * q->in if, in addition, a side of the face at this point is in the model. */
+static ebpo_status query_face(face_query *q, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];
     bool has_area;
-    ebpo_two_models *two = a->two;
-    ebpo_status status = ebpo_two_models_face(two, a->m, face, t, &has_area, error);
+    ebpo_two_models *two = q->two;
+    ebpo_status status = ebpo_two_models_face(two, q->m, face, t, &has_area, error);
     if (status != EBPO_OK || !has_area)
         return status;
     ebpo_face_cuts_begin(&two->others, (const double(*)[3])t, true);
     if (!ebpo_face_cuts_target(&two->others, x))
         return EBPO_OK;
-    a->on = true;
-    a->in = !two->solid[a->m];
-    if (!a->in)
-        status = cut_face(two, &two->others, a->m, face, (const double(*)[3])t, error);
-    piece_visit l = { two, &two->others, a->m, record_side, a, true };
-    return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
+    q->on = true;
+    q->in = !two->solid[q->m]; /* a surface contains all points of its faces */
+    if (!q->in)
+        status = cut_face(two, &two->others, q->m, face, (const double(*)[3])t, error);
+    piece_visit v = { two, &two->others, q->m, record_side, q, true };
+    return status == EBPO_OK && !q->in ? visit_pieces(&v, &two->others, error) : status;
 }
 
-/* Sets *has to true if model m with its boundary contains the point x. */
+/* Sets *has to true if model m or its boundary contains the point x. */
 static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool *has,
                              ebpo_error *error)
 {
-    face_query a = { .two = two, .m = m };
-    faces_at near = { 0 };
+    face_query q = { .two = two, .m = m };
+    faces_at faces = { 0 };
     int32_t winding = 0;
-    ebpo_status status = find_faces(two, m, x, &near, error);
-    for (uint64_t i = 0; i < near.count && status == EBPO_OK && !a.in; i++)
-        status = query_face(&a, near.face[i], x, error);
-    free(near.face);
-    if (status == EBPO_OK && !a.on && two->solid[m]) {
+    ebpo_status status = find_faces(two, m, x, &faces, error);
+    for (uint64_t i = 0; i < faces.count && status == EBPO_OK && !q.in; i++)
+        status = query_face(&q, faces.face[i], x, error);
+    free(faces.face);
+    if (status == EBPO_OK && !q.on && two->solid[m]) {
         status = ebpo_exact_winding(&two->model[m], two->context[m], x, &winding, error);
-        a.in = ebpo_rule_inside(two->rule[m], winding);
+        q.in = ebpo_rule_inside(two->rule[m], winding);
     }
-    *has = a.in;
+    *has = q.in;
     return status;
 }
 
+/* The search for a vertex of a face's pieces that both models contain. */
 typedef struct common_point_search {
     ebpo_two_models *two;
     bool *has; /* output: both models contain a visited vertex */

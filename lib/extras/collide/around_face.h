@@ -1,6 +1,6 @@
 /* Finds, exactly, which sides of a posed face are in the interior of each of two models. Other
- * faces cut the face into pieces (face_pieces.h), and each piece has separate results. For one
- * thread at a time. */
+ * faces cut the face into pieces (face_pieces.h), and each piece has separate results. An
+ * ebpo_two_models may be used by one thread at a time. */
 #ifndef EBPO_COLLIDE_AROUND_FACE_H
 #define EBPO_COLLIDE_AROUND_FACE_H
 
@@ -11,22 +11,24 @@
 /* Both models of a query, in the query's order. */
 typedef struct ebpo_two_models {
     ebpo_posed_solid model[2];
-    ebpo_context *context[2];
-    ebpo_faces_by_number *faces[2];
-    bool solid[2];         /* false: the model is a surface, which has no interior */
-    ebpo_rule rule[2];     /* which winding numbers are inside the solid */
-    ebpo_face_cuts pieces; /* cuts of the examined face */
-    ebpo_face_cuts others; /* cuts of other faces, around a vertex of the examined face */
+    ebpo_context *context[2];       /* contexts for queries of the models */
+    ebpo_faces_by_number *faces[2]; /* the look-up of single faces */
+    bool solid[2];                  /* false: the model is a surface, which has no interior */
+    ebpo_rule rule[2];              /* which winding numbers are inside the solid */
+    ebpo_face_cuts pieces;          /* cuts of the examined face */
+    ebpo_face_cuts others;          /* cuts of another face, which contains a vertex of the examined
+                                     * face's pieces */
 } ebpo_two_models;
 
-/* Prepares both models of the query lookup->collision. `lookup` must live longer than `two`, which
- * reads faces through it. Fails with the errors of ebpo_posed_solid_make and ebpo_context_new. */
+/* Prepares both models of the query lookup->collision. `two` reads faces through `lookup`, which
+ * must live longer. Fails with the errors of ebpo_posed_solid_make and ebpo_context_new. */
 EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *lookup,
                                                 ebpo_error *error);
 /* Releases the memory of subtrees until the next query. */
 void ebpo_two_models_let_go(ebpo_two_models *two);
 /* Returns the number of subtrees that `two` has loaded. */
 uint64_t ebpo_two_models_loads(const ebpo_two_models *two);
+/* Frees the members of `two`; a zero struct is allowed. */
 void ebpo_two_models_end(ebpo_two_models *two);
 
 /* Sides of a face: its normal points to the front. */

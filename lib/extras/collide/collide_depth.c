@@ -1,13 +1,14 @@
-/* Computes how deep the surface of one model is in the solid of another: the greatest distance from
- * a point of the surface inside the solid to the boundary of the solid.
+/* Computes how deep the surface of one model is in another model, which is a solid. The depth of a
+ * point inside the solid is its distance from the solid's boundary, and the depth of the surface is
+ * the greatest depth of its points inside the solid.
  *
  * A branch-and-bound search visits the cells of the surface's octree, then faces and parts of
  * faces. A ball encloses each cell, face or part; the distance of the ball's centre from the
  * solid's boundary bounds the depth of all points in the ball. A heap returns the part that may be
- * deepest. The search ends when no part can be deeper than the best point plus the tolerance, or at
- * the deadline; lo and hi then bound the depth. The order of the search does not depend on which
- * subtrees are in memory. A search runs in one thread. Bounds: docs/develop/collision.md, "Depth".
- */
+ * deepest. The search ends at the deadline, or when no part can be deeper than the best point by
+ * more than the tolerance; lo and hi then bound the depth. The order of the search does not depend
+ * on which subtrees are in memory. A search runs in one thread. Bounds: docs/develop/collision.md,
+ * "Depth". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,30 +32,31 @@
 
 /* --- the search: balls, faces and parts of faces --- */
 
-/* A triangle that is a part of a face. */
+/* A triangle that is a face or a part of a face. */
 typedef struct depth_part {
-    double most;         /* upper bound of the depth of its points */
+    double most;         /* upper bound of the depth of the part's points */
     double corner[3][3]; /* in world coordinates */
 } depth_part;
 
 typedef struct depth_search {
     /* Input: */
-    ebpo_context *from; /* context of the surface's model */
-    const ebpo_posing *posing;
+    ebpo_context *surface_context; /* context of the surface's model */
+    const ebpo_posing *posing;     /* posing of the surface's model */
     double
         max_coordinate; /* upper bound of the absolute values of the surface's posed coordinates */
     const ebpo_posed_solid *solid;
-    ebpo_context *context; /* separate context of the solid's model */
-    double tolerance;
-    uint64_t deadline; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
+    ebpo_context *solid_context; /* context of the solid's model */
+    double tolerance;            /* greatest allowed difference of hi and lo */
+    uint64_t deadline;           /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= depth <= hi. */
     double lo, hi;
     /* Initially 0: */
-    double dropped_max;    /* greatest `most` of the dropped parts */
+    double dropped_max; /* greatest `most` of the parts and cells that are not searched further */
     double position_error; /* greatest distance by which rounding moves points */
     depth_part *part;      /* [count] a heap; part[0] has the greatest `most` */
-    uint64_t count, capacity, evaluations;
+    uint64_t count, capacity;
+    uint64_t evaluations; /* number of points whose depth was computed */
 } depth_search;
 
 /* A ball that contains a part of the surface. */
@@ -79,31 +81,32 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     ebpo_unpose(s->solid, w, p, &uncertainty);
     *rounding = uncertainty * scale;
     s->evaluations++;
-    ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
+    ebpo_status status = ebpo_distance(s->solid_context, p, NULL, &r, error);
     if (status != EBPO_OK)
         return status;
-    double size = fabs(r.distance), off = 2 * uncertainty + 0x1p-50 * size;
-    *hi = (size + off) * scale;
+    double size = fabs(r.distance), error_bound = 2 * uncertainty + 0x1p-50 * size;
+    *hi = (size + error_bound) * scale;
     *lo = -*hi;
-    if (!(size > off)) /* the rounded point may be on either side of a face */
+    if (!(size > error_bound)) /* the rounded point may be on either side of a face */
         return EBPO_OK;
     if (r.distance < 0)
-        *lo = (size - off) * scale;
+        *lo = (size - error_bound) * scale;
     else
-        *hi = (off - size) * scale;
+        *hi = (error_bound - size) * scale;
     return EBPO_OK;
 }
 
 /* Returns an upper bound of the depth of a triangle's points: their greatest distance from the face
- * that was nearest to the last query point. No point inside the solid is deeper than its distance
- * from any face of the solid. The distance is convex, so it is greatest at a corner. */
+ * that was nearest to the last query point. This distance bounds the depth, because a point inside
+ * the solid is not deeper than its distance from any face of the solid. The distance from a face is
+ * a convex function, so it is greatest at a corner of the triangle. */
 static double max_at_corners(const depth_search *s, const double corner[3][3])
 {
     double most = 0, p[3], uncertainty;
     for (int i = 0; i < 3; i++) {
         ebpo_distance_bounds d;
         ebpo_unpose(s->solid, corner[i], p, &uncertainty);
-        ebpo_triangle_distance_bounds(p, (const double(*)[3])s->context->warm_triangle, &d);
+        ebpo_triangle_distance_bounds(p, (const double(*)[3])s->solid_context->warm_triangle, &d);
         most = fmax(most, (d.hi + 2 * uncertainty) * s->solid->posing.scale + s->position_error);
     }
     return most * (1 + 0x1p-50);
@@ -115,6 +118,7 @@ static bool is_deeper(const depth_part *a, const depth_part *b) { return a->most
 
 EBPO_HEAP(heap, depth_part, is_deeper)
 
+/* Adds a part to the heap. Returns false if memory is short. */
 static bool push_part(depth_search *s, const depth_part *part)
 {
     if (!ebpo_grow(&s->part, &s->capacity, s->count + 1, sizeof *s->part))
@@ -125,14 +129,16 @@ static bool push_part(depth_search *s, const depth_part *part)
 
 /* --- parts --- */
 
+/* Returns true if the deadline has passed. */
 static bool is_search_late(const depth_search *s)
 {
     return s->deadline != UINT64_MAX && ebpo_clock() >= s->deadline;
 }
 
-/* Returns true if a part with the bound `most` need not be divided, and records the bound. A part
- * whose depth is uncertain only because of rounding is not divided, because the search would divide
- * faces that are on other faces without end. */
+/* Returns true if a part or cell with the bound `most` need not be divided, and records the bound
+ * in s->dropped_max. A part whose depth is uncertain only because of rounding is not divided:
+ * otherwise the search would divide without end where a face of the surface is on a face of the
+ * solid. */
 static bool is_settled(depth_search *s, double most, double rounding)
 {
     if (most > s->lo + s->tolerance + 4 * (rounding + s->position_error))
@@ -141,21 +147,23 @@ static bool is_settled(depth_search *s, double most, double rounding)
     return true;
 }
 
-/* Returns an upper bound of the depth in a ball. hi: upper bound of the depth at its centre. */
+/* Returns an upper bound of the depth in a ball. hi: upper bound of the depth at the ball's centre.
+ */
 static double max_within(double hi, double radius)
 {
     return (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
 }
 
-/* Evaluates the depth at the centre of a ball, raises s->lo, and sets the output of the ball. */
-static ebpo_status query_ball(depth_search *s, const double middle[3], depth_ball *ball,
+/* Computes the depth at the centre of a ball, raises s->lo if possible, and sets the output of the
+ * ball. */
+static ebpo_status query_ball(depth_search *s, const double centre[3], depth_ball *ball,
                               ebpo_error *error)
 {
     double lo, hi, rounding;
     ball->open = false;
-    if (!ebpo_posed_solid_near(s->solid, middle, ball->radius))
+    if (!ebpo_posed_solid_near(s->solid, centre, ball->radius))
         return EBPO_OK;
-    ebpo_status status = depth_at(s, middle, &lo, &hi, &rounding, error);
+    ebpo_status status = depth_at(s, centre, &lo, &hi, &rounding, error);
     if (status != EBPO_OK)
         return status;
     s->lo = fmax(s->lo, (lo - ball->far) * (1 - 0x1p-50) - s->position_error);
@@ -164,8 +172,8 @@ static ebpo_status query_ball(depth_search *s, const double middle[3], depth_bal
     return EBPO_OK;
 }
 
-/* Adds a part to the heap if it may have the deepest point. `centre` is a point of the part, and
- * all points of the part are within `radius` of it. */
+/* Adds a part to the heap if the part may have the deepest point. `centre` is a point of the part,
+ * and all points of the part are within the distance `radius` of this point. */
 static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
                               double radius, ebpo_error *error)
 {
@@ -177,18 +185,18 @@ static ebpo_status offer_part(depth_search *s, depth_part *part, const double ce
         return status;
     s->lo = fmax(s->lo, lo - s->position_error);
     part->most = max_within(hi, radius);
-    if (part->most > s->lo && s->context->warm)
+    if (part->most > s->lo && s->solid_context->warm)
         part->most = fmin(part->most, max_at_corners(s, (const double(*)[3])part->corner));
     if (is_settled(s, part->most, rounding))
         return EBPO_OK;
-    if (!(radius > 4 * s->position_error)) {
+    if (!(radius > 4 * s->position_error)) { /* the part is too small to be divided */
         s->dropped_max = fmax(s->dropped_max, part->most);
         return EBPO_OK;
     }
     return push_part(s, part) ? EBPO_OK : ebpo_fail_memory(error, s->capacity * sizeof *s->part);
 }
 
-/* Adds a posed triangle to the heap if it may have the deepest point. */
+/* Adds the posed triangle a, b, c to the heap if it may have the deepest point. */
 static ebpo_status offer_triangle(depth_search *s, const double a[3], const double b[3],
                                   const double c[3], ebpo_error *error)
 {
@@ -266,13 +274,12 @@ static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 /* --- cells of the octree --- */
 
 /* Cells are visited level by level, and in each level in file order. So a subtree is loaded about
- * once for each of its levels that has open cells. Neither the visited cells nor the final interval
- * depend on which subtrees are in memory. */
+ * once for each of its levels that has open cells (cells that may contain the deepest point).
+ * Neither the visited cells nor the final interval depend on which subtrees are in memory. */
 
-/* A cell that may contain the deepest point. */
 typedef struct open_cell {
     ebpo_cell cell;
-    double most; /* bound of the depth of its faces */
+    double most; /* upper bound of the depth of the cell's faces */
 } open_cell;
 
 /* A face that a leaf lists. */
@@ -284,25 +291,27 @@ typedef struct listed_face {
 /* The search through the levels of the surface's octree. */
 typedef struct level_search {
     depth_search *s;
-    ebpo_posed_subtrees at; /* model and pose of the surface */
-    open_cell *open, *next; /* cells of the current level, and of the level below it */
+    ebpo_posed_subtrees at; /* model and posing of the surface; all other members are 0 */
+    open_cell *open, *next; /* open cells of the current level, and of the level below it */
     uint64_t open_count, open_capacity, next_count, next_capacity;
-    listed_face *face; /* faces of leaves that wait for offer_faces */
+    listed_face *face; /* [face_count] faces of leaves that wait for offer_faces */
     uint64_t face_count, face_capacity;
 } level_search;
 
-/* Faces of leaves are evaluated when at least this many wait. */
+/* Faces of leaves are evaluated when the number of waiting faces is at least this. */
 enum { FACES_AT_ONCE = 16384 };
 
 /* --- faces --- */
 
+/* Compares the indices of two faces for qsort. */
 static int by_index(const void *x, const void *y)
 {
     const listed_face *a = x, *b = y;
     return (a->index > b->index) - (a->index < b->index);
 }
 
-/* Evaluates the waiting faces; a face that several leaves list is evaluated once. */
+/* Adds the waiting faces to the heap if they may have the deepest point. A face that several leaves
+ * list is evaluated once. */
 static ebpo_status offer_faces(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -315,6 +324,7 @@ static ebpo_status offer_faces(level_search *g, ebpo_error *error)
     return status;
 }
 
+/* Adds the face at a slot of a subtree to the waiting faces. Returns false if memory is short. */
 static bool add_face(level_search *g, const ebpo_accel *subtree, uint32_t slot)
 {
     if (!ebpo_grow(&g->face, &g->face_capacity, g->face_count + 1, sizeof *g->face))
@@ -348,16 +358,16 @@ static ebpo_status add_leaf(level_search *g, const ebpo_node *leaf, ebpo_error *
 static ebpo_status offer_cell(level_search *g, ebpo_cell cell, ebpo_error *error)
 {
     depth_search *s = g->s;
-    double corner[8][3], middle[3], diagonal = ebpo_posed_diagonal(&g->at, cell);
+    double corner[8][3], centre[3], diagonal = ebpo_posed_diagonal(&g->at, cell);
     depth_ball ball = { .radius = diagonal / 2 * (1 + 0x1p-17) + 2 * s->position_error,
                         .far = INFINITY };
     ebpo_posed_cell(&g->at, cell, corner);
     for (int k = 0; k < 3; k++)
-        middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
-    if (!g->at.model->info->pruned) /* a point of a face is in the cell or near it */
+        centre[k] = corner[0][k] / 2 + corner[7][k] / 2;
+    if (!g->at.model->info->pruned) /* a point of a face is in the cell or close to it */
         ball.far = ball.radius + EBPO_FACE_MARGIN * diagonal;
     open_cell open = { .cell = cell };
-    ebpo_status status = query_ball(s, middle, &ball, error);
+    ebpo_status status = query_ball(s, centre, &ball, error);
     if (status != EBPO_OK || !ball.open)
         return status;
     open.most = ball.most;
@@ -367,10 +377,10 @@ static ebpo_status offer_cell(level_search *g, ebpo_cell cell, ebpo_error *error
     return EBPO_OK;
 }
 
-/* Finds the node of a cell; loads subtrees on the path. */
+/* Finds the node of a cell, and loads the subtrees on the path from the root to the node. */
 static ebpo_status find_node(level_search *g, ebpo_cell cell, ebpo_node *out, ebpo_error *error)
 {
-    ebpo_context *context = g->s->from;
+    ebpo_context *context = g->s->surface_context;
     *out = ebpo_model_root(context->model);
     for (int level = 0;; level++) {
         ebpo_status status = EBPO_OK;
@@ -382,6 +392,8 @@ static ebpo_status find_node(level_search *g, ebpo_cell cell, ebpo_node *out, eb
     }
 }
 
+/* Adds the children of a cell to the next level, or, if the cell's node is a leaf, adds the faces
+ * of the leaf to the waiting faces. */
 static ebpo_status divide_cell(level_search *g, ebpo_cell cell, ebpo_error *error)
 {
     ebpo_node node;
@@ -391,7 +403,7 @@ static ebpo_status divide_cell(level_search *g, ebpo_cell cell, ebpo_error *erro
     if (node.type != EBPO_GRAY)
         return add_leaf(g, &node, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        ebpo_node child = ebpo_model_child(g->s->from->model, &node, octant);
+        ebpo_node child = ebpo_model_child(g->s->surface_context->model, &node, octant);
         if (!ebpo_node_is_uniform(&child))
             status = offer_cell(g, child.cell, error);
     }
@@ -400,6 +412,8 @@ static ebpo_status divide_cell(level_search *g, ebpo_cell cell, ebpo_error *erro
 
 /* --- levels --- */
 
+/* Divides the open cells of the current level. A cell that cannot be deeper than the best point by
+ * more than the tolerance is dropped; so are all cells after the deadline. */
 static ebpo_status divide_level(level_search *g, ebpo_error *error)
 {
     depth_search *s = g->s;
@@ -416,6 +430,7 @@ static ebpo_status divide_level(level_search *g, ebpo_error *error)
     return status == EBPO_OK ? offer_faces(g, error) : status;
 }
 
+/* Makes the next level the current one, and begins an empty next level. */
 static void swap_levels(level_search *g)
 {
     open_cell *open = g->open;
@@ -432,7 +447,7 @@ static void swap_levels(level_search *g)
  * point. */
 static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
 {
-    level_search g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
+    level_search g = { .s = s, .at = { .model = s->surface_context->model, .posing = *s->posing } };
     ebpo_node root = ebpo_model_root(g.at.model);
     ebpo_status status = ebpo_node_is_uniform(&root) ? EBPO_OK : offer_cell(&g, root.cell, error);
     for (swap_levels(&g); status == EBPO_OK && g.open_count > 0; swap_levels(&g))
@@ -443,6 +458,7 @@ static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
     return status;
 }
 
+/* Visits the cells, then divides the parts in the heap until the search is done or late. */
 static ebpo_status search_parts(depth_search *s, ebpo_error *error)
 {
     ebpo_status status = offer_cells(s, error);
@@ -454,8 +470,8 @@ static ebpo_status search_parts(depth_search *s, ebpo_error *error)
     return status;
 }
 
-/* Runs a search whose input has been set. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED and the errors
- * of ebpo_distance. */
+/* Runs a search whose input has been set, and sets its output. Fails with EBPO_E_MEMORY,
+ * EBPO_E_CANCELLED and the errors of ebpo_distance. */
 static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 {
     s->position_error = 0x1p-46 * s->max_coordinate;
@@ -471,8 +487,8 @@ static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 
 /* --- the query --- */
 
-/* Computes how deep the surface of one model is in the other model. solid: 0: the other model is
- * the caller's A, 1: it is B. */
+/* Computes how deep the surface of one model is in the other model. solid: index of this other
+ * model, 0 for the caller's A, 1 for the caller's B. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance,
                             ebpo_value_bounds *out, ebpo_error *error)
 {
@@ -484,11 +500,11 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
         status = ebpo_posed_solid_make(&posed, c->model[solid], pose, error);
     if (status != EBPO_OK)
         return status;
-    depth_search s = { .from = c->context[!solid],
+    depth_search s = { .surface_context = c->context[!solid],
                        .posing = &q->posing[solid == q->swapped].posing,
                        .max_coordinate = q->max_coordinate,
                        .solid = &posed,
-                       .context = c->context[solid],
+                       .solid_context = c->context[solid],
                        .tolerance = tolerance,
                        .deadline = q->deadline,
                        .progress = &q->options.progress };
@@ -498,6 +514,7 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
     return status;
 }
 
+/* Makes the collider's contexts if they do not exist yet. */
 static ebpo_status make_contexts(ebpo_collider *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -507,6 +524,7 @@ static ebpo_status make_contexts(ebpo_collider *c, ebpo_error *error)
     return status;
 }
 
+/* Returns the number of subtrees that the collider's contexts have loaded. */
 static uint64_t subtree_loads(const ebpo_collider *c)
 {
     uint64_t sum = 0;

@@ -1,15 +1,16 @@
-/* Computes the distance of two posed models, and a pair of faces at that distance.
+/* Computes the distance of two posed models, and a pair of faces at that distance (a nearest pair).
  *
- * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop pairs that are
- * certainly farther apart than the limit. They store the remaining pairs of faces as waiting pairs,
- * which are decided here: in doubles with error bounds (ebpo_triangles_distance_bounds), and
- * exactly where the bounds overlap. Of several pairs at the same distance, the first in file order
- * is returned, so the result is the same with every processor and number of threads.
+ * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats, and drop pairs that are
+ * certainly farther apart than the limit (ebpo_gap_search.limit). They store the remaining pairs of
+ * faces as waiting pairs. This file decides the waiting pairs in doubles with error bounds
+ * (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of several pairs at the
+ * same distance, the first pair in file order is returned, so the result is the same with every
+ * processor and number of threads.
  *
  * Partly loaded models are searched in pairs of subtrees, in the order of the gaps of their
  * envelopes. A subtree is loaded only if its envelope is nearer than the best pair so far. A
- * collider keeps its last pair, from which the next search begins. Bounds:
- * docs/develop/collision.md. */
+ * collider keeps the nearest pair of its last query; the next search may begin with this pair.
+ * Bounds: docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,35 +29,37 @@
 #include "extras/collide/subtree_search.h"
 #include "geometry/triangle_pair.h"
 
-/* Two faces, with coordinates as in their files (`unposed`) and at their poses (`corner`). */
+/* Two faces, one of each model. */
 typedef struct ebpo_face_two {
     uint64_t file[2], source[2]; /* face indices in the file and in the source */
-    double unposed[2][3][3], corner[2][3][3];
+    double unposed[2][3][3];     /* corners as in the files */
+    double corner[2][3][3];      /* corners at the poses */
     ebpo_pair_distance_bounds bounds;
 } ebpo_face_two;
 
-/* Search for the nearest pair of faces of two hierarchies, or of several pairs of hierarchies one
- * after the other. */
+/* The search for the nearest pair of faces, in one pair of hierarchies or in several pairs of
+ * hierarchies one after the other. */
 typedef struct nearest_pair {
     /* Input: */
-    double tolerance;  /* 0: exact */
+    double tolerance;  /* greatest allowed difference of hi and lo; 0: exact */
     double at_least;   /* only compare the distance with this value; NAN: compute the distance */
     uint64_t deadline; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= distance <= hi, equal if the result is exact. */
     double lo, hi;
-    bool found;
-    bool intersects; /* the faces of `best` intersect; another intersecting pair may precede it in
-                      * file order */
-    int is_at_least; /* the distance is at least `at_least`: 1: yes, 0: no, -1: not compared, or
-                      * undecided */
+    bool found;         /* `best` is set */
+    bool intersects;    /* the faces of `best` intersect, but another intersecting pair may precede
+                         * `best` in file order */
+    int is_at_least;    /* the distance is at least `at_least`: 1: yes, 0: no, -1: not compared, or
+                         * undecided */
     ebpo_face_two best; /* if `found`: the nearest pair so far */
     bool ended;         /* the search ended before all pairs were visited */
-    double unvisited;  /* if `ended`: the pairs that were not visited are at least this far apart */
-    ebpo_error *error; /* error of `status` during the search */
-    ebpo_status status;
+    double unvisited;   /* if `ended`: lower bound of the distances of the unvisited pairs */
+    ebpo_status status; /* failure of the function that reports progress, and its error */
+    ebpo_error *error;
 } nearest_pair;
 
+/* The three corners of one face of an ebpo_face_two, in the form that functions expect. */
 typedef const double (*corners)[3];
 #define CORNERS(face, side) ((corners)(face)->corner[side])
 
@@ -83,13 +86,15 @@ static void inspect_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo
     pose_faces(posing, out);
 }
 
-/* Returns true if the pair f precedes the pair `than` in the order of the files. */
+/* Returns true if the pair f precedes the pair `than` in file order: by the first face's index,
+ * then by the second face's index. */
 static bool is_earlier(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
 }
 
-/* Returns true if the pair f is nearer than the pair `than`, or equally near and earlier. */
+/* Returns true if the pair f is nearer than the pair `than`, or if it is equally near and precedes
+ * `than` in file order. */
 static bool is_nearer(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     if (f->bounds.hi < than->bounds.lo)
@@ -106,7 +111,7 @@ static bool is_nearer(const ebpo_face_two *f, const ebpo_face_two *than)
 
 /* --- all waiting pairs --- */
 
-/* Converts a distance to the search's unit, rounded up. */
+/* Converts a distance to the unit of the walk's lengths (ebpo_block_unit), rounded up. */
 static float to_unit(const ebpo_gap_search *g, double distance)
 {
     return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
@@ -127,8 +132,8 @@ static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
 }
 
 /* Updates the result of a search with a tolerance by a pair. If the distance is tiny compared with
- * the faces, its direction is inaccurate in doubles and the bounds are wider than the tolerance;
- * the bounds are then computed from the exact distance. */
+ * the faces, the direction of the distance is inaccurate in doubles, and the bounds are wider than
+ * the tolerance. Then the bounds are computed from the exact distance. */
 static void compare_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
 {
     ebpo_face_two f = *given;
@@ -144,7 +149,7 @@ static void compare_within_tolerance(nearest_pair *n, const ebpo_face_two *given
     n->found = true;
 }
 
-/* Updates the result by a pair of faces. Returns false if the search can end. */
+/* Updates the result by a pair of faces. Returns false if further pairs are not needed. */
 static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo > 0) &&
@@ -164,7 +169,7 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
     return true;
 }
 
-/* Decides a waiting pair of faces. Returns false if the search can end. */
+/* Decides a waiting pair of faces. Returns false if further pairs are not needed. */
 static bool decide_faces(ebpo_gap_search *g, nearest_pair *n, const uint32_t slot[2])
 {
     ebpo_face_two f;
@@ -183,8 +188,8 @@ static bool continue_search(ebpo_gap_search *g)
     return !g->ended;
 }
 
-/* Returns the least lower bound of the waiting pairs from index `first` on. The loop does not use
- * fmin, because gcc 12 for ARM fails to compile it. */
+/* Returns the least lower bound of the distances of the waiting pairs from index `first` on. The
+ * loop does not use fmin, because gcc 12 for ARM fails to compile a loop with fmin. */
 static double least_waiting(const ebpo_gap_search *g, unsigned first)
 {
     double least = INFINITY;
@@ -195,20 +200,21 @@ static double least_waiting(const ebpo_gap_search *g, unsigned first)
 }
 
 /* Decides the waiting pairs. Calls continue_search after every 16 pairs, because many pairs may
- * wait if models have flat parts. Returns false if the search can end. */
+ * wait if models have flat parts. Returns false if further pairs are not needed, or if
+ * continue_search returns false. */
 static bool decide_waiting(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
-    bool more = true;
+    bool go_on = true;
     unsigned evaluated = 0, i = 0;
-    for (; i < g->waiting_count && more; i++)
+    for (; i < g->waiting_count && go_on; i++)
         if (!(g->waiting[i].low > g->limit))
-            more =
+            go_on =
                 decide_faces(g, n, g->waiting[i].slot) && (++evaluated % 16 || continue_search(g));
-    if (!more)
+    if (!go_on)
         n->lo = fmin(n->lo, least_waiting(g, i));
     g->waiting_count = 0;
-    return more;
+    return go_on;
 }
 
 /* --- the result --- */
@@ -223,13 +229,13 @@ static double least_unvisited(const ebpo_gap_search *g)
     return sqrt(fmax(least, 0)) / g->posing[0].unit * (1 - 0x1p-18);
 }
 
-/* Sets the exact distance of the best pair, rounded once. */
+/* Sets lo and hi to the exact distance of the best pair, rounded once. */
 static void set_exact_distance(nearest_pair *n)
 {
     n->lo = n->hi = ebpo_triangles_distance(CORNERS(&n->best, 0), CORNERS(&n->best, 1));
 }
 
-/* Sets bounds of the distance, with a tolerance or after an early end. */
+/* Sets lo and hi to bounds of the distance, for a search that has a tolerance or ended early. */
 static void set_distance_bounds(nearest_pair *n)
 {
     n->hi = n->found ? n->best.bounds.hi : INFINITY;
@@ -262,11 +268,11 @@ static void nearest_pair_end(nearest_pair *n)
         set_distance_bounds(n);
 }
 
-/* Records that the pairs that were not visited are at least this far apart. */
-static void record_unvisited(nearest_pair *n, double distance)
+/* Records an early end of the search. low: lower bound of the distances of the unvisited pairs. */
+static void record_unvisited(nearest_pair *n, double low)
 {
     n->ended = true;
-    n->unvisited = fmin(n->unvisited, distance);
+    n->unvisited = fmin(n->unvisited, low);
 }
 
 /* --- the search --- */
@@ -280,14 +286,14 @@ static void nearest_pair_begin(nearest_pair *n)
     n->is_at_least = -1;
 }
 
-/* Considers a pair of faces from an earlier query. Of `pair`, only unposed, file and source are
- * used. */
+/* Updates the result by a pair of faces from an earlier query. Only the members unposed, file and
+ * source of `pair` are used. */
 static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
                                const ebpo_face_two *pair)
 {
-    const ebpo_posing *const two[2] = { &posing[0], &posing[1] };
+    const ebpo_posing *const posings[2] = { &posing[0], &posing[1] };
     ebpo_face_two f = *pair;
-    pose_faces(two, &f);
+    pose_faces(posings, &f);
     (void)consider_faces(n, &f);
 }
 
@@ -312,7 +318,7 @@ static bool nearest_pair_is_done(const nearest_pair *n)
     return n->intersects || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
 }
 
-/* Limits the search by the results of earlier searches of this query. */
+/* Sets the walk's tolerance, and its limit from the result so far. */
 static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
 {
     g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
@@ -325,7 +331,8 @@ static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
 }
 
 /* Decides the pairs that still wait after the walk. With a tolerance, also decides the pair
- * g->best_slot if g->best is less than `before`, its value at the beginning of the walk. */
+ * g->best_slot, if the walk has found a pair that is nearer than `before`, the value of g->best at
+ * the beginning of the walk. */
 static void decide_last(ebpo_gap_search *g, nearest_pair *n, float before)
 {
     if (nearest_pair_is_done(n) || !decide_waiting(g) || n->intersects || !isnan(n->at_least))
@@ -334,8 +341,8 @@ static void decide_last(ebpo_gap_search *g, nearest_pair *n, float before)
         decide_faces(g, n, g->best_slot);
 }
 
-/* Continues the search in two more hierarchies, for which ebpo_gap_begin has been called. Fails
- * with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+/* Continues the search in another pair of hierarchies, for which ebpo_gap_begin has been called.
+ * Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
 static ebpo_status nearest_pair_search(nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
 {
     g->user = n;
@@ -353,19 +360,19 @@ static ebpo_status nearest_pair_search(nearest_pair *n, ebpo_gap_search *g, ebpo
     return n->status;
 }
 
-static const char stage[] = "distance";
+static const char stage[] = "distance"; /* for the progress function */
 
 /* The search in pairs of subtrees. */
 typedef struct node_search {
     ebpo_subtree_search subtrees;
     nearest_pair *n;
-    double hi; /* upper bound of the distance, from the cells */
+    double hi; /* upper bound of the distance, computed from the cells of nodes with faces */
 } node_search;
 
 /* --- two accels (acceleration structures of subtrees) --- */
 
-/* Continues the search in two more hierarchies of the query's models. `may_intersect`: first search
- * for a contact, because lower bounds exclude few pairs where models intersect. */
+/* Continues the search in another pair of hierarchies of the query's models. may_intersect: first
+ * search for a contact, because lower bounds exclude few pairs where models intersect. */
 static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel *const accel[2],
                                       bool may_intersect, nearest_pair *n, ebpo_error *error)
 {
@@ -391,8 +398,8 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
 
 /* --- pairs of nodes --- */
 
-/* Searches a pair of subtrees. */
-static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
+/* Loads a pair of subtrees, and continues the search in their hierarchies. */
+static ebpo_status search_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
     bool loaded;
@@ -402,8 +409,8 @@ static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_
                : status;
 }
 
-/* Adds a pair of nodes to the heap, unless it is too far apart. gap: lower bound of the distance of
- * their parents. */
+/* Adds a pair of nodes to the heap, unless the nodes are too far apart. gap: lower bound of the
+ * distance of the pair from which the nodes were made. */
 static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], double gap,
                                  ebpo_error *error)
 {
@@ -414,7 +421,7 @@ static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], 
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the gap of the parents is a bound, too */
+    pair.gap = fmax(pair.gap, gap);
     if (status != EBPO_OK || pair.gap > fmin(s->hi, nearest_pair_limit(s->n)))
         return status;
     if (!model[0]->info->pruned && !model[1]->info->pruned)
@@ -422,6 +429,7 @@ static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], 
     return ebpo_node_gaps_push(nodes, &pair, error);
 }
 
+/* Replaces a pair by the pairs of each child of node `side` with the other node. */
 static ebpo_status divide_pair(node_search *s, const ebpo_node_gap *pair, int side,
                                ebpo_error *error)
 {
@@ -434,7 +442,7 @@ static ebpo_status divide_pair(node_search *s, const ebpo_node_gap *pair, int si
     return status;
 }
 
-/* Visits pairs of nodes in the order of their gaps, until a pair is too far apart. */
+/* Visits pairs of nodes in the order of their gaps, until the gap of a pair is above the limit. */
 static ebpo_status search_subtrees(node_search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -448,8 +456,8 @@ static ebpo_status search_subtrees(node_search *s, ebpo_error *error)
         if (ebpo_collision_is_late(q))
             record_unvisited(s->n, pair.gap);
         else
-            status = side < 0 ? inspect_pair(s, &pair, error) : divide_pair(s, &pair, side, error);
-        if (nearest_pair_is_done(s->n)) /* the other pairs are not visited */
+            status = side < 0 ? search_pair(s, &pair, error) : divide_pair(s, &pair, side, error);
+        if (nearest_pair_is_done(s->n)) /* the pairs that are still in the heap are not visited */
             record_unvisited(s->n, pair.gap);
         if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
@@ -459,7 +467,7 @@ static ebpo_status search_subtrees(node_search *s, ebpo_error *error)
 
 /* Searches pairs of subtrees in the order of the gaps of their envelopes, until the gap is greater
  * than the best distance. The result is the same as for models that are entirely in memory. */
-static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, ebpo_error *error)
+static ebpo_status distance_of_subtrees(const ebpo_collision *q, nearest_pair *n, ebpo_error *error)
 {
     node_search s = { .n = n, .hi = INFINITY };
     ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, q, error);
@@ -476,12 +484,14 @@ static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, e
 
 /* --- the query --- */
 
+/* Refuses options that are not numbers in their ranges. */
 static ebpo_status check_options(const ebpo_collide_distance_options *o, ebpo_error *error)
 {
     if (!(o->tolerance >= 0 && o->tolerance < INFINITY) || isnan(o->at_least))
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "expected a tolerance of the distance that is 0 or more and finite, and a "
-                         "distance to compare with that is a number");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "expected a tolerance of the distance that is 0 or more and finite, and an "
+            "at_least that is a number");
     return EBPO_OK;
 }
 
@@ -496,6 +506,7 @@ static void set_common_point(const ebpo_face_two *f, ebpo_pair_kind kind, double
         point[0][k] = point[1][k] = end[0].point[k];
 }
 
+/* Sets the faces and points of the result to the nearest pair, in the caller's order. */
 static void report_pair(const ebpo_collision *q, const nearest_pair *n,
                         ebpo_collide_distance_result *out)
 {
@@ -520,7 +531,8 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n,
 
 /* --- from one query to the next --- */
 
-/* Exchanges the two faces if the query has the caller's models in the other order. */
+/* Converts a pair between the caller's order and the query's order of the models: returns the pair
+ * with its faces exchanged if both orders differ. Only file, source and unposed are exchanged. */
 static ebpo_face_two in_query_order(const ebpo_collision *q, const ebpo_face_two *f)
 {
     ebpo_face_two out = *f;
@@ -544,7 +556,8 @@ static ebpo_status keep_nearest(const ebpo_collision *q, const nearest_pair *n, 
     return EBPO_OK;
 }
 
-/* Considers the nearest pair of the last query first. */
+/* Begins a search with the nearest pair of the last query. If this pair decides the result, no pair
+ * is visited. */
 static void start_search(const ebpo_collision *q, nearest_pair *n)
 {
     const ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
@@ -556,11 +569,13 @@ static void start_search(const ebpo_collision *q, nearest_pair *n)
 
 /* --- the search of a query --- */
 
+/* Returns true if a model has faces in its file. */
 static bool has_faces(const ebpo_model *m)
 {
     return m->whole ? m->whole->bound_count > 0 : m->info->face_count > 0;
 }
 
+/* Searches for the nearest pair. warm: begin with the nearest pair of the collider's last query. */
 static ebpo_status search_nearest(const ebpo_collision *q, bool warm, nearest_pair *n,
                                   ebpo_error *error)
 {
@@ -574,7 +589,7 @@ static ebpo_status search_nearest(const ebpo_collision *q, bool warm, nearest_pa
         start_search(q, n);
     if (nearest_pair_is_done(n))
         return EBPO_OK;
-    return ebpo_collision_is_in_parts(q) ? distance_of_parts(q, n, error)
+    return ebpo_collision_is_in_parts(q) ? distance_of_subtrees(q, n, error)
                                          : distance_of_accels(q, accel, true, n, error);
 }
 

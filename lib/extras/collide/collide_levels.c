@@ -3,9 +3,9 @@
  *
  * Pairs of nodes are visited in the order of the gaps of their envelopes, the least first
  * (subtree_search.h). A gap is a lower bound of the distance; two nodes with faces give an upper
- * bound. A black cell belongs entirely to its solid. So both solids have a common point in two
- * cases: a black cell contains all of a cell with faces of the other model, or a point of a black
- * cell of the other model. A search runs in one thread. */
+ * bound. A black cell belongs entirely to the interior of its solid. So a black cell certainly has
+ * a common point with the other model if it contains a whole cell with faces of the other model, or
+ * if it contains a point of a black cell of the other model. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,15 +18,15 @@
 /* The search through the levels. Zero at the beginning. */
 typedef struct level_search {
     const ebpo_collision *collision;
-    ebpo_node_gaps nodes;
+    ebpo_node_gaps nodes; /* heap of the pairs that will be visited */
     /* Output: */
     double lo, hi;            /* bounds of the distance of faces */
-    uint64_t undecided_pairs; /* pairs whose faces may intersect */
+    uint64_t undecided_pairs; /* number of undivided pairs of nodes whose faces may intersect */
     bool intersects;          /* the solids or faces certainly have a common point */
-    bool may_intersect;       /* an undecided pair may have a common point */
+    bool may_intersect;       /* the content of an undivided pair may have a common point */
 } level_search;
 
-static const char stage[] = "pairs of nodes";
+static const char stage[] = "pairs of nodes"; /* for the progress function */
 
 /* Width of the margin along the faces of a black cell, as a share of the cell's side. Points in the
  * margin are not counted as inside the cell. */
@@ -34,9 +34,14 @@ static const double margin_share = 0x1p-14;
 
 /* --- nodes --- */
 
-/* Content of a node: nothing, faces, or only the interior of the solid. */
-typedef enum content { NOTHING, FACES, SOLID } content;
+/* Content of a node. */
+typedef enum content {
+    NOTHING, /* only the exterior of the model */
+    FACES,   /* faces */
+    SOLID    /* only the interior of the solid: a black node */
+} content;
 
+/* Returns the content of a node of model `side`. */
 static content content_of(const level_search *g, int side, const ebpo_posed_node *node)
 {
     const ebpo_info *info = g->nodes.side[side].model->info;
@@ -46,6 +51,8 @@ static content content_of(const level_search *g, int side, const ebpo_posed_node
                                                                                         : NOTHING;
 }
 
+/* Returns true if the search may divide a node: it has children on the levels that the caller wants
+ * to use. */
 static bool has_children(const level_search *g, const ebpo_posed_node *node)
 {
     int level = g->collision->options.level;
@@ -55,12 +62,12 @@ static bool has_children(const level_search *g, const ebpo_posed_node *node)
 
 /* --- a common point of both solids --- */
 
-/* Returns true if the posed point p is certainly within a posed cell. max_coordinate: bound of
- * posed coordinates. */
+/* Returns true if the posed point p is certainly within a posed cell with these corners, and not in
+ * the margin. max_coordinate: upper bound of the absolute values of posed coordinates. */
 static bool is_within(const double corner[8][3], const double p[3], double max_coordinate)
 {
     for (int k = 0; k < 3; k++) {
-        const double *from = corner[0], *to = corner[1 << k];
+        const double *from = corner[0], *to = corner[1 << k]; /* the cell's edge along axis k */
         double length2 = 0, along = 0;
         for (int i = 0; i < 3; i++) {
             length2 += (to[i] - from[i]) * (to[i] - from[i]);
@@ -76,7 +83,7 @@ static bool is_within(const double corner[8][3], const double p[3], double max_c
     return true;
 }
 
-/* Widens a cell about its middle by a share of its size. */
+/* Widens a cell on all sides: multiplies its size by 1 + share, and keeps its middle. */
 static void widen_cell(double corner[8][3], double share)
 {
     double middle[3];
@@ -87,35 +94,38 @@ static void widen_cell(double corner[8][3], double share)
             corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
 }
 
-/* Returns true if `solid`, the cell of a black node, certainly has a common point with the model of
- * the other cell. black: the other node is black, too; then `solid` must contain a corner or the
- * middle of the other cell. Otherwise `solid` must contain the region in which the other node has
- * its faces. `other` may be changed. */
-static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
+/* Returns true if a black node certainly has a common point with the model of another node. black,
+ * other: corners of both cells; other_black: the other node is black, too. If it is black, the
+ * first cell must contain a corner or the middle of the other cell. If it has faces, the first cell
+ * must contain the region of these faces: the other cell with a margin, by which `other` is
+ * widened. */
+static bool shares_point(const level_search *g, double black[8][3], double other[8][3],
+                         bool other_black)
 {
     int within = 0;
     double middle[3], max_coordinate = g->collision->max_coordinate;
-    if (!black)
+    if (!other_black)
         widen_cell(other, 2 * EBPO_FACE_MARGIN);
     for (int c = 0; c < 8; c++)
-        within += is_within((const double(*)[3])solid, other[c], max_coordinate);
+        within += is_within((const double(*)[3])black, other[c], max_coordinate);
     for (int i = 0; i < 3; i++)
         middle[i] = other[0][i] / 2 + other[7][i] / 2;
-    return black ? within > 0 || is_within((const double(*)[3])solid, middle, max_coordinate)
-                 : within == 8;
+    return other_black ? within > 0 || is_within((const double(*)[3])black, middle, max_coordinate)
+                       : within == 8;
 }
 
-/* Returns true if the models of two nodes certainly have a common point because of a black node. */
+/* Returns true if the models of two nodes certainly have a common point, because one of the nodes
+ * is black. contents: contents of the nodes. */
 static bool certainly_intersect(const level_search *g, const ebpo_posed_node node[2],
-                                const content has[2])
+                                const content contents[2])
 {
     for (int i = 0; i < 2; i++) {
-        double solid[8][3], other[8][3];
-        if (has[i] != SOLID)
+        double black[8][3], other[8][3];
+        if (contents[i] != SOLID)
             continue;
-        ebpo_posed_cell(&g->nodes.side[i], node[i].cell, solid);
+        ebpo_posed_cell(&g->nodes.side[i], node[i].cell, black);
         ebpo_posed_cell(&g->nodes.side[1 - i], node[1 - i].cell, other);
-        if (shares_point(g, solid, other, has[1 - i] == SOLID))
+        if (shares_point(g, black, other, contents[1 - i] == SOLID))
             return true;
     }
     return false;
@@ -123,28 +133,29 @@ static bool certainly_intersect(const level_search *g, const ebpo_posed_node nod
 
 /* --- pairs --- */
 
-/* Adds a pair of nodes to the heap unless it cannot change the result. gap: lower bound of the
- * distance of their parents. */
+/* Adds a pair of nodes to the heap if it can change the result. gap: lower bound of the distance of
+ * the pair from which the nodes were made. */
 static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2], double gap,
                                  ebpo_error *error)
 {
-    content has[2] = { content_of(g, 0, &node[0]), content_of(g, 1, &node[1]) };
+    content contents[2] = { content_of(g, 0, &node[0]), content_of(g, 1, &node[1]) };
     ebpo_node_gap pair = { { node[0], node[1] }, 0 };
-    bool faces = has[0] == FACES && has[1] == FACES;
-    if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->intersects))
+    bool both_faces = contents[0] == FACES && contents[1] == FACES;
+    if (contents[0] == NOTHING || contents[1] == NOTHING || (!both_faces && g->intersects))
         return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the gap of the parents is a bound, too */
-    if (status != EBPO_OK || pair.gap > g->hi || (!faces && pair.gap > 0))
+    pair.gap = fmax(pair.gap, gap);
+    if (status != EBPO_OK || pair.gap > g->hi || (!both_faces && pair.gap > 0))
         return status;
-    if (faces)
+    if (both_faces)
         g->hi = fmin(g->hi, ebpo_node_far_bound(&g->nodes, node));
-    else if (certainly_intersect(g, node, has))
+    else if (certainly_intersect(g, node, contents))
         g->intersects = true;
     return ebpo_node_gaps_push(&g->nodes, &pair, error);
 }
 
-static bool has_faces(const level_search *g, const ebpo_node_gap *pair)
+/* Returns true if both nodes of a pair have faces. */
+static bool both_have_faces(const level_search *g, const ebpo_node_gap *pair)
 {
     return content_of(g, 0, &pair->node[0]) == FACES && content_of(g, 1, &pair->node[1]) == FACES;
 }
@@ -152,19 +163,21 @@ static bool has_faces(const level_search *g, const ebpo_node_gap *pair)
 /* Adds a pair that is not divided any further to the result. */
 static void finish_pair(level_search *g, const ebpo_node_gap *pair)
 {
-    bool faces = has_faces(g, pair);
-    if (faces)
+    bool both_faces = both_have_faces(g, pair);
+    if (both_faces)
         g->lo = fmin(g->lo, pair->gap);
     if (pair->gap > 0)
         return;
     g->may_intersect = true;
-    g->undecided_pairs += faces;
+    g->undecided_pairs += both_faces;
 }
 
+/* Divides a node of a pair, and adds the pairs of its children with the other node. Divides the
+ * larger node if both nodes have children. */
 static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_error *error)
 {
-    bool down[2] = { has_children(g, &pair->node[0]), has_children(g, &pair->node[1]) };
-    int side = !down[0] ? 1 : !down[1] ? 0 : ebpo_node_larger(&g->nodes, pair->node);
+    bool divisible[2] = { has_children(g, &pair->node[0]), has_children(g, &pair->node[1]) };
+    int side = !divisible[0] ? 1 : !divisible[1] ? 0 : ebpo_node_larger(&g->nodes, pair->node);
     ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
@@ -184,7 +197,7 @@ static void finish_all_pairs(level_search *g)
     g->nodes.count = 0;
 }
 
-/* Returns true if the search uses more than the collider's memory. */
+/* Returns true if the search uses more than the memory that the collider's options allow. */
 static bool is_full(const level_search *g)
 {
     return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
@@ -192,16 +205,16 @@ static bool is_full(const level_search *g)
            g->collision->collider->options.memory;
 }
 
-/* Visits pairs in the order of their gaps. Skips pairs with a gap above g->lo, the least gap of the
- * pairs that are not divided further, and, once a common point is certain, pairs without faces. */
+/* Visits pairs in the order of their gaps. Skips pairs with a gap above g->lo (the least gap of the
+ * pairs that are not divided further). Once a common point is certain, also skips pairs of which a
+ * node has no faces. At the deadline, or if memory is used up, divides no more pairs. */
 static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     while (g->nodes.count > 0 && status == EBPO_OK) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(&g->nodes);
-        bool faces = has_faces(g, &pair);
         g->collision->collider->node_pairs++;
-        if ((!faces && g->intersects) || pair.gap > g->lo)
+        if ((!both_have_faces(g, &pair) && g->intersects) || pair.gap > g->lo)
             continue;
         if (ebpo_collision_is_late(g->collision) || is_full(g)) {
             finish_pair(g, &pair);
@@ -217,6 +230,7 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
     return status;
 }
 
+/* Begins and runs a search, and sets its output. */
 static ebpo_status level_search_run(level_search *g, const ebpo_collision *q, ebpo_error *error)
 {
     g->collision = q;
@@ -241,6 +255,7 @@ static int32_t last_level(const ebpo_model *m, int level)
     return level < 0 || level > last ? last : level;
 }
 
+/* Sets the caller's result; an unknown answer is -1. */
 static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_level_result *out)
 {
     double lo = fmin(g->lo, g->hi);

@@ -1,11 +1,12 @@
 /* Finds the pairs of faces of two models that intersect: the first contact, or all pairs in a fixed
  * order.
  *
- * To find all pairs, the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough
- * pairs of nodes, which are distributed to threads. The results are sorted by the indices of the
- * first face, then of the second, so the order does not depend on the number of threads. If the
- * collider's memory is too small for all pairs, runs of consecutive faces of the first model are
- * searched one after the other. Partly loaded models are searched by subtree_walk.h. */
+ * To find all pairs, the pair of both hierarchies' top nodes is divided repeatedly into pairs of
+ * their children, until there are enough pairs of nodes (parts). The threads search the parts
+ * (pair_walk_kernels.c). The results are sorted by the index of the first face, then by the index
+ * of the second face, so the order does not depend on the number of threads. If the collider's
+ * memory is too small for all pairs, runs of consecutive faces of the first model are searched one
+ * run after another. Partly loaded models are searched by subtree_walk.c. */
 #include "core/strict_fp.h"
 
 #include <stdatomic.h>
@@ -20,14 +21,14 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "extras/collide/subtree_walk.h"
 
-/* Search for all intersecting pairs of faces of two hierarchies, for a run of faces of the first.
- * Zero at the beginning. */
+/* The search for all intersecting pairs of faces of two hierarchies, for one run of faces of the
+ * first hierarchy. Zero at the beginning. */
 typedef struct pair_gathering {
     const ebpo_collision *collision;
-    bool self;            /* both hierarchies are the same one, at one pose */
+    bool self;            /* both hierarchies are the same hierarchy at the same pose */
     ebpo_node_pair *part; /* [parts] pairs of nodes at which the searches of threads begin */
     uint64_t parts, part_capacity;
-    ebpo_pair_walk *walk; /* [threads] */
+    ebpo_pair_walk *walk; /* [threads] the search of each thread */
     unsigned threads;
     uint64_t most;                /* maximum number of pairs */
     _Atomic uint64_t found;       /* number of pairs found by all threads */
@@ -42,11 +43,15 @@ typedef struct pair_gathering {
  * that counting digits takes no longer than moving the pairs. */
 enum { MIN_BITS = 4, MAX_BITS = 11 };
 
-static inline uint32_t digit_of(const ebpo_found_pair *m, bool by_a, unsigned shift, unsigned bits)
+/* Returns a digit of a pair's face index: `bits` bits, beginning with bit `shift`. by_a: of the
+ * index a; otherwise of the index b. */
+static inline uint32_t digit_of(const ebpo_found_pair *pair, bool by_a, unsigned shift,
+                                unsigned bits)
 {
-    return (by_a ? m->a : m->b) >> shift & ((1u << bits) - 1);
+    return (by_a ? pair->a : pair->b) >> shift & ((1u << bits) - 1);
 }
 
+/* Copies pairs to `to`, sorted by one digit; keeps the order of pairs with equal digits. */
 static void sort_by_digit(const ebpo_found_pair *from, ebpo_found_pair *to, uint64_t count,
                           bool by_a, unsigned shift, unsigned bits)
 {
@@ -60,6 +65,7 @@ static void sort_by_digit(const ebpo_found_pair *from, ebpo_found_pair *to, uint
         to[begin[digit_of(&from[i], by_a, shift, bits)]++] = from[i];
 }
 
+/* Returns the number of bits of a digit for sorting `count` pairs. */
 static unsigned bits_for(uint64_t count)
 {
     unsigned bits = MIN_BITS;
@@ -80,9 +86,9 @@ static void sort_found_pairs(ebpo_found_pair *pairs, ebpo_found_pair *spare, uin
     for (int by_a = 0; by_a < 2; by_a++)
         for (unsigned shift = 0; shift < 32 && (by_a ? max_a : max_b) >> shift; shift += bits) {
             sort_by_digit(from, to, count, by_a, shift, bits);
-            ebpo_found_pair *other = from;
-            from = to;
-            to = other;
+            ebpo_found_pair *sorted = to;
+            to = from;
+            from = sorted;
         }
     if (from != pairs)
         memcpy(pairs, from, count * sizeof *pairs);
@@ -90,8 +96,8 @@ static void sort_found_pairs(ebpo_found_pair *pairs, ebpo_found_pair *spare, uin
 
 /* --- the first contact --- */
 
-/* Searches for the first contact. *found: 1 if there is one, 0 if there is none, -1 if the deadline
- * has passed. */
+/* Searches for a contact. *found: 1 if there is a contact, 0 if there is no contact, -1 if the
+ * deadline has passed before the search has found a contact. */
 static ebpo_status search_first(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
                                 int32_t *found, ebpo_error *error)
 {
@@ -151,18 +157,21 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
     return status;
 }
 
-static const char stage[] = "pairs of faces";
+static const char stage[] = "pairs of faces"; /* for the progress function */
 
-/* PARTS: number of parts at which dividing ends; TASKS: number of groups of parts that are
- * distributed to threads. They affect only how evenly the threads are used, not the result. */
-enum { PARTS = 512, TASKS = 64 };
+/* These numbers affect only how evenly the threads are used, not the result. */
+enum {
+    PARTS = 512, /* number of parts from which on parts are not divided */
+    TASKS = 64   /* number of groups of parts that are distributed to threads */
+};
 
+/* Fails because the stack of a walk cannot grow by the 64 pairs of children of two nodes. */
 static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
 {
     return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
 }
 
-/* Stores pairs of nodes as the parts. Returns false without memory. */
+/* Replaces the parts by `count` pairs of nodes. Returns false if memory is short. */
 static bool store_parts(pair_gathering *g, const ebpo_node_pair *pairs, uint64_t count)
 {
     if (!ebpo_grow(&g->part, &g->part_capacity, count, sizeof *g->part))
@@ -173,24 +182,24 @@ static bool store_parts(pair_gathering *g, const ebpo_node_pair *pairs, uint64_t
     return true;
 }
 
-/* Divides all pairs of nodes repeatedly, until there are enough parts or all parts are pairs of
- * blocks. Returns false without memory. */
+/* Divides all parts repeatedly, until there are enough parts or all parts are pairs of blocks.
+ * Returns false if memory is short. */
 static bool make_parts(pair_gathering *g, ebpo_pair_walk *w)
 {
     bool ok = w->kernels->start(w) && store_parts(g, w->stack, w->top);
-    for (bool more = true; ok && more && g->parts && g->parts < PARTS;) {
-        uint64_t divided = w->node_pairs;
+    for (bool divisible = true; ok && divisible && g->parts && g->parts < PARTS;) {
+        uint64_t node_pairs = w->node_pairs;
         w->top = 0;
         for (uint64_t i = 0; i < g->parts && ok; i++)
             ok = w->kernels->expand(w, g->part[i]);
-        more = w->node_pairs > divided;
+        divisible = w->node_pairs > node_pairs; /* at least one part was a pair of nodes */
         ok = ok && store_parts(g, w->stack, w->top);
     }
     w->top = 0;
     return ok;
 }
 
-/* Searches the parts [begin, end). */
+/* Searches the parts [begin, end) in a thread. Ends if all threads have found too many pairs. */
 static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -213,9 +222,9 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Takes the walks that the collider keeps. Makes new walks if an outer query of the same collider
- * has taken them (the callback that receives pairs may make a query). Returns false without
- * memory. */
+/* Takes the walks that the collider keeps. Makes new walks if another query of the same collider
+ * has taken its walks: the function that receives the pairs of a query may make a second query.
+ * Returns false if memory is short. */
 static bool acquire_walks(pair_gathering *g)
 {
     ebpo_collider *c = g->collision->collider;
@@ -230,6 +239,7 @@ static bool acquire_walks(pair_gathering *g)
     return g->walk != NULL;
 }
 
+/* Prepares the walks of all threads for the faces [begin, end) of the first hierarchy. */
 static ebpo_status prepare_walks(pair_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                  uint32_t end, ebpo_error *error)
 {
@@ -247,7 +257,7 @@ static ebpo_status prepare_walks(pair_gathering *g, const ebpo_accel_pair *pair,
     return EBPO_OK;
 }
 
-/* Joins and sorts the results of all threads. */
+/* Copies the pairs that the threads have found to g->found_pairs, and sorts them. */
 static ebpo_status join_results(pair_gathering *g, const ebpo_accel_pair *pair, ebpo_error *error)
 {
     uint64_t count = 0;
@@ -269,8 +279,8 @@ static ebpo_status join_results(pair_gathering *g, const ebpo_accel_pair *pair, 
     return EBPO_OK;
 }
 
-/* Finds the pairs of the faces [begin, end) of the first hierarchy. Sets g->found_pairs, or, if
- * there are too many pairs, g->full. */
+/* Finds the pairs of the faces [begin, end) of the first hierarchy. Sets g->found_pairs; if there
+ * are too many pairs, sets only g->full. */
 static ebpo_status gather_pairs(pair_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
 {
@@ -289,7 +299,8 @@ static ebpo_status gather_pairs(pair_gathering *g, const ebpo_accel_pair *pair, 
     return join_results(g, pair, error);
 }
 
-/* Returns the walks to the collider for the next query, which reuses their memory. */
+/* Gives the walks back to the collider, so that the next query can use them. Frees them if the
+ * collider has walks already. */
 static void return_walks(pair_gathering *g)
 {
     ebpo_collider *c = g->collision->collider;
@@ -321,9 +332,9 @@ typedef struct pair_receiver {
     bool enough; /* the function has returned false: the caller needs no more pairs */
 } pair_receiver;
 
-enum { PASSED_AT_ONCE = 1024 };
+enum { PASSED_AT_ONCE = 1024 }; /* greatest number of pairs in a call of the caller's function */
 
-/* Passes pairs to the caller. */
+/* Passes pairs to the caller, until there are no more pairs or the caller needs no more pairs. */
 static void pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uint64_t count)
 {
     ebpo_face_pair out[PASSED_AT_ONCE];
@@ -337,7 +348,7 @@ static void pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uin
 }
 
 /* Searches runs of consecutive faces of the first model. A run is halved until its pairs fit in
- * memory; after a run that fits, the next one is twice as long. The pairs of a single face are
+ * memory; after a run that fits, the next run is twice as long. The pairs of a single face are
  * stored even if they do not fit. */
 static ebpo_status search_in_runs(pair_receiver *v, pair_gathering *g, ebpo_error *error)
 {
@@ -361,6 +372,8 @@ static ebpo_status search_in_runs(pair_receiver *v, pair_gathering *g, ebpo_erro
     return EBPO_OK;
 }
 
+/* Finds all intersecting pairs of faces and passes them to `take`. self: as in ebpo_gather_parts.
+ */
 static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
                              ebpo_error *error)
 {
@@ -398,8 +411,8 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
     ebpo_collide_options unposed = EBPO_COLLIDE_OPTIONS_INIT;
     if (c->model[0] != c->model[1])
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "one model with itself: expected a collider whose two models are the same "
-                         "one");
+                         "a collision of a model with itself needs a collider whose two models are "
+                         "the same model");
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;

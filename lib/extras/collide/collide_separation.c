@@ -1,12 +1,14 @@
 /* Computes how far one model has to move along a direction until both models have no common point.
- * The distance is a time t, the last time of contact: the model has moved by t * direction.
+ * The distance is given as the time t of the last contact: at the time t, the model has moved by
+ * t * direction.
  *
- * A heap holds pairs of nodes; its first pair is the one that may separate last. The extents of the
- * nodes along the direction and along two axes perpendicular to it bound the time of their last
- * contact. The last contact of two faces is bounded in doubles (ebpo_sweep_max) and computed
- * exactly (ebpo_sweep_last). Partly loaded models are searched in pairs of subtrees: a subtree is
- * loaded only if its envelope may separate later than the last contact found so far. A search runs
- * in one thread. Bounds: docs/develop/collision.md, "Separation distance along a direction". */
+ * A heap holds pairs of nodes; its first pair is the pair whose last contact may be the latest. The
+ * extents of the nodes along the direction, and along two axes perpendicular to the direction,
+ * bound the time of the nodes' last contact. The last contact of two faces is bounded in doubles
+ * (ebpo_sweep_max) and computed exactly (ebpo_sweep_last). Partly loaded models are searched in
+ * pairs of subtrees: a subtree is loaded only if the last contact of its envelope may be later than
+ * the latest contact that has been found. A search runs in one thread. Bounds:
+ * docs/develop/collision.md, "Separation distance along a direction". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,17 +24,18 @@
 #include "extras/collide/subtree_search.h"
 #include "geometry/vec3.h"
 
-/* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
+/* A pair of children of nodes (hierarchy_walk.h). A child is given by its reference: 8 * the node's
+ * index + the child's lane. */
 typedef struct separation_pair {
-    double most; /* upper bound of the last time at which the two children have a common point */
-    uint32_t a, b;
+    double most;   /* upper bound of the last time at which the two children have a common point */
+    uint32_t a, b; /* references of the children */
 } separation_pair;
 
-/* A hierarchy, and the map from its frame to components along the three axes of
+/* A hierarchy, and the map from points of its frame to their components along the three axes of
  * separation_search. */
 typedef struct separation_side {
-    const ebpo_accel *accel;
-    const ebpo_posing *posing;
+    const ebpo_accel *accel;   /* the hierarchy */
+    const ebpo_posing *posing; /* posing of its model */
     double row[3][3], base[3]; /* [axis] a point x has the component row . x + base */
 } separation_side;
 
@@ -41,19 +44,22 @@ typedef struct separation_search {
     const ebpo_collision *collision;
     double direction[3]; /* direction in which the query's first model moves; the absolute value of
                           * its greatest component is 1/2 to 1 */
-    /* Output: the time of the last contact, in units of `direction`, and its pair of faces.
-     * Contacts before time 0 do not count. */
+    /* Output: the time of the latest contact that has been found, in the unit of `direction`, and
+     * its pair of faces. Contacts before time 0 do not count. */
     ebpo_sweep_time last;
     ebpo_face_pair pair; /* faces of the caller's A and B */
-    double hi;           /* upper bound of the times of dropped pairs; negative: none was dropped */
+    double hi;           /* upper bound of the contact times of pairs that were not visited before
+                          * the deadline; negative: all pairs were visited */
     /* Initially 0: */
     separation_side side[2];
-    double axis[3][3];      /* three perpendicular axes; the first is the direction */
-    double step;            /* length of `direction` */
+    double axis[3][3];      /* three perpendicular unit vectors; the first has the direction */
+    double length;          /* length of `direction` */
     double extent_error;    /* greatest distance by which rounding moves ends of extents */
-    double earliest;        /* lower bound of `last`, 0 or more */
+    double earliest;        /* lower bound of `last`, 0 or more; pairs that cannot have a contact at
+                             * this time or later are not visited */
     separation_pair *pairs; /* [count] a heap; pairs[0] has the greatest `most` */
-    uint64_t count, capacity, evaluations;
+    uint64_t count, capacity;
+    uint64_t evaluations; /* number of pairs of faces that were compared */
 } separation_search;
 
 /* Extents along the three axes. */
@@ -70,6 +76,7 @@ static bool is_later(const separation_pair *a, const separation_pair *b)
 
 EBPO_HEAP(heap, separation_pair, is_later)
 
+/* Adds a pair to the heap. Returns false if memory is short. */
 static bool push_pair(separation_search *s, const separation_pair *pair)
 {
     if (!ebpo_grow(&s->pairs, &s->capacity, s->count + 1, sizeof *s->pairs))
@@ -80,7 +87,7 @@ static bool push_pair(separation_search *s, const separation_pair *pair)
 
 /* --- extents along the three axes --- */
 
-/* Returns the extents of a child of a node. ref: 8 * the node's index + the child's lane. */
+/* Returns the extents of a child in hierarchy `which`. ref: the child's reference. */
 static separation_extent extent_of(const separation_search *s, int which, uint32_t ref)
 {
     const separation_side *side = &s->side[which];
@@ -111,7 +118,7 @@ static double separation_max(const separation_search *s, const separation_extent
         if (b->low[i] - a->high[i] > s->extent_error || a->low[i] - b->high[i] > s->extent_error)
             return -1;
     double along = b->high[0] - a->low[0] + s->extent_error;
-    return along < 0 ? -1 : along / s->step * (1 + 0x1p-40);
+    return along < 0 ? -1 : along / s->length * (1 + 0x1p-40);
 }
 
 /* Sets axis[0] to the direction d with length 1, and axis[1] and axis[2] to unit vectors that are
@@ -155,18 +162,19 @@ static void make_side(separation_search *s, int which, const ebpo_accel *accel)
 
 /* --- faces --- */
 
-/* Returns true if the pair x precedes s->pair in the order of the query's models. */
-static bool comes_first(const separation_search *s, const ebpo_found_pair *x)
+/* Returns true if a pair precedes s->pair: by the index of the face of the query's first model,
+ * then by the index of the other face. */
+static bool precedes(const separation_search *s, const ebpo_found_pair *pair)
 {
-    uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
-             b = ebpo_accel_file_face(s->side[1].accel, x->b);
-    const uint64_t has[2] = { s->pair.file_face_a, s->pair.file_face_b };
+    uint64_t a = ebpo_accel_file_face(s->side[0].accel, pair->a),
+             b = ebpo_accel_file_face(s->side[1].accel, pair->b);
+    const uint64_t known[2] = { s->pair.file_face_a, s->pair.file_face_b };
     bool swapped = s->collision->swapped;
-    return a != has[swapped] ? a < has[swapped] : b < has[!swapped];
+    return a != known[swapped] ? a < known[swapped] : b < known[!swapped];
 }
 
-/* Computes the last contact of two faces. Keeps it if it is later than s->last, or at the same time
- * and of an earlier pair. */
+/* Computes the last contact of two faces. Sets s->last and s->pair if the contact is later than
+ * s->last, or if it is at the same time and the pair precedes s->pair. */
 static void inspect_faces(separation_search *s, const double a[3][3], const double b[3][3],
                           const ebpo_found_pair *pair)
 {
@@ -178,7 +186,7 @@ static void inspect_faces(separation_search *s, const double a[3][3], const doub
     ebpo_sweep_time_init(&t);
     ebpo_sweep_last(a, b, s->direction, &t);
     int order = t.ever && mpz_sgn(t.numerator) >= 0 ? ebpo_sweep_time_compare(&t, &s->last) : -1;
-    if (order > 0 || (order == 0 && comes_first(s, pair))) {
+    if (order > 0 || (order == 0 && precedes(s, pair))) {
         mpz_swap(t.numerator, s->last.numerator);
         mpz_swap(t.denominator, s->last.denominator);
         s->last.unit = t.unit;
@@ -189,6 +197,7 @@ static void inspect_faces(separation_search *s, const double a[3][3], const doub
     ebpo_sweep_time_clear(&t);
 }
 
+/* Computes the last contacts of all pairs of faces of two blocks. */
 static void inspect_blocks(separation_search *s, uint32_t block_a, uint32_t block_b)
 {
     const uint32_t block[2] = { block_a, block_b };
@@ -210,18 +219,21 @@ static void inspect_blocks(separation_search *s, uint32_t block_a, uint32_t bloc
 
 /* --- the search --- */
 
+/* Returns a child's entry: the index of a node, or the index of a block with EBPO_IS_BLOCK. */
 static uint32_t child_of(const separation_search *s, int which, uint32_t ref)
 {
     return s->side[which].accel->bound[ref / 8].child[ref % 8];
 }
 
+/* Returns the sum of the lengths of three extents. */
 static double size_of(const separation_extent *e)
 {
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
-/* Adds to the heap the pairs of each child of `node`, a node of model `which`, with `other`, a
- * child of a node of the other model (as in separation_pair). */
+/* Adds to the heap the pairs of each child of `node`, a node of model `which`, with `other`, the
+ * reference of a child in the other model. Omits pairs that cannot have a contact at the time
+ * s->earliest or later. */
 static ebpo_status offer_children(separation_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
@@ -241,8 +253,8 @@ static ebpo_status offer_children(separation_search *s, int which, uint32_t node
     return EBPO_OK;
 }
 
-/* Divides the larger node of a pair, or, if one of them is a block, the other one. Compares the
- * faces of a pair of blocks. */
+/* Compares the faces of a pair of two blocks. In a pair of a block and a node, divides the node; in
+ * a pair of two nodes, divides the larger node. */
 static ebpo_status divide_pair(separation_search *s, const separation_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
@@ -261,7 +273,7 @@ static void separation_search_begin(separation_search *s)
 {
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
-    s->step = ebpo_vec3_dot(s->axis[0], s->direction);
+    s->length = ebpo_vec3_dot(s->axis[0], s->direction);
     s->extent_error = 0x1p-40 * s->collision->max_coordinate;
     s->hi = -1;
     s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,
@@ -278,7 +290,8 @@ static ebpo_status offer_tops(separation_search *s, ebpo_error *error)
     return status;
 }
 
-/* Searches two hierarchies of the query's models. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+/* Searches a pair of hierarchies of the query's models, until no pair in the heap can have a later
+ * contact or the deadline has passed. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
 static ebpo_status separation_search_run(separation_search *s, const ebpo_accel *const accel[2],
                                          ebpo_error *error)
 {
@@ -311,11 +324,12 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
 
 /* The search in pairs of subtrees. A subtree lists the faces that have a point in its cell.
  * Therefore the last common point of two moving faces is, in each model, in the cell of a subtree
- * that lists the model's face. The envelopes of both subtrees contain the point, so they do not
- * separate before the faces. */
+ * that lists the model's face. The envelopes of both subtrees contain the point, so the last
+ * contact of the envelopes is not earlier than the last contact of the faces. */
 typedef struct node_search {
-    ebpo_subtree_search subtrees; /* ebpo_node_gap.gap is used for minus the last time at which
-                                   * the envelopes may intersect */
+    ebpo_subtree_search subtrees; /* a heap whose least gap comes first; here ebpo_node_gap.gap is
+                                   * minus an upper bound of the time of the envelopes' last contact
+                                   */
     separation_search *search;
 } node_search;
 
@@ -341,6 +355,8 @@ static ebpo_status cell_extent(node_search *s, int which, ebpo_cell cell, separa
     return status;
 }
 
+/* Adds a pair of nodes to the heap, if both nodes have faces and their envelopes may have a contact
+ * at the time s->search->earliest or later. */
 static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], ebpo_error *error)
 {
     separation_extent extent[2];
@@ -357,6 +373,7 @@ static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], 
                                            : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
 }
 
+/* Adds the pairs of each child of node `side` with the other node of a pair. */
 static ebpo_status divide_node_pair(node_search *s, const ebpo_node_gap *pair, int side,
                                     ebpo_error *error)
 {
@@ -369,6 +386,7 @@ static ebpo_status divide_node_pair(node_search *s, const ebpo_node_gap *pair, i
     return status;
 }
 
+/* Divides a pair of nodes, or, if both nodes are roots of subtrees, searches the subtrees. */
 static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
@@ -380,6 +398,7 @@ static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_
     return status == EBPO_OK && loaded ? separation_search_run(s->search, accel, error) : status;
 }
 
+/* Visits pairs of nodes in the order of the bounds of their last contacts, the latest first. */
 static ebpo_status search_node_pairs(node_search *s, ebpo_error *error)
 {
     const ebpo_collision *q = s->subtrees.collision;
@@ -402,10 +421,9 @@ static ebpo_status search_node_pairs(node_search *s, ebpo_error *error)
     return status;
 }
 
-/* Searches pairs of subtrees in the order of the time at which their envelopes may separate, the
- * latest first, until that time is before the last contact found. The result is the same as for
- * models that are entirely in memory. */
-static ebpo_status separation_of_parts(separation_search *search, ebpo_error *error)
+/* Searches pairs of subtrees, until no pair of envelopes can have a contact after the latest
+ * contact that has been found. The result is the same as for models that are entirely in memory. */
+static ebpo_status separation_of_subtrees(separation_search *search, ebpo_error *error)
 {
     node_search s = { .search = search };
     ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, search->collision, error);
@@ -417,8 +435,8 @@ static ebpo_status separation_of_parts(separation_search *search, ebpo_error *er
 
 /* --- the query --- */
 
-/* Sets s->direction to the direction in which the query's first model moves, times 2^-exponent, and
- * returns the exponent. */
+/* Sets s->direction to 2^-exponent times the direction in which the query's first model moves, and
+ * returns the exponent. direction: the direction in which the caller's A moves. */
 static int set_direction(separation_search *s, const double direction[3])
 {
     int exponent;
@@ -429,6 +447,7 @@ static int set_direction(separation_search *s, const double direction[3])
     return exponent;
 }
 
+/* Sets the caller's result. exponent: result of set_direction. */
 static void fill_separation(const separation_search *s, int exponent, ebpo_separation *out)
 {
     double lo = 0, hi = ldexp(s->hi, -exponent) * (1 + 0x1p-50);
@@ -449,8 +468,10 @@ ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options
     ebpo_collision q;
     double size = fabs(direction[0]) + fabs(direction[1]) + fabs(direction[2]);
     if (!(size > 0x1p-500 && size < 0x1p500))
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "expected a direction of three finite numbers, not all 0");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "expected a direction of three numbers whose absolute values have a sum of "
+            "2^-500 to 2^500");
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
@@ -458,7 +479,7 @@ ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options
     int exponent = set_direction(&s, direction);
     separation_search_begin(&s);
     const ebpo_accel *const whole[2] = { q.model[0]->whole, q.model[1]->whole };
-    status = ebpo_collision_is_in_parts(&q) ? separation_of_parts(&s, error)
+    status = ebpo_collision_is_in_parts(&q) ? separation_of_subtrees(&s, error)
                                             : separation_search_run(&s, whole, error);
     if (status == EBPO_OK)
         fill_separation(&s, exponent, out);

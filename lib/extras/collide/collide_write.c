@@ -1,10 +1,10 @@
 /* Writes results for other programs: pairs of intersecting faces to an HDF5 file, and meshes to a
  * PLY file that shows the intersecting faces in red.
  *
- * Rows are written in groups as pairs are found, so memory does not grow with the number of pairs.
- * The writer of PLY files reads vertices and faces in ascending order from a source: a mesh in
- * memory or a partly loaded model. Output files appear only when they are complete (io/publish.h).
- */
+ * The HDF5 file has a row for each pair. Rows are written in groups while pairs are found, so that
+ * memory does not grow with the number of pairs. The writer of PLY files reads vertices and faces
+ * in ascending order from a source: a mesh in memory or a partly loaded model. Output files appear
+ * only when they are complete (io/publish.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,6 +19,7 @@
 #include "hdf5_write/h5.h"
 #include "io/publish.h"
 
+/* Functions of an ebpo_red_source for a mesh in memory. They cannot fail. */
 static ebpo_status mesh_vertex(void *user, uint64_t number, double out[3], ebpo_error *error)
 {
     const ebpo_mesh *mesh = user;
@@ -42,33 +43,36 @@ ebpo_red_source ebpo_red_source_of(const ebpo_mesh *mesh)
                               mesh_face };
 }
 
-static ebpo_status print_vertices(FILE *f, const ebpo_red_mesh *p, ebpo_error *error)
+/* Prints the posed vertices of a mesh. */
+static ebpo_status print_vertices(FILE *f, const ebpo_red_mesh *m, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (uint64_t v = 0; v < p->source.vertices && status == EBPO_OK; v++) {
+    for (uint64_t v = 0; v < m->source.vertices && status == EBPO_OK; v++) {
         double x[3], out[3];
-        status = p->source.vertex(p->source.user, v, x, error);
+        status = m->source.vertex(m->source.user, v, x, error);
         if (status != EBPO_OK)
             break;
         memcpy(out, x, sizeof out);
-        if (p->posing)
-            ebpo_posing_apply(p->posing, x, out);
+        if (m->posing)
+            ebpo_posing_apply(m->posing, x, out);
         fprintf(f, "%.17g %.17g %.17g\n", out[0], out[1], out[2]);
     }
     return status;
 }
 
-static ebpo_status print_faces(FILE *f, const ebpo_red_mesh *p, uint64_t first_vertex,
+/* Prints the faces of a mesh with their colours. first_vertex: index of the mesh's first vertex in
+ * the PLY file. */
+static ebpo_status print_faces(FILE *f, const ebpo_red_mesh *m, uint64_t first_vertex,
                                ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < p->source.faces && status == EBPO_OK; i++) {
+    for (uint64_t i = 0; i < m->source.faces && status == EBPO_OK; i++) {
         uint32_t v[3];
-        bool red = p->red[i / 64] >> i % 64 & 1;
-        status = p->source.face(p->source.user, i, v, error);
+        bool red = m->red[i / 64] >> i % 64 & 1;
+        status = m->source.face(m->source.user, i, v, error);
         if (status == EBPO_OK)
             fprintf(f, "3 %" PRIu64 " %" PRIu64 " %" PRIu64 " %s\n", first_vertex + v[0],
-                    first_vertex + v[1], first_vertex + v[2], red ? "255 0 0" : p->colour);
+                    first_vertex + v[1], first_vertex + v[2], red ? "255 0 0" : m->colour);
     }
     return status;
 }
@@ -108,12 +112,14 @@ ebpo_status ebpo_red_meshes_print(const ebpo_red_mesh *meshes, int count, ebpo_p
 
 /* --- HDF5 --- */
 
+/* The datasets of the file. Those before POINTS have a row for each pair, and all other datasets
+ * have a row for each contact. */
 enum { PAIR_FACES, PAIR_FILE_FACES, PAIR_KIND, POINTS, CONTACT_FACES, CONTACT_ON, TABLES };
 
 static const struct {
     const char *path;
-    ebpo_h5_number number;
-    uint32_t cols;
+    ebpo_h5_number number; /* type of the numbers */
+    uint32_t cols;         /* number of columns; 0: the dataset has one dimension */
 } layout[TABLES] = {
     [PAIR_FACES] = { "/pairs/faces", EBPO_H5_I64, 2 },
     [PAIR_FILE_FACES] = { "/pairs/file_faces", EBPO_H5_I64, 2 },
@@ -129,17 +135,19 @@ enum { ROWS = 512 };
 /* An HDF5 file while it is written. */
 typedef struct pairs_file {
     const ebpo_collision *collision;
-    ebpo_pair_faces lookup; /* for looking up faces */
+    ebpo_pair_faces lookup; /* the look-up of faces by their indices */
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
+    /* rows that wait to be written to each dataset */
     int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
     uint8_t kind[ROWS], on[ROWS][4];
     double points[ROWS][6];
-    uint64_t pairs, contacts; /* numbers of rows that wait to be written */
+    uint64_t pairs, contacts; /* numbers of waiting rows of pairs and of contacts */
+    ebpo_status status;       /* failure of receive_rows, and its error */
     ebpo_error *error;
-    ebpo_status status;
 } pairs_file;
 
+/* Makes the groups and the empty datasets. */
 static ebpo_status make_tables(pairs_file *w, ebpo_error *error)
 {
     static const char *const groups[] = { "/pairs", "/contacts" };
@@ -188,6 +196,8 @@ static bool add_contact_row(pairs_file *w, const ebpo_face_pair *pair)
     return true;
 }
 
+/* Receives pairs from ebpo_collide_all, and adds their rows. Returns false after a failure, and
+ * sets w->status. */
 static bool receive_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     pairs_file *w = user;
@@ -206,6 +216,7 @@ static bool receive_rows(void *user, const ebpo_face_pair *pairs, uint64_t count
     return true;
 }
 
+/* Writes the whole file. */
 static ebpo_status write_tables(pairs_file *w, const char *path, ebpo_publish *target)
 {
     const ebpo_collision *q = w->collision;
@@ -226,6 +237,7 @@ static ebpo_status write_tables(pairs_file *w, const char *path, ebpo_publish *t
     return status;
 }
 
+/* Writes the pairs and contacts of a query to an HDF5 file. */
 static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_publish *target,
                               ebpo_error *error)
 {
@@ -247,8 +259,8 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
 
 /* --- PLY --- */
 
-/* A mesh that is written as PLY. A partly loaded model is read chunk by chunk. The mesh of a model
- * that is entirely in memory (a whole model) is read from the file again. */
+/* A mesh that is written as PLY. The mesh of a partly loaded model is read chunk by chunk. The mesh
+ * of a model that is entirely in memory (a whole model) is read from the model's file. */
 typedef struct shown_mesh {
     ebpo_mesh mesh;             /* for a whole model */
     ebpo_faces_by_number parts; /* for a partly loaded model */
@@ -272,6 +284,7 @@ static bool mark_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
+/* Functions of an ebpo_red_source for a partly loaded model. */
 static ebpo_status part_vertex(void *user, uint64_t number, double out[3], ebpo_error *error)
 {
     return ebpo_faces_by_number_vertex(user, number, out, error);
@@ -282,6 +295,7 @@ static ebpo_status part_face(void *user, uint64_t number, uint32_t out[3], ebpo_
     return ebpo_faces_by_number_corners(user, number, out, error);
 }
 
+/* Prepares the mesh of a model, without marked faces. */
 static ebpo_status begin_shown_mesh(shown_mesh *p, const ebpo_model *model, ebpo_error *error)
 {
     const ebpo_info *info = model->info;
@@ -306,9 +320,10 @@ static void end_shown_mesh(shown_mesh *p)
     free(p->intersecting);
 }
 
+/* Writes both meshes of a query to a PLY file. */
 static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
 {
-    static const char *const colour[2] = { "200 200 200", "150 150 160" };
+    static const char *const colour[2] = { "200 200 200", "150 150 160" }; /* two greys */
     shown_meshes p = { 0 };
     ebpo_red_mesh red[2];
     ebpo_status status = EBPO_OK;

@@ -1,8 +1,8 @@
 /* Makes a collider: two models, options, and data that a query keeps for the following queries.
  *
- * All queries begin with ebpo_collision_begin. It checks the options and puts the models in an
- * order that does not change when the caller swaps them, so results do not depend on the caller's
- * order.
+ * All queries begin with ebpo_collision_begin. This function checks the options and puts the models
+ * in an order (the query's order) that does not change when the caller swaps the models, so results
+ * do not depend on the caller's order.
  *
  * A collider belongs to one thread at a time. ebpo_collider_new refuses models that are subsets;
  * ebpo_collider_of_parts accepts them for callers that know which parts are omitted. */
@@ -21,7 +21,7 @@
 #include "extras/collide/posed_solid.h"
 #include "query/query_model.h"
 
-/* Refuses a subset, because its omitted faces might also intersect. */
+/* Refuses a subset, because faces that were omitted from it might also intersect. */
 static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)
 {
     if (!model->info->pruned)
@@ -62,7 +62,7 @@ ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
     c->model[1] = b;
     c->options = wanted;
     if (!c->options.memory)
-        c->options.memory = 64 << 20;
+        c->options.memory = 64 << 20; /* the default in the public header */
     *out = c;
     return EBPO_OK;
 }
@@ -107,8 +107,9 @@ ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats 
 
 /* --- queries --- */
 
-/* Returns true if the caller's A comes second. Orders by files, then by the bits of poses; the
- * order has no meaning. */
+/* Returns true if the caller's A is the second model in the query's order: by the hashes of the
+ * files' contents, then by the bits of the poses. Any order that does not depend on the caller's
+ * order could be used. */
 static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
 {
     int by_file = memcmp(c->model[0]->info->content_sha256, c->model[1]->info->content_sha256,
@@ -116,6 +117,7 @@ static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
     return (by_file ? by_file : memcmp(&o->pose_a, &o->pose_b, sizeof o->pose_a)) > 0;
 }
 
+/* Sets the posings of both models, and the bound of all posed coordinates. */
 static ebpo_status make_posings(ebpo_collision *q, ebpo_error *error)
 {
     ebpo_posing posing[2];
@@ -159,7 +161,7 @@ bool ebpo_collision_is_late(const ebpo_collision *q)
     return q->deadline != UINT64_MAX && ebpo_clock() >= q->deadline;
 }
 
-/* Counts a file that both models use only once. */
+/* Counts the bytes of a file once if both models use the file. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 {
     uint64_t bytes = 0;

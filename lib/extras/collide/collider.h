@@ -1,4 +1,5 @@
-/* Declares a collider (two models and their options), and the first step of all queries on it. */
+/* Declares a collider (two models, options of queries, and data that queries keep for the next
+ * query), and the first step of all queries. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -25,24 +26,24 @@ struct ebpo_collider {
     uint64_t node_pairs, block_pairs, exact; /* as in ebpo_collider_stats */
     uint64_t subtree_pairs, subtrees, loads,
         bytes_read;                /* as in ebpo_collider_stats; only for partly loaded models */
-    struct ebpo_gap_search *gap;   /* state of distance queries; NULL before the first one */
+    struct ebpo_gap_search *gap;   /* state of distance queries; NULL before the first query */
     struct ebpo_face_two *nearest; /* nearest pair of the last distance query, in the caller's
-                                    * order; or NULL */
-    ebpo_context *context[2]; /* contexts of depth queries; NULL before the first one of a model */
-    uint32_t *slots[2];       /* ebpo_face_slots of models that are entirely in memory; NULL before
-                               * the first query that needs the array */
+                                    * order of the models; NULL: no query has found a pair */
+    ebpo_context *context[2];      /* contexts of depth queries; NULL before the first query */
+    uint32_t *slots[2]; /* ebpo_face_slots of models that are entirely in memory; NULL before the
+                         * first query that needs the array */
 };
 
-/* A query with checked options. Its models are in an order that stays the same when the caller
- * swaps them. */
+/* A query with checked options. Its models are in the query's order, which stays the same when the
+ * caller swaps the models. */
 typedef struct ebpo_collision {
     ebpo_collider *collider;
-    ebpo_collide_options options;
-    bool swapped; /* model[0] is the caller's B */
-    ebpo_model *model[2];
-    ebpo_block_posing posing[2];
-    double max_coordinate; /* upper bound of the absolute values of all posed coordinates */
-    uint64_t deadline;     /* deadline, a time of ebpo_clock; UINT64_MAX: none */
+    ebpo_collide_options options; /* pose_a and pose_b are poses of the caller's A and B */
+    bool swapped;                 /* model[0] is the caller's B */
+    ebpo_model *model[2];         /* in the query's order */
+    ebpo_block_posing posing[2];  /* in the query's order */
+    double max_coordinate;        /* upper bound of the absolute values of all posed coordinates */
+    uint64_t deadline;            /* deadline, a time of ebpo_clock; UINT64_MAX: none */
 } ebpo_collision;
 
 /* Checks the options and prepares a query. Fails with EBPO_E_ARGUMENT (options, poses). */
@@ -55,7 +56,7 @@ bool ebpo_collision_is_late(const ebpo_collision *collision);
 
 /* Finds a contact of two hierarchies of the query's models. Sets *found as ebpo_collide_first does.
  * If *found is 1, the contact is in found_pairs[0] and found_slot of the collider's walk. stage:
- * for the progress function. */
+ * the text that the progress function receives. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
@@ -66,8 +67,8 @@ uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 /* Returns true if a model is not entirely in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
 
-/* Begins a walk. A walk that was used before reuses its memory; a new walk must be zero. `pair`
- * must live as long as the walk is used. */
+/* Begins a walk. `walk` must be zero or have been used before; then its memory is used again.
+ * `pair` must live as long as the walk is used. */
 void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 
 /* Adds a walk's counts to the collider's counts, and resets them. */
@@ -85,7 +86,8 @@ EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   ebpo_pairs_fn take, void *user,
                                                   ebpo_error *error);
 
-/* Returns the interval lo .. hi as a result, with its kind. */
+/* Returns the interval lo .. hi as a result: exact if lo = hi, a bound if one end is trivial (0 or
+ * infinite), otherwise an interval. */
 static inline ebpo_value_bounds ebpo_value_bounds_of(double lo, double hi)
 {
     bool bound = lo != hi && (lo == 0 || isinf(hi));

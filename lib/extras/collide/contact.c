@@ -1,9 +1,10 @@
 /* Computes the ends of the segment that two crossing faces have in common.
  *
- * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the ends are on
- * the right edges. The point where an edge pierces a plane is computed in double-double arithmetic
- * (an ebpo_pair is a number: the sum of two doubles). If coordinates are too large or too small for
- * the error bounds of that arithmetic, the point is computed exactly with GMP and rounded once.
+ * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so each end is
+ * computed from the correct edge. The point where an edge pierces a plane is computed in
+ * double-double arithmetic, in which an ebpo_pair is a number: the sum of two doubles. If
+ * coordinates are too large or too small for the error bounds of double-double arithmetic, the
+ * point is computed exactly with GMP and rounded once.
  * Neither the order of the faces nor the order of their corners changes a bit of the points.
  * Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are pure and can
  * be called from any thread. */
@@ -19,11 +20,13 @@
 #include "geometry/triangle_pair.h"
 
 /* An edge with its ends on different sides of a plane, and three points of the plane. The two ends
- * are sorted by coordinates, and so are the three points. */
+ * and the three points are sorted by their coordinates, so that results do not depend on the order
+ * of corners. */
 typedef struct piercing {
     const double *end[2], *plane[3];
 } piercing;
 
+/* Sorts n corners by their coordinates. */
 static void sort_corners(const double **corner, int n)
 {
     for (int i = 1; i < n; i++)
@@ -34,9 +37,12 @@ static void sort_corners(const double **corner, int n)
         }
 }
 
-static piercing piercing_of(const double edge_of[3][3], int from, int to, const double plane[3][3])
+/* Returns the piercing of the edge between two corners of `face` with the plane of the face
+ * `plane`.
+ */
+static piercing piercing_of(const double face[3][3], int from, int to, const double plane[3][3])
 {
-    piercing p = { { edge_of[from], edge_of[to] }, { plane[0], plane[1], plane[2] } };
+    piercing p = { { face[from], face[to] }, { plane[0], plane[1], plane[2] } };
     sort_corners(p.end, 2);
     sort_corners(p.plane, 3);
     return p;
@@ -60,10 +66,11 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
 }
 
 /* Sets *share to the position of the piercing point as a fraction of the edge: height[0] /
- * (height[0] - height[1]). Returns false if the error of *share may be too large. */
+ * (height[0] - height[1]), where height[i] is the height of end i over the plane. Returns false if
+ * the error of *share may be too large. */
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
-    ebpo_pair e[3], f[3], normal[3], height[2];
+    ebpo_pair e[3], f[3], normal[3], height[2]; /* e, f: two edges of the face in the plane */
     double products[3], most = 0;
     ebpo_pair_differences(p->plane[0], p->plane[1], e);
     ebpo_pair_differences(p->plane[0], p->plane[2], f);
@@ -79,7 +86,7 @@ static bool share_of_edge(const piercing *p, ebpo_pair *share)
     return most <= 0x1p30 * fabs(difference.head) && fabs(difference.head) >= 0x1p-600;
 }
 
-/* Returns false if coordinates are so large or small that the error bounds do not hold. */
+/* Returns false if coordinates are so large or so small that the error bounds are not valid. */
 static bool is_ordinary(const piercing *p)
 {
     const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
@@ -109,11 +116,16 @@ static bool point_by_pairs(const piercing *p, double out[3])
 
 /* --- the point, exact and rounded once --- */
 
+/* A piercing in integers, which count multiples of 2^unit. */
 typedef struct exact_piercing {
-    ebpo_vectorz end[2], plane[3], normal;
-    mpz_t height[2], numerator;
+    ebpo_vectorz end[2];   /* ends of the edge */
+    ebpo_vectorz plane[3]; /* plane[0]: a point of the plane; plane[1], plane[2]: differences */
+    ebpo_vectorz normal;   /* normal of the plane */
+    mpz_t height[2];       /* heights of the ends over the plane, times the normal's length */
+    mpz_t numerator;       /* an intermediate result */
 } exact_piercing;
 
+/* Sets the integers from a piercing, and computes the normal and the heights. */
 static void set_exact(exact_piercing *e, const piercing *p, int unit)
 {
     for (int k = 0; k < 3; k++) {
@@ -131,8 +143,8 @@ static void set_exact(exact_piercing *e, const piercing *p, int unit)
     }
 }
 
-/* Computes the point (end1 h0 - end0 h1) / (h0 - h1), where h0 and h1, of different signs, are the
- * heights of the ends over the plane. */
+/* Computes the point (end1 h0 - end0 h1) / (h0 - h1). h0 and h1 are the heights of the ends over
+ * the plane, and have different signs. First makes h0 - h1 positive. */
 static void exact_point(exact_piercing *e, int unit, double out[3])
 {
     if (mpz_sgn(e->height[0]) < 0 || mpz_sgn(e->height[1]) > 0)
@@ -141,11 +153,12 @@ static void exact_point(exact_piercing *e, int unit, double out[3])
     for (int k = 0; k < 3; k++) {
         mpz_mul(e->numerator, e->end[1].x[k], e->height[0]);
         mpz_submul(e->numerator, e->end[0].x[k], e->height[1]);
-        mpz_sub(e->normal.x[0], e->height[0], e->height[1]);
+        mpz_sub(e->normal.x[0], e->height[0], e->height[1]); /* the normal is not needed any more */
         out[k] = ebpo_round_quotient(e->numerator, e->normal.x[0], unit);
     }
 }
 
+/* Computes the piercing point exactly, and rounds it once. */
 static void point_by_integers(const piercing *p, double out[3])
 {
     exact_piercing e;
@@ -167,6 +180,7 @@ static void point_by_integers(const piercing *p, double out[3])
         ebpo_vectorz_clear(all[i]);
 }
 
+/* Computes the piercing point. */
 static void compute_piercing(const piercing *p, double out[3])
 {
     if (!point_by_pairs(p, out))
@@ -175,14 +189,16 @@ static void compute_piercing(const piercing *p, double out[3])
 
 /* --- which edge pierces --- */
 
-/* An edge of a face. It begins at the corner that is alone on one side of the other face's plane.
- */
+/* An edge of a face that intersects the plane of the other face. The edge begins at the corner that
+ * is alone on one side of this plane. */
 typedef struct edge {
-    const double (*face)[3], (*plane)[3];
-    int from, to;
-    bool ends_in_plane; /* corner `to` is in the plane */
+    const double (*face)[3];  /* corners of the face that has the edge */
+    const double (*plane)[3]; /* corners of the other face */
+    int from, to;             /* corners of `face` at which the edge begins and ends */
+    bool ends_in_plane;       /* corner `to` is in the plane */
 } edge;
 
+/* Returns the feature of the edge's face that contains the piercing point. */
 static ebpo_feature feature_of(const edge *e)
 {
     if (e->ends_in_plane)
@@ -214,8 +230,8 @@ static const edge *choose_edge(const edge *a, const edge *b)
     return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
 }
 
-/* Sets an end of the segment. order < 0: it is the point where A's edge pierces B; order > 0: the
- * point where B's edge pierces A; 0: both are the same point. */
+/* Sets an end of the segment. order < 0: the end is the point where A's edge pierces B; order > 0:
+ * the end is the point where B's edge pierces A; 0: both points are equal. */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
     end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);
@@ -229,8 +245,9 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
     ebpo_pair_kind kind;
     if (!ebpo_prepare_pair(a, b, &t, &kind))
         return;
-    bool reversed = t.flipped_a != t.flipped_b;
-    edge of_a[2], of_b[2]; /* the edges from t.a[0] and t.b[0] to corners 1 and 2 */
+    bool reversed =
+        t.flipped_a != t.flipped_b; /* the intervals below have the opposite direction */
+    edge of_a[2], of_b[2];          /* the edges from t.a[0] and t.b[0] to corners 1 and 2 */
     for (int i = 0; i < 2; i++) {
         of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
         of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };

@@ -1,10 +1,10 @@
 /* Joins the segments of all crossing pairs to lines of contact. Two segments are joined where they
  * end at the same features of the same faces.
  *
- * Each end has a key: the edge or corner that contains the end, and the face of the other model.
- * Ends with equal keys are the same point. Corners with equal coordinates have the same index
- * (face_patches.h). A line continues where exactly one segment ends and exactly one begins; at all
- * other points it ends. */
+ * Each end of a segment has a key: for each model, the feature (corner, edge or face) that contains
+ * the end. Ends with equal keys are the same point. Corners with equal coordinates have the same
+ * index (face_patches.h). A line continues at a point where exactly one segment ends and exactly
+ * one segment begins; at all other points it ends. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,40 +19,41 @@
 
 #define NONE UINT32_MAX
 
-/* Key of an end: for each model the feature that contains the end. An edge is the indices of its
- * two corners, the lesser first; a corner is its index and NONE; a face is NONE and its index. */
+/* Key of an end of a segment. */
 typedef struct end_key {
-    uint32_t on[2][2]; /* [model] */
-    uint32_t end;      /* twice the segment's index, plus 1 for its second end */
+    /* [model] the feature that contains the end. A corner: its index and NONE. An edge: the indices
+     * of its two corners, the lesser index first. A face: NONE and its index. */
+    uint32_t on[2][2];
+    uint32_t end; /* twice the segment's index, plus 1 for its second end */
 } end_key;
 
 typedef struct segment {
     ebpo_contact_segment contact;
-    double normal[2][3];
+    double normal[2][3];    /* unit normals of the faces of A and B */
     uint32_t after, before; /* neighbouring segments in the line, or NONE */
-    bool reported;
+    bool reported;          /* the segment belongs to a line that has been made */
 } segment;
 
 typedef struct line_search {
-    ebpo_pair_faces lookup; /* for looking up faces */
+    ebpo_pair_faces lookup; /* the look-up of faces by their indices */
     uint64_t most;          /* maximum number of segments */
     segment *segment;       /* [count] */
-    end_key *key;           /* two for each segment */
+    end_key *key;           /* [2 count] keys of the ends of all segments */
     uint64_t count, capacity, key_capacity;
-    ebpo_corner_ids corners[2];
-    ebpo_polyline line;
+    ebpo_corner_ids corners[2]; /* indices of the corners of A and B */
+    ebpo_polyline line;         /* the line that is passed to the caller, and its arrays */
     double *points, *normals;
     uint64_t *faces;
     uint64_t points_capacity, normals_capacity, faces_capacity;
     bool full;          /* there are more than `most` segments */
     bool no_memory;     /* an allocation has failed */
-    ebpo_error *error;  /* error of `status` */
-    ebpo_status status; /* other failures */
+    ebpo_status status; /* failure of reading faces, and its error */
+    ebpo_error *error;
 } line_search;
 
 /* --- gathering --- */
 
-/* Computes the unit normal of a face; 0, 0, 0 if it has no area in doubles. */
+/* Computes the unit normal of a face; 0, 0, 0 if the computed normal has the length 0. */
 static void unit_normal(const double t[3][3], double out[3])
 {
     double e[2][3], most[2] = { 0, 0 }, length;
@@ -73,9 +74,9 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* Sets `out` to the key of a feature of a face of the caller's model m. on: ebpo_feature; 0 to 2: a
- * corner, 3 to 5: an edge, more: the interior. t: the face's corners as in the file. Returns false
- * without memory. */
+/* Sets `out` to the part of an end_key for a feature of a face of the caller's model m. on: an
+ * ebpo_feature: 0 to 2 for a corner, 3 to 5 for an edge, above 5 for the interior. t: the face's
+ * corners as in the file. Returns false if memory is short. */
 static bool set_feature(line_search *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {
@@ -96,8 +97,8 @@ static bool set_feature(line_search *l, int m, uint64_t face, const double t[3][
     return true;
 }
 
-/* Adds the segment of a crossing pair, with the keys of its ends. Returns false without memory;
- * sets l->status after other failures. */
+/* Adds the segment of a crossing pair, with the keys of its ends. Returns false if memory is short.
+ * Sets l->status, and returns true, after a failure of reading. */
 static bool add_segment(line_search *l, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
@@ -125,6 +126,8 @@ static bool add_segment(line_search *l, const ebpo_face_pair *pair)
     return true;
 }
 
+/* Receives pairs from ebpo_collide_all, and adds the segments of crossing pairs. Returns false
+ * after a failure or if there are too many segments. */
 static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     line_search *l = user;
@@ -143,6 +146,7 @@ static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t coun
 
 /* --- joining --- */
 
+/* Compares the features of two keys; returns a negative number, 0 or a positive number. */
 static int compare_features(const end_key *p, const end_key *q)
 {
     for (int i = 0; i < 4; i++)
@@ -151,6 +155,7 @@ static int compare_features(const end_key *p, const end_key *q)
     return 0;
 }
 
+/* Compares two keys by their features, then by their ends, for qsort. */
 static int by_features(const void *x, const void *y)
 {
     const end_key *p = x, *q = y;
@@ -158,7 +163,8 @@ static int by_features(const void *x, const void *y)
     return order ? order : (p->end > q->end) - (p->end < q->end);
 }
 
-/* Joins segments at each point where exactly one segment ends and exactly one begins. */
+/* Joins two segments at each point where exactly one segment ends and exactly one segment begins.
+ */
 static void join_segments(line_search *l)
 {
     uint64_t n = 2 * l->count;
@@ -178,6 +184,7 @@ static void join_segments(line_search *l)
 
 /* --- output --- */
 
+/* Adds a point to the line. Returns false if memory is short. */
 static bool add_point(line_search *l, const double at[3])
 {
     /* a copy, because `at` may point into the array that grows */
@@ -188,8 +195,8 @@ static bool add_point(line_search *l, const double at[3])
     return true;
 }
 
-/* Adds to the line the first point of a segment, its faces and normals. The segment's second point
- * is the first point of the next segment. Returns false without memory. */
+/* Adds the first point, the faces and the normals of a segment to the line. The segment's second
+ * point is the first point of the next segment. Returns false if memory is short. */
 static bool add_to_line(line_search *l, segment *s)
 {
     uint64_t n = l->line.count;
@@ -204,8 +211,8 @@ static bool add_to_line(line_search *l, segment *s)
     return true;
 }
 
-/* Makes the line that contains segment i, the first segment that has not been reported. Returns
- * false without memory. */
+/* Makes the line that contains segment i, which has not been reported. Returns false if memory is
+ * short. */
 static bool make_line(line_search *l, uint32_t i)
 {
     uint32_t first = i, last = NONE;
@@ -228,6 +235,7 @@ static bool make_line(line_search *l, uint32_t i)
     return true;
 }
 
+/* Makes all lines, and passes them to the caller until the function `take` returns false. */
 static ebpo_status pass_lines(line_search *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
 {
     for (uint64_t i = 0; i < l->count; i++) {
@@ -241,13 +249,14 @@ static ebpo_status pass_lines(line_search *l, ebpo_polylines_fn take, void *user
     return EBPO_OK;
 }
 
+/* Fails because memory is short or there are too many segments. */
 static ebpo_status fail_lines(const line_search *l, ebpo_error *error)
 {
     if (l->no_memory)
         return ebpo_fail_memory(error, l->capacity * sizeof *l->segment);
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "lines of contact: the collider's memory is too small for more than %llu "
-                     "segments; give it more",
+                     "segments; give the collider more memory",
                      (unsigned long long)l->most);
 }
 
@@ -263,9 +272,10 @@ static void free_lines(line_search *l)
     free(l->faces);
 }
 
-/* Memory of a segment with its share of all arrays, and the greatest number of segments, whose ends
- * have indices of 32 bits. */
-enum { SEGMENT_BYTES = 256, SEGMENTS_MAX = 1 << 30 };
+enum {
+    SEGMENT_BYTES = 256,   /* memory of a segment with its share of all arrays */
+    SEGMENTS_MAX = 1 << 30 /* greatest number of segments, because ends have indices of 32 bits */
+};
 
 uint64_t ebpo_contact_lines_max(const ebpo_collider *c)
 {

@@ -1,12 +1,13 @@
 /* Finds patches of faces: the connected components of a mesh.
  *
- * One function connects faces by corners with equal coordinates, the other one by edges that
- * exactly two faces share. Connected faces are joined in a disjoint-set forest, in which the root
- * of a tree is the first face of the patch. A hash table gives corners with equal coordinates the
- * same index (0 and -0 are equal).
+ * ebpo_face_patches connects faces by corners with equal coordinates, ebpo_edge_patches by edges
+ * that exactly two faces share. Connected faces are joined in a disjoint-set forest, in which the
+ * root of a tree is the first face of the patch. A hash table gives corners with equal coordinates
+ * the same index (0 and -0 are equal).
  *
- * If no face of a patch intersects another model, the patch is entirely on one side of that model.
- * The relation of two models and the exact volumes of Boolean operations rely on this. */
+ * If no face of a patch intersects another model, the whole patch is inside or outside the other
+ * model. The relation of two models and the exact volumes of Boolean operations rely on this fact.
+ */
 #include "core/strict_fp.h"
 
 #include <stdint.h>
@@ -22,24 +23,27 @@
 
 /* --- joined faces --- */
 
-/* Returns the root of the tree of `face` in the forest: the first face of all faces joined with
- * `face` so far. first[face]: parent of the face; initially the face itself. Shortens paths. */
-static inline uint32_t first_joined(uint32_t *first, uint32_t face)
+/* Returns the root of the tree of `face` in the forest: the face with the least index among all
+ * faces that have been joined with `face`. parent[face]: parent of a face in its tree; the root is
+ * its own parent. Shortens the paths to the root. */
+static inline uint32_t first_joined(uint32_t *parent, uint32_t face)
 {
-    while (first[face] != face) {
-        first[face] = first[first[face]];
-        face = first[face];
+    while (parent[face] != face) {
+        parent[face] = parent[parent[face]];
+        face = parent[face];
     }
     return face;
 }
 
-static inline void join_faces(uint32_t *first, uint32_t a, uint32_t b)
+/* Joins the trees of two faces. */
+static inline void join_faces(uint32_t *parent, uint32_t a, uint32_t b)
 {
-    a = first_joined(first, a);
-    b = first_joined(first, b);
-    first[a > b ? a : b] = a > b ? b : a;
+    a = first_joined(parent, a);
+    b = first_joined(parent, b);
+    parent[a > b ? a : b] = a > b ? b : a;
 }
 
+/* Returns a hash of a corner's coordinates. */
 static uint64_t hash_of(const double x[3])
 {
     uint64_t bits[3], h = 0;
@@ -51,12 +55,14 @@ static uint64_t hash_of(const double x[3])
     return h;
 }
 
+/* Returns true if two corners have equal coordinates. */
 static bool same_corner(const double p[3], const double q[3])
 {
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Returns the corner's entry of the table, or the free entry for it. */
+/* Returns the entry of the table that has the corner x, or, if no entry has it, the free entry for
+ * the corner. */
 static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
 {
     uint64_t i = hash_of(x) & (ids->table_size - 1);
@@ -65,6 +71,8 @@ static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
     return &ids->table[i];
 }
 
+/* Replaces the table by a table with `size` entries, a power of two. Returns false if memory is
+ * short. */
 static bool enlarge_table(ebpo_corner_ids *ids, uint64_t size)
 {
     uint32_t *table = ebpo_alloc_zero(size, sizeof *table);
@@ -109,25 +117,27 @@ void ebpo_corner_ids_free(ebpo_corner_ids *ids)
     *ids = (ebpo_corner_ids){ 0 };
 }
 
+/* --- patches over corners --- */
+
 typedef struct corner_joining {
     ebpo_corner_ids corners;
-    uint32_t *user; /* [corner] a face that has this corner */
-    uint64_t users; /* capacity of `user` */
+    uint32_t *face; /* [corner] the first face that has this corner */
+    uint64_t face_capacity;
 } corner_joining;
 
-/* Joins a face with the faces that have one of its corners. Returns false without memory. */
+/* Joins a face with the faces that have one of its corners. Returns false if memory is short. */
 static bool join_face(corner_joining *j, uint32_t *patch, uint32_t face, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
         uint32_t id;
         uint64_t known = j->corners.count;
         if (!ebpo_corner_id(&j->corners, t[i], &id) ||
-            !ebpo_grow(&j->user, &j->users, j->corners.count, sizeof *j->user))
+            !ebpo_grow(&j->face, &j->face_capacity, j->corners.count, sizeof *j->face))
             return false;
         if (id < known)
-            join_faces(patch, j->user[id], face);
+            join_faces(patch, j->face[id], face);
         else
-            j->user[id] = face;
+            j->face[id] = face;
     }
     return true;
 }
@@ -152,7 +162,7 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
     for (uint32_t f = 0; f < count && ok; f++)
         patch[f] = first_joined(patch, f);
     ebpo_corner_ids_free(&j.corners);
-    free(j.user);
+    free(j.face);
     if (!ok) {
         free(patch);
         return ebpo_fail_memory(error, count * sizeof *patch);
@@ -163,21 +173,22 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
 
 /* --- patches over edges --- */
 
-/* Each corner has a list of the edges at whose other end is a corner with a greater index. An entry
- * has the other corner and a face with this edge. If exactly two entries of a list have the same
- * other corner, their faces are joined. */
+/* Each edge of each face is an entry in the list of the edge's lesser corner (the corner with the
+ * lesser index). The entry has the edge's greater corner and the face. If exactly two entries of a
+ * list have the same greater corner, two faces share the edge, and are joined. */
 
 #define NO_CORNER UINT32_MAX
 
 typedef struct edge_lists {
     const ebpo_accel *whole;
-    uint32_t (*corner)[3]; /* corners of each face; NO_CORNER: the face has no area */
-    uint64_t *end;  /* end of each corner's list, which begins at the end of the previous list */
-    uint64_t *edge; /* other corner << 32 | face */
-    uint32_t *patch;
+    uint32_t (*corner)[3]; /* [face] corners of the face; NO_CORNER: the face has no area */
+    uint64_t *end;   /* [corner] end of the corner's list, which begins at the end of the previous
+                      * list */
+    uint64_t *edge;  /* the lists; an entry is greater corner << 32 | face */
+    uint32_t *patch; /* [face] the forest of joined faces */
 } edge_lists;
 
-/* Sets the corners of all faces, and makes each face a patch. Returns false without memory. */
+/* Sets the corners of all faces, and makes each face a patch. Returns false if memory is short. */
 static bool number_corners(edge_lists *e, ebpo_corner_ids *ids, const uint32_t *slots,
                            const ebpo_posing *posing)
 {
@@ -194,39 +205,40 @@ static bool number_corners(edge_lists *e, ebpo_corner_ids *ids, const uint32_t *
     return true;
 }
 
-/* Sets *lesser and *other to the corners of edge i of face f. Returns false if the face has no
- * area.
- */
-static bool edge_of(const edge_lists *e, uint32_t f, int i, uint32_t *lesser, uint32_t *other)
+/* Sets *lesser and *greater to the corners of edge i of face f. Returns false if the face has no
+ * area. */
+static bool edge_of(const edge_lists *e, uint32_t f, int i, uint32_t *lesser, uint32_t *greater)
 {
     uint32_t a = e->corner[f][i], b = e->corner[f][i == 2 ? 0 : i + 1];
     *lesser = a < b ? a : b;
-    *other = a < b ? b : a;
+    *greater = a < b ? b : a;
     return e->corner[f][0] != NO_CORNER;
 }
 
 /* Counts the entries of all lists, then fills the lists. */
 static void list_edges(edge_lists *e, uint64_t corners)
 {
-    uint32_t at, other;
+    uint32_t lesser, greater;
     for (uint32_t f = 0; f < e->whole->face_count; f++)
         for (int i = 0; i < 3; i++)
-            if (edge_of(e, f, i, &at, &other))
-                e->end[at + 1]++;
+            if (edge_of(e, f, i, &lesser, &greater))
+                e->end[lesser + 1]++;
     for (uint64_t c = 0; c < corners; c++)
         e->end[c + 1] += e->end[c];
     for (uint32_t f = 0; f < e->whole->face_count; f++)
         for (int i = 0; i < 3; i++)
-            if (edge_of(e, f, i, &at, &other))
-                e->edge[e->end[at]++] = (uint64_t)other << 32 | f;
+            if (edge_of(e, f, i, &lesser, &greater))
+                e->edge[e->end[lesser]++] = (uint64_t)greater << 32 | f;
 }
 
+/* Compares two entries for qsort. */
 static int compare_edges(const void *a, const void *b)
 {
     uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return (x > y) - (x < y);
 }
 
+/* Sorts the list of a corner, and joins the faces of each edge that exactly two faces share. */
 static void join_list(edge_lists *e, uint64_t *list, uint64_t count)
 {
     if (count > 1)
@@ -239,6 +251,7 @@ static void join_list(edge_lists *e, uint64_t *list, uint64_t count)
     }
 }
 
+/* Makes the lists, and sets e->patch to the result. Returns false if memory is short. */
 static bool join_edges(edge_lists *e, uint64_t corners)
 {
     uint64_t faces = e->whole->face_count;
@@ -272,7 +285,7 @@ ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
     free(e.edge);
     if (!ok) {
         free(e.patch);
-        /* 60 bytes for each face: corner, end, edge and patch, approximately */
+        /* the arrays have approximately 60 bytes for each face */
         return ebpo_fail_memory(error, whole->face_count * (uint64_t)60);
     }
     *out = e.patch;

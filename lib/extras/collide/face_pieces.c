@@ -1,12 +1,13 @@
 /* Finds the pieces into which other faces cut a face, and an exact point of each piece.
  *
  * The face is projected along the axis on which its normal has the largest component; p and q are
- * the two other coordinates, which are GMP fractions. Other faces cut it along segments, the cuts.
- * Values of p at which a cut begins, ends or crosses another cut are events. Between neighbouring
- * events (in a strip) the cuts have one order in q, so they divide the strip into parts. Two parts
- * of neighbouring strips belong to one piece if their borders have an open interval in common that
- * no cut covers. For each point, the other faces in the same plane that contain it are counted by
- * their orientation. See docs/develop/collision.md, "Relation of two models". */
+ * the two other coordinates, which are GMP fractions. Other faces cut the face along segments, the
+ * cuts. A value of p at which a cut begins, ends or crosses another cut is an event. Between
+ * neighbouring events (in a strip) the cuts have one order in q, so they divide the strip into
+ * parts. Two parts of neighbouring strips belong to one piece if their borders have an open
+ * interval in common that no cut covers. For each point of a piece, the other faces that are in the
+ * same plane and contain the point are counted by their orientation. See docs/develop/collision.md,
+ * "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,7 +21,7 @@
 
 /* --- arrays of fractions: initialised once, then reused --- */
 
-/* Makes space for one more cut, whose fractions are initialised. Returns false without memory. */
+/* Makes space for one more cut, and initialises its fractions. Returns false if memory is short. */
 static bool capacity_for_cut(ebpo_face_cuts *f)
 {
     if (!ebpo_grow(&f->cut, &f->cut_capacity, f->cuts + 1, sizeof *f->cut))
@@ -32,7 +33,7 @@ static bool capacity_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-/* Adds a value of p to the events. Sets f->no_memory if there is not enough memory. */
+/* Adds a value of p to the events. Sets f->no_memory if memory is short. */
 static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
@@ -44,8 +45,7 @@ static void add_event(ebpo_face_cuts *f, const mpq_t p)
     mpq_set(f->event[f->events++], p);
 }
 
-/* Adds the point (p, q) to the vertices if f->all_cuts. Sets f->no_memory if there is not enough
- * memory. */
+/* Adds the point (p, q) to the vertices if f->all_cuts. Sets f->no_memory if memory is short. */
 static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 {
     if (!f->all_cuts)
@@ -62,8 +62,9 @@ static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 
 /* --- the face --- */
 
-/* Chooses the axis of the projection: the axis on which the normal's component is not 0 and,
- * computed in doubles, greatest. */
+/* Chooses the axis of the projection, and the orientation of the projected corners. Among the axes
+ * on which the normal's component is not 0, chooses the axis with the greatest component, computed
+ * in doubles. */
 static void choose_projection(ebpo_face_cuts *f)
 {
     double most = -1;
@@ -85,7 +86,7 @@ static void choose_projection(ebpo_face_cuts *f)
     }
 }
 
-/* Sets out to a - b. */
+/* Sets out to a - b, exactly. */
 static void difference_of(mpq_t out, mpq_t scratch, double a, double b)
 {
     mpq_set_d(out, a);
@@ -93,7 +94,7 @@ static void difference_of(mpq_t out, mpq_t scratch, double a, double b)
     mpq_sub(out, out, scratch);
 }
 
-/* Sets the face's plane. */
+/* Computes the face's plane, exactly. */
 static void set_plane(ebpo_face_cuts *f)
 {
     mpq_t *s = f->scratch;
@@ -114,8 +115,9 @@ static void set_plane(ebpo_face_cuts *f)
     }
 }
 
-/* Orients the cut whose ends are in f->cut[f->cuts], and adds it. Adds only an event and a vertex
- * for a cut of length 0. */
+/* Completes the new cut f->cut[f->cuts], whose ends have been set: orders the ends by p, computes
+ * the slope, and adds the events and vertices. A cut of length 0 adds only an event and a vertex.
+ */
 static void finish_cut(ebpo_face_cuts *f)
 {
     ebpo_face_cut *c = &f->cut[f->cuts];
@@ -141,6 +143,7 @@ static void finish_cut(ebpo_face_cuts *f)
     f->cuts++;
 }
 
+/* Sets an end (0 or 1) of the new cut to the projection of x. */
 static void set_end(ebpo_face_cuts *f, int end, const double x[3])
 {
     mpq_set_d(f->cut[f->cuts].p[end], x[f->u]);
@@ -150,7 +153,7 @@ static void set_end(ebpo_face_cuts *f, int end, const double x[3])
 /* The first FACE_EDGES cuts are the edges of the face itself. */
 enum { FACE_EDGES = 3 };
 
-/* Adds the edges of t as cuts. t is the face itself or another face in the same plane. */
+/* Adds the edges of t, which is the face itself or another face in the same plane, as cuts. */
 static void cut_along_edges(ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
@@ -184,8 +187,8 @@ void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all
 
 /* --- other faces --- */
 
-/* Returns the side of edge i of the projection of x: 1: inside, -1: outside, 0: on the edge's
- * line. */
+/* Returns the side of the face's edge i on which the projection of x is: 1 for the inner side, -1
+ * for the outer side, 0 for the edge's line. */
 static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
 {
     const double *a = f->corner[i], *b = f->corner[(i + 1) % 3];
@@ -193,8 +196,8 @@ static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if, for an edge of the face, all corners of t are on the outer side or on the edge's
- * line. */
+/* Returns true if the face has an edge that separates it from t: all corners of t are on the outer
+ * side or on the line of the edge. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -229,8 +232,8 @@ static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const do
     }
 }
 
-/* Adds the cut of a face t that intersects the plane of this face. side: sides of the plane on
- * which the corners of t are. */
+/* Adds the cut of a face t that intersects the plane of the cut face but is not in the plane. side:
+ * sides of the plane on which the corners of t are. */
 static void cut_across(ebpo_face_cuts *f, const double t[3][3], const int side[3])
 {
     int ends = 0;
@@ -274,7 +277,7 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
         return;
     if ((!f->all_cuts && beyond_an_edge(f, t)) || ebpo_zero_area(t[0], t[1], t[2]))
         return;
-    if (!(side[0] | side[1] | side[2])) {
+    if (!(side[0] | side[1] | side[2])) { /* t is in the plane */
         add_flat(f, t, model);
         return;
     }
@@ -364,12 +367,14 @@ static void value_of_cut(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
 /* Returns true if the cut is parallel to the q axis. */
 static bool is_upright(const ebpo_face_cut *c) { return mpq_equal(c->p[0], c->p[1]) != 0; }
 
-static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
+/* Returns true if p is in the cut's interval of p. */
+static bool cut_has(const ebpo_face_cut *c, const mpq_t p)
 {
     return mpq_cmp(c->p[0], p) <= 0 && mpq_cmp(c->p[1], p) >= 0;
 }
 
-/* Adds the crossing of two cuts, neither of which is parallel to the q axis. */
+/* Adds an event and a vertex for the crossing of two cuts, if they cross. Neither cut may be
+ * parallel to the q axis. */
 static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face_cut *b)
 {
     mpq_t *s = f->scratch;
@@ -382,25 +387,28 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     mpq_sub(s[2], s[2], b->q[0]);
     mpq_sub(s[1], s[1], s[2]);
     mpq_div(s[1], s[1], s[0]);
-    if (!cut_reaches(a, s[1]) || !cut_reaches(b, s[1]))
+    if (!cut_has(a, s[1]) || !cut_has(b, s[1])) /* s[1]: the p at which the lines cross */
         return;
     add_event(f, s[1]);
     value_of_cut(a, s[1], s[2]);
     add_vertex(f, s[1], s[2]);
 }
 
-/* Adds the crossing of a cut with a cut parallel to the q axis, whose p is already an event. */
+/* Adds a vertex for the crossing of a cut with the line of a cut that is parallel to the q axis.
+ * The p of the crossing is already an event. */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
-    if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))
+    if (!f->all_cuts || is_upright(c) || !cut_has(c, upright->p[0]))
         return;
     value_of_cut(c, upright->p[0], f->scratch[2]);
     add_vertex(f, upright->p[0], f->scratch[2]);
 }
 
+/* Compares two fractions for qsort. */
 static int by_value(const void *x, const void *y) { return mpq_cmp((mpq_srcptr)x, (mpq_srcptr)y); }
 
-/* Completes the events by crossings of cuts, and sorts them. */
+/* Adds events for the crossings of cuts, sorts the events, and removes equal events. The edges of
+ * the face itself are not crossed with each other. */
 static void find_events(ebpo_face_cuts *f)
 {
     for (uint64_t i = 0; i < f->cuts && !f->no_memory; i++)
@@ -427,7 +435,8 @@ static void find_events(ebpo_face_cuts *f)
 
 /* --- strips --- */
 
-/* Sets `out` to a fraction between `low` and `high`: a double, which has few bits, if possible. */
+/* Sets `out` to a fraction between `low` and `high`: if possible to a double, because a double has
+ * few bits. */
 static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 {
     double middle = mpq_get_d(low) / 2 + mpq_get_d(high) / 2;
@@ -441,11 +450,14 @@ static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 /* Positions in a strip: its left border, a value of p in its interior, its right border. */
 enum { LEFT, MIDDLE, RIGHT };
 
-static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int where)
+/* Returns the q of a cut at a position in the current strip: LEFT, MIDDLE or RIGHT. */
+static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int position)
 {
-    return &f->value[3 * (uint64_t)cut + (unsigned)where];
+    return &f->value[3 * (uint64_t)cut + (unsigned)position];
 }
 
+/* Makes space for the values, the order and the borders of all cuts. Returns false if memory is
+ * short. */
 static bool capacity_for_values(ebpo_face_cuts *f)
 {
     if (!ebpo_grow(&f->value, &f->value_capacity, 3 * f->cuts, sizeof *f->value) ||
@@ -463,8 +475,9 @@ static bool capacity_for_values(ebpo_face_cuts *f)
     return true;
 }
 
-/* Sets f->order to the cuts that cross the strip within the face, in the order of q in the middle
- * of the strip, and returns their number. p: values of p at the three positions. */
+/* Sets f->order to the cuts that cross the strip inside the face or along its edges, in the order
+ * of q in the middle of the strip, and returns their number. p: values of p at the three positions.
+ */
 static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
 {
     uint64_t n = 0, kept = 0;
@@ -486,8 +499,8 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
             low = low < 0 ? (int)i : low;
             high = (int)i;
         }
-    /* cuts below the lower edge of the face and above the upper one are outside the face, or
-     * coincide with the edge */
+    /* A cut before the face's lower edge or after its upper edge in this order is outside the face
+     * or coincides with the edge. */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
         value_of_cut(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
@@ -497,14 +510,15 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     return kept;
 }
 
-/* Returns true if a part of the previous strip (its intervals are border[before]) and this part,
- * which is between `low` and `high`, have an open interval of the border between the strips in
- * common. */
-static bool continues_piece(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
+/* Returns true if a part of the previous strip and this part have an open interval in common on the
+ * border between both strips. previous: index of f->border for the previous strip. low, high: the
+ * interval of this part on the border. */
+static bool continues_piece(const ebpo_face_cuts *f, int previous, const mpq_t low,
+                            const mpq_t high)
 {
-    for (uint64_t i = 0; i < f->borders[before]; i++) {
-        const ebpo_piece_border *e = &f->border[before][i];
-        if (mpq_cmp(e->low, high) < 0 && mpq_cmp(low, e->high) < 0)
+    for (uint64_t i = 0; i < f->borders[previous]; i++) {
+        const ebpo_piece_border *b = &f->border[previous][i];
+        if (mpq_cmp(b->low, high) < 0 && mpq_cmp(low, b->high) < 0)
             return true;
     }
     return false;
@@ -541,7 +555,8 @@ static bool is_in_flat(ebpo_face_cuts *f, const ebpo_flat_face *t, const mpq_t p
     return true;
 }
 
-/* Calls `visit` for the point (p, q) of a piece. x: workspace. */
+/* Calls `visit` for the point (p, q) of a piece. x: workspace. at_target: value of
+ * ebpo_piece.at_target. */
 static ebpo_status visit_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3],
                             bool at_target, ebpo_piece_fn visit, void *user, ebpo_error *error)
 {
@@ -564,33 +579,33 @@ typedef struct strip_scratch {
  * high. */
 static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low, uint32_t high)
 {
-    for (int where = LEFT; f->has_target && where <= RIGHT; where += RIGHT)
-        if (mpq_equal(f->target[0], p[where]) &&
-            mpq_cmp(*value_at(f, low, where), f->target[1]) <= 0 &&
-            mpq_cmp(f->target[1], *value_at(f, high, where)) <= 0)
+    for (int side = LEFT; f->has_target && side <= RIGHT; side += RIGHT)
+        if (mpq_equal(f->target[0], p[side]) &&
+            mpq_cmp(*value_at(f, low, side), f->target[1]) <= 0 &&
+            mpq_cmp(f->target[1], *value_at(f, high, side)) <= 0)
             return true;
     return false;
 }
 
-/* Visits a point of each part of a strip that begins a new piece. now: index of f->border for this
- * strip. */
-static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebpo_piece_fn visit,
-                               void *user, ebpo_error *error)
+/* Visits a point of each part of a strip that begins a new piece; with all_cuts, of each part.
+ * current: index of f->border for this strip. */
+static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int current,
+                               ebpo_piece_fn visit, void *user, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     bool border_has_cut = upright_at(f, s->p[LEFT]);
     uint64_t n = cuts_of_strip(f, (const mpq_t *)s->p);
-    f->borders[now] = 0;
+    f->borders[current] = 0;
     for (uint64_t i = 0; i + 1 < n && status == EBPO_OK; i++) {
         uint32_t low = f->order[i], high = f->order[i + 1];
         if (mpq_equal(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE)))
             continue;
-        ebpo_piece_border *e = &f->border[now][f->borders[now]++];
-        mpq_set(e->low, *value_at(f, low, RIGHT));
-        mpq_set(e->high, *value_at(f, high, RIGHT));
+        ebpo_piece_border *b = &f->border[current][f->borders[current]++];
+        mpq_set(b->low, *value_at(f, low, RIGHT));
+        mpq_set(b->high, *value_at(f, high, RIGHT));
         if (!border_has_cut && !f->all_cuts &&
-            continues_piece(f, !now, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
-            continue;
+            continues_piece(f, !current, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
+            continue; /* the piece has been visited in the previous strip */
         fraction_between(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE), s->q);
         status = visit_at(f, s->p[MIDDLE], s->q, s->x,
                           is_at_target(f, (const mpq_t *)s->p, low, high), visit, user, error);

@@ -3,12 +3,13 @@
  * results. Names that end in 8 handle eight values at once.
  *
  * The distance of two nodes has three lower bounds: the gap of their boxes, the gap of their
- * bounding cylinders, and the gap along the direction of the best pair of faces. The walk is
- * depth-first until a limit is known; then a heap returns the least bound first. In a pair of
- * blocks the distance of each pair of faces is bounded by a point of each face, which are near each
- * other. A pair is dropped only if it is certainly not nearer than the limit; collide_distance.c
- * decides the remaining pairs. Bounds:
- * docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces". */
+ * bounding cylinders, and the gap along the direction of the best pair of faces (the nearest pair
+ * so far). The walk is depth-first until a limit is known; then a heap returns the pair with the
+ * least bound first. In a pair of blocks, the distance of each pair of faces is bounded by means of
+ * two points, one of each face, that are the nearest points except for rounding. A pair is dropped
+ * only if it is certainly not nearer than the limit; collide_distance.c decides the remaining
+ * pairs. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces".
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,15 +25,18 @@ typedef struct point8 {
     f8 x[3];
 } point8;
 
+/* Eight faces. */
 typedef struct triangle8 {
     point8 corner[3];
 } triangle8;
 
+/* Returns the scalar products of a and b. */
 EBPO_EIGHT f8 point_dot8(const point8 *a, const point8 *b)
 {
     return f8_add(f8_add(f8_mul(a->x[0], b->x[0]), f8_mul(a->x[1], b->x[1])),
                   f8_mul(a->x[2], b->x[2]));
 }
+/* Returns a - b. */
 EBPO_EIGHT point8 point_minus8(const point8 *a, const point8 *b)
 {
     point8 out;
@@ -50,6 +54,7 @@ EBPO_EIGHT point8 point_along8(const point8 *a, f8 t, const point8 *b)
 }
 /* Returns a d - b c. */
 EBPO_EIGHT f8 minor_of8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
+/* Returns the vector products of a and b. */
 EBPO_EIGHT point8 point_cross8(const point8 *a, const point8 *b)
 {
     return (point8){ { minor_of8(a->x[1], a->x[2], b->x[1], b->x[2]),
@@ -76,12 +81,13 @@ EBPO_EIGHT void offer_nearest8(nearest8 *n, const point8 *direction, f8 square)
         n->direction.x[k] = f8_pick(better, direction->x[k], n->direction.x[k]);
 }
 
-/* The edges of faces. */
+/* The edges of eight faces. */
 typedef struct edges8 {
-    point8 edge[3];           /* vectors along the edges */
+    point8 edge[3];           /* vectors along the edges: edge i leads from corner i to the next */
     f8 square[3], inverse[3]; /* squared lengths, and their reciprocals */
 } edges8;
 
+/* Computes the edges of eight faces. */
 EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
 {
     edges8 out;
@@ -94,8 +100,8 @@ EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
     return out;
 }
 
-/* Offers the nearest points of two edges: edge i of a, which begins at p, and edge j of b, which
- * begins at q. */
+/* Offers the nearest points of two edges to n: of edge i of a, which begins at p, and of edge j of
+ * b, which begins at q. */
 EBPO_EIGHT void offer_edges8(nearest8 *n, const point8 *p, const edges8 *a, int i, const point8 *q,
                              const edges8 *b, int j)
 {
@@ -111,8 +117,9 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const point8 *p, const edges8 *a, int 
     offer_nearest8(n, &direction, point_dot8(&direction, &direction));
 }
 
-/* Offers each corner that is above the interior of a face, with its nearest point on the face.
- * edges: those of `face`. sign: 1 if the corners belong to A, -1 if they belong to B. */
+/* Offers pairs of a corner and the nearest point of a face to n, for the corners whose projection
+ * to the plane of the face is on the face. edges: edges of `face`. sign: 1 if the corners belong to
+ * A, -1 if they belong to B. */
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *edges,
                                const triangle8 *corners, float sign)
 {
@@ -135,8 +142,9 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
     }
 }
 
-/* Bounds eight distances by *low and *high, and computes the vectors between the near points. No
- * coordinate is greater than `size` or differs from its exact value by more than `error`. */
+/* Bounds the distances of eight pairs of faces by *low and *high. *direction: the vectors from A's
+ * nearest points to B's nearest points. Coordinates are at most `size`, and differ from their exact
+ * values by at most `error`. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
                                  f8 *low, f8 *high, point8 *direction)
 {
@@ -164,7 +172,8 @@ EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float s
 
 /* --- nodes --- */
 
-/* Decodes centres and half sides of boxes, and computes boxes around them in the other frame. */
+/* Decodes centres and half sides of the children's boxes, and computes boxes around these boxes in
+ * the other frame. */
 EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_turned_frame *f)
 {
     f8 centre[3], half[3];
@@ -182,13 +191,13 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
     }
 }
 
-/* Decodes bounding cylinders. A child without a cylinder gets an extreme length, so that the
- * cylinder excludes no pair. */
+/* Decodes the children's bounding cylinders. A child without a cylinder gets a cylinder of extreme
+ * length, which excludes no pair. */
 EBPO_EIGHT void node_cylinders(ebpo_gap_node *out, const ebpo_bound_cylinder *b,
                                const ebpo_turned_frame *f, float slack)
 {
-    f8 axis[3], middle[3], inverse, is;
-    decode_axes8(b, axis, &inverse, &is);
+    f8 axis[3], middle[3], inverse, exists;
+    decode_axes8(b, axis, &inverse, &exists);
     f8 step = f8_mul(f8_all(b->along_step * f->unit * 0.5f), inverse),
        from = f8_from_shorts(b->from), to = f8_from_shorts(b->to),
        along = f8_mul(f8_add(from, to), step);
@@ -204,7 +213,7 @@ EBPO_EIGHT void node_cylinders(ebpo_gap_node *out, const ebpo_bound_cylinder *b,
         f8_store(out->middle[1][k], f8_add(turned_row8(f->turn[k], middle), f8_all(f->shift[k])));
     }
     f8 thick = f8_add(f8_mul(f8_sub(to, from), step), f8_all(4 * slack));
-    f8_store(out->thick, f8_pick(is, thick, f8_all(0x1p60f)));
+    f8_store(out->thick, f8_pick(exists, thick, f8_all(0x1p60f)));
     f8_store(out->radius, f8_add(f8_mul(f8_from_shorts(b->radius), f8_all(b->aside_step * f->unit)),
                                  f8_all(4 * slack)));
 }
@@ -215,7 +224,7 @@ EBPO_EIGHT f8 sine_of8(f8 cosine)
     return f8_sqrt(f8_max(f8_sub(f8_all(1 + 0x1p-18f), f8_mul(cosine, cosine)), f8_all(0)));
 }
 
-/* Computes how far the children extend along the search's direction. */
+/* Computes how far the children extend along the search's direction; see ebpo_gap_node.extent. */
 EBPO_EIGHT void node_extent(ebpo_gap_node *out, const float along[3])
 {
     f8 boxes = f8_all(0), cylinders = f8_all(0), cosine = f8_all(0);
@@ -232,7 +241,7 @@ EBPO_EIGHT void node_extent(ebpo_gap_node *out, const float along[3])
     f8_store(out->extent, f8_min(boxes, cylinders));
 }
 
-/* Returns the decoded children of a node; decodes them unless they are kept. */
+/* Returns the decoded children of a node; decodes them if the cache does not have them. */
 static const ebpo_gap_node *decoded_node(ebpo_gap_search *g, int side, uint32_t node)
 {
     ebpo_gap_node *out = &g->node[side][node % EBPO_GAP_NODES];
@@ -303,8 +312,8 @@ EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int
     return f8_max3(far_p, far_q, none);
 }
 
-/* Returns the keys (ebpo_gap_visit.key) of eight children of p with child j of q: squared lower
- * bounds of their distances; 0 or negative if boxes intersect. */
+/* Returns the keys (ebpo_gap_visit.key) of the pairs of each child of p with child j of q: squared
+ * lower bounds of their distances; 0 or negative if the boxes may intersect. */
 EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q,
                         int j)
 {
@@ -323,7 +332,8 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
 
 /* --- pairs to be visited --- */
 
-/* Prefetches the memory of the pair that is visited next unless a nearer pair is found. */
+/* Prefetches the memory of the pair that is now first on the stack or heap, and will be visited
+ * next unless a nearer pair is found. */
 EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
 {
     if (g->count == 0)
@@ -333,8 +343,8 @@ EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
         fetch_below(g->accel[i], below_child(g->accel[i], v->child[i]), true);
 }
 
-/* Adds a pair. In a stack, keeps the pairs from index `base` on sorted, with the least key on
- * top. */
+/* Adds a pair to the heap or stack. In a stack, keeps the pairs from index `base` on sorted, so
+ * that the pair with the least key is on top. */
 EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
 {
     uint64_t at = g->count++;
@@ -373,6 +383,7 @@ static void make_heap(ebpo_gap_search *g)
         sift_down(g, i, g->stack[i]);
 }
 
+/* Removes and returns the pair that is visited next. */
 EBPO_EIGHT ebpo_gap_visit pop_visit(ebpo_gap_search *g)
 {
     ebpo_gap_visit last = g->stack[--g->count], out = last;
@@ -411,8 +422,8 @@ static void push_both(ebpo_gap_search *g, uint32_t node_a, uint32_t node_b)
         push_eight(g, base, 0, p, q, j);
 }
 
-/* Pushes the pairs of each child of `node`, of model `side`, with `other`, a child of the other
- * model. */
+/* Pushes the pairs of each child of `node`, a node of model `side`, with `other`, a child of a node
+ * of the other model (8 * the node's index + the child's lane). */
 static void push_side(ebpo_gap_search *g, int side, uint32_t node, uint32_t other)
 {
     const ebpo_gap_node *p = decoded_node(g, side, node), *q = decoded_node(g, 1 - side, other / 8);
@@ -421,22 +432,22 @@ static void push_side(ebpo_gap_search *g, int side, uint32_t node, uint32_t othe
 
 /* --- pairs of blocks --- */
 
-/* Pairs of faces of two blocks, by their lanes. */
+/* The pairs of faces of two blocks that may be nearer than the limit, by the faces' lanes. */
 typedef struct near_lanes {
-    int32_t lane[2][72]; /* [count + 8]: the entries after the last pair are 0, so that pairs can be
-                          * loaded eight at a time */
-    unsigned count;
+    int32_t lane[2][72]; /* [block][count + 8]: the entries after the last pair are 0, so that pairs
+                          * can be loaded eight at a time */
+    unsigned count;      /* at most 64 */
 } near_lanes;
 
-/* Finds the pairs of faces that may be within the limit, by their boxes and by their gap along the
- * direction. shift: origin of b minus origin of a. */
+/* Finds the pairs of faces that may be nearer than the limit, by the gaps of their boxes and by
+ * their gaps along the search's direction. shift: origin of b minus origin of a. */
 EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *a,
                               const ebpo_posed_faces *b, const float shift[3], float error,
                               near_lanes *out)
 {
     f8 low[3], high[3], zero = f8_all(0), lost = f8_all(4 * error);
-    float other_low[3][8], other_high[3][8], back[8];
-    f8 ahead = zero, behind = zero;
+    float b_low[3][8], b_high[3][8], b_least[8];
+    f8 a_most = zero, least = zero; /* ends of the faces along the direction */
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
         f8 a_at = zero, b_at = zero;
@@ -447,25 +458,25 @@ EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *
             b_at =
                 f8_add(b_at, f8_mul(f8_add(f8_load(b->x[3 * i + k]), f8_all(shift[k])), direction));
         }
-        ahead = i ? f8_max(ahead, a_at) : a_at;
-        behind = i ? f8_min(behind, b_at) : b_at;
+        a_most = i ? f8_max(a_most, a_at) : a_at;
+        least = i ? f8_min(least, b_at) : b_at;
     }
-    f8_store(back, behind);
+    f8_store(b_least, least);
     for (int k = 0; k < 3; k++) {
         f8 a0 = f8_load(a->x[k]), a1 = f8_load(a->x[3 + k]), a2 = f8_load(a->x[6 + k]);
         low[k] = f8_sub(f8_min3(a0, a1, a2), lost);
         high[k] = f8_add(f8_max3(a0, a1, a2), lost);
         f8 b0 = f8_load(b->x[k]), b1 = f8_load(b->x[3 + k]), b2 = f8_load(b->x[6 + k]);
-        f8_store(other_low[k], f8_add(f8_min3(b0, b1, b2), f8_all(shift[k])));
-        f8_store(other_high[k], f8_add(f8_max3(b0, b1, b2), f8_all(shift[k])));
+        f8_store(b_low[k], f8_add(f8_min3(b0, b1, b2), f8_all(shift[k])));
+        f8_store(b_high[k], f8_add(f8_max3(b0, b1, b2), f8_all(shift[k])));
     }
     out->count = 0;
-    for (unsigned rest = b->lanes; rest; rest &= rest - 1) {
-        int j = __builtin_ctz(rest);
-        f8 square = zero, gap = f8_sub(f8_all(back[j] - 8 * error), ahead);
+    for (unsigned lanes = b->lanes; lanes; lanes &= lanes - 1) {
+        int j = __builtin_ctz(lanes);
+        f8 square = zero, gap = f8_sub(f8_all(b_least[j] - 8 * error), a_most);
         for (int k = 0; k < 3; k++) {
-            f8 d = f8_max3(f8_sub(low[k], f8_all(other_high[k][j])),
-                           f8_sub(f8_all(other_low[k][j]), high[k]), zero);
+            f8 d = f8_max3(f8_sub(low[k], f8_all(b_high[k][j])),
+                           f8_sub(f8_all(b_low[k][j]), high[k]), zero);
             square = f8_add(square, f8_mul(d, d));
         }
         gap = f8_max(gap, zero);
@@ -480,6 +491,7 @@ EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *
         out->lane[0][out->count + i] = out->lane[1][out->count + i] = 0;
 }
 
+/* Loads the faces in eight lanes, and adds `shift` to their coordinates. */
 EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
                                  const float shift[3])
 {
@@ -490,9 +502,10 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
     return out;
 }
 
-/* If one of eight pairs is nearer than the best pair so far, makes the nearest pair the best pair,
- * and its direction the direction of the search. used: a bit for each valid pair. at: index of the
- * first of the eight pairs. */
+/* If one of eight pairs is nearer than the best pair so far, makes the nearest of the eight pairs
+ * the best pair, and its direction the direction of the search. high: upper bounds of the
+ * distances. used: a bit for each valid pair. at: index in `near` of the first of the eight pairs.
+ */
 EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const point8 *direction, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
@@ -515,8 +528,8 @@ EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const point8 *direction
                                                 directions[2][best] });
 }
 
-/* Adds each of eight pairs that may be within the limit to the waiting pairs. Returns true if an
- * added pair may intersect. */
+/* Adds each of eight pairs that may be nearer than the limit to the waiting pairs. Returns true if
+ * an added pair may intersect. low: lower bounds of the distances. used, at: as for update_best. */
 EBPO_EIGHT bool add_candidates(ebpo_gap_search *g, f8 low, unsigned used, const uint32_t block[2],
                                const near_lanes *near, unsigned at)
 {
@@ -542,7 +555,7 @@ static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
 {
     const ebpo_posed_faces *a = posed_faces_of(g->faces[0], g->accel[0], &g->posing[0], block[0]),
                            *b = posed_faces_of(g->faces[1], g->accel[1], &g->posing[1], block[1]);
-    float shift[3], none[3] = { 0, 0, 0 }, most = 0;
+    float shift[3], no_shift[3] = { 0, 0, 0 }, most = 0;
     for (int k = 0; k < 3; k++) {
         shift[k] = (float)((b->base[k] - a->base[k]) * g->posing[0].unit);
         most = fabsf(shift[k]) > most ? fabsf(shift[k]) : most;
@@ -557,7 +570,7 @@ static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
     if (near.count && !ebpo_gap_wait_capacity(g))
         return false;
     for (unsigned at = 0; at < near.count; at += 8) {
-        triangle8 p = load_faces8(a, near.lane[0] + at, none),
+        triangle8 p = load_faces8(a, near.lane[0] + at, no_shift),
                   q = load_faces8(b, near.lane[1] + at, shift);
         unsigned used = near.count - at < 8 ? (1u << (near.count - at)) - 1 : 255;
         f8 low, high;
@@ -618,6 +631,7 @@ static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
     return true;
 }
 
+/* Visits all pairs, as ebpo_gap_kernels.walk describes. */
 static void walk_gaps(ebpo_gap_search *g)
 {
     if (!ebpo_gap_capacity(g))

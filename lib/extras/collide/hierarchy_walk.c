@@ -3,8 +3,9 @@
  * of pairs of nodes, and keeps the last nodes and blocks that it has transformed. Each walk is for
  * one thread.
  *
- * Pairs of faces that the float filter leaves undecided are decided here exactly. If both models
- * are one mesh, a corner or edge that neighbouring faces share is no contact. */
+ * ebpo_pair_walk_decide exactly decides the pairs of faces that the filter, which uses floats,
+ * leaves undecided. If both models are the same mesh, a corner or edge that neighbouring faces
+ * share is no contact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -76,8 +77,9 @@ static bool is_on_side(const double n[3], const double corner[3], const double p
 }
 
 /* Returns true if a plane through the common corner (corner i of a, corner k of b) certainly
- * separates the faces, so that they have only this corner in common. The plane is between the two
- * edges that form the least angle; its normal may be rounded. */
+ * separates the faces, so that they have only this corner in common. The plane is between an edge
+ * of a and an edge of b, which form the least angle of such edges at the corner. Its normal may be
+ * rounded. */
 static bool separate_at_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     const double *p[4] = { a[(i + 1) % 3], a[(i + 2) % 3], b[(k + 1) % 3], b[(k + 2) % 3] };
@@ -102,9 +104,9 @@ static bool separate_at_corner(const double a[3][3], int i, const double b[3][3]
            is_on_side(n, a[i], p[2], -1) && is_on_side(n, a[i], p[3], -1);
 }
 
-/* Returns the kind of two faces with one common corner, i of a and k of b. If the faces have
- * another common point, the ray from the corner through this point leaves one face through its
- * opposite edge, at a point that the other face contains. */
+/* Returns the kind of two faces with one common corner: corner i of a and corner k of b. If the
+ * faces have another common point, the ray from the corner through this point leaves one of the
+ * faces at the edge opposite the corner, at a point that the other face contains. */
 static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     if (separate_at_corner(a, i, b, k))
@@ -115,9 +117,9 @@ static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][
     return kind;
 }
 
-/* Returns the kind of two faces with a common edge. Faces in different planes have no other common
- * point. opposite: the corner of b that is not on the edge; -1: a face has two corners at one
- * point. */
+/* Returns the kind of two faces with a common edge. If the faces are in different planes, they have
+ * no common point except on the edge. opposite: the corner of b that is not on the edge; -1: a face
+ * has two equal corners. */
 static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3], int opposite)
 {
     if (opposite >= 0 && ebpo_orient3d(a[0], a[1], a[2], b[opposite]) != 0)
@@ -130,20 +132,21 @@ static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3], int o
  * change when the faces are swapped. */
 static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
 {
-    /* the third corner, if exactly two bits of corners are set; otherwise -1 */
+    /* [bits of corners] if exactly two bits are set, the corner whose bit is 0; otherwise -1 */
     static const int third[8] = { -1, -1, -1, 2, -1, 1, 0, -1 };
-    int shared = 0, in_a = 0, in_b = 0, of_b = 0;
+    int shared = 0, in_a = 0, in_b = 0;
+    int shared_b = 0; /* bits of the corners of b that a has, too */
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             if (a[i][0] == b[k][0] && a[i][1] == b[k][1] && a[i][2] == b[k][2]) {
                 shared++;
                 in_a = i;
                 in_b = k;
-                of_b |= 1 << k;
+                shared_b |= 1 << k;
             }
     if (shared == 0)
         return ebpo_triangle_pair(a, b);
-    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b, third[of_b]);
+    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b, third[shared_b]);
 }
 
 /* Faces of two blocks at their poses, computed when they are needed. */
@@ -214,7 +217,7 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
     g->direction_number = 0;
-    for (int k = 0; k < 3; k++) /* the direction for models whose centres are equal */
+    for (int k = 0; k < 3; k++) /* the x axis is the direction for models whose centres are equal */
         g->direction[k] = k == 0;
     ebpo_gap_set_direction(g, g->direction);
     double centre[2][3];
@@ -253,13 +256,14 @@ void ebpo_gap_set_best(ebpo_gap_search *g, float best, uint32_t slot_a, uint32_t
     ebpo_gap_set_limit(g, best - g->tolerance);
 }
 
+/* Returns the scalar product of two vectors. */
 static float float_dot(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Scales the direction to slightly less than length 1, so that gaps along the direction are not
- * computed too great. */
+/* Scales the direction to a length slightly less than 1, so that the computed gaps along the
+ * direction are not too great. */
 void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3])
 {
     float length = sqrtf(float_dot(direction, direction));

@@ -1,10 +1,10 @@
-/* Finds the faces of one mesh that intersect in more than a common corner or edge.
+/* Finds the pairs of faces of one mesh that have more in common than a corner or an edge.
  *
  * The mesh is written to a temporary file, which is opened as a model with a memory budget, so the
  * mesh may be larger than memory. The search needs only the faces, so the model is built as a
  * surface without planes, which is much faster. ebpo_collide_self finds the pairs of the model's
- * faces that intersect. The mesh in the workspace gives the coordinates for their common points. An
- * optional PLY file shows these faces in red. */
+ * faces that intersect. The mesh in the workspace gives the coordinates of these faces, from which
+ * their common points are computed. An optional PLY file shows these faces in red. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -24,20 +24,24 @@
 
 typedef struct crossings {
     ebpo_self_intersections_options options;
-    ebpo_self_intersections_fn take;
+    ebpo_self_intersections_fn take; /* the caller's function, or NULL, and its argument */
     void *user;
-    ebpo_tree tree;
-    ebpo_file *file;
+    ebpo_tree tree;  /* the built tree; after the file is written only its mesh, which is in the
+                      * workspace */
+    ebpo_file *file; /* the temporary file */
     ebpo_model *model;
     ebpo_collider *collider;
-    ebpo_publish target; /* the PLY file, if the caller wants one */
-    ebpo_self_intersections_summary sum;
-    uint64_t *intersecting; /* a bit for each face, by its index in the source */
+    ebpo_publish target;                 /* the PLY file, if options.ply is not NULL */
+    ebpo_self_intersections_summary sum; /* counts for the caller */
+    uint64_t *intersecting; /* a bit for each face, by its index in the source; 1: it intersects
+                             * another face */
     bool enough;            /* the caller needs no more crossings */
 } crossings;
 
 /* --- the model --- */
 
+/* Builds the tree of the mesh, as the tree of a surface: the report for ebpo_build states that the
+ * mesh is not closed. */
 static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                ebpo_error *error)
 {
@@ -50,8 +54,7 @@ static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_re
     return ebpo_build(mesh, &surface, NULL, &options, &c->tree, error);
 }
 
-/* Frees the levels. After the file is written, the search needs only the file, and the mesh for the
- * common points. */
+/* Frees the levels of the tree, which are not needed after the file has been written. */
 static void drop_levels(ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++)
@@ -61,18 +64,20 @@ static void drop_levels(ebpo_tree *tree)
 /* Writes the temporary file and opens it. */
 static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
-    ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
-    how.codec_level = 1;
-    how.threads = c->options.threads;
-    how.progress = c->options.progress;
-    return ebpo_tree_store(&c->tree, folder, "ebpo-crossings", &how, &c->file, error);
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.codec_level = 1; /* the fastest level, because the file is temporary */
+    options.threads = c->options.threads;
+    options.progress = c->options.progress;
+    return ebpo_tree_store(&c->tree, folder, "ebpo-crossings", &options, &c->file, error);
 }
 
-/* Least memory budget of the model; only tests have workspaces so small that it applies. */
+/* Least memory budget of the model in bytes. Only tests have workspaces whose memory is so small
+ * that the model would get less. */
 enum { LEAST_MODEL = 1 << 20 };
 
-/* Makes the model and its collider. memory: number of bytes that all parts may use together. The
- * workspace uses half of it, the model a quarter, and waiting pairs 1/16. */
+/* Makes the model and its collider. memory: number of bytes that the workspace, the model and the
+ * collider may use together. The workspace uses half of these bytes, the model a quarter, and the
+ * pairs of the collider 1/16. */
 static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *error)
 {
     ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
@@ -89,6 +94,7 @@ static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *erro
 
 /* --- pairs --- */
 
+/* Gets the corners of a face by its index in the file. */
 static void corners_of(const crossings *c, uint64_t file_face, double out[3][3])
 {
     const ebpo_mesh *mesh = &c->tree.mesh;
@@ -114,7 +120,7 @@ static void common_point(const double a[3][3], const double b[3][3], int32_t kin
     memcpy(out, nearest.point[0], sizeof nearest.point[0]);
 }
 
-/* Marks a face as intersecting, and counts it once. */
+/* Marks a face as intersecting; counts the face if it was not marked. */
 static void record_face(crossings *c, uint64_t face)
 {
     uint64_t bit = UINT64_C(1) << face % 64;
@@ -122,6 +128,7 @@ static void record_face(crossings *c, uint64_t face)
     c->intersecting[face / 64] |= bit;
 }
 
+/* Sets *out to the crossing of a pair, and counts the pair and its faces. */
 static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_self_intersection *out)
 {
     double a[3][3], b[3][3];
@@ -137,8 +144,10 @@ static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_self_in
         record_face(c, out->face[i]);
 }
 
-enum { REPORTED_AT_ONCE = 256 };
+enum { REPORTED_AT_ONCE = 256 }; /* greatest number of crossings in a call of c->take */
 
+/* Receives pairs from ebpo_collide_self, and passes their crossings to the caller. Returns false if
+ * the caller needs no more crossings. */
 static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     crossings *c = user;
@@ -154,7 +163,8 @@ static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t coun
 
 /* --- the call --- */
 
-/* Writes the PLY file. */
+/* Writes the PLY file. The model's file has its faces in another order, so the mesh is read in the
+ * order of the source. */
 static ebpo_status write_red_mesh(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -171,6 +181,7 @@ static ebpo_status write_red_mesh(crossings *c, ebpo_workspace *workspace, ebpo_
     return status == EBPO_OK ? ebpo_publish_commit(&c->target, error) : status;
 }
 
+/* Makes the model, searches it, and writes the PLY file if the caller wants one. */
 static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                     ebpo_workspace *workspace, ebpo_error *error)
 {
@@ -191,6 +202,7 @@ static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_me
     return status == EBPO_OK && c->options.ply ? write_red_mesh(c, workspace, error) : status;
 }
 
+/* Frees all members. */
 static void close_all(crossings *c)
 {
     ebpo_collider_free(c->collider);

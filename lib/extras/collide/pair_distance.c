@@ -1,11 +1,11 @@
 /* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
- * Bounds follow from a pair of near points, which need not be the nearest points. The distance of
- * these points is an upper bound. The gap of the faces along the line through both points is a
- * lower bound. All coordinates are relative to A's first corner, so that rounding does not depend
- * on the position of the faces. If bounds do not decide a comparison, the squared distance is
- * computed as a fraction of integers. It is the least one of the squared distances of a corner from
- * the other face, and of two edges whose nearest points are not ends. See
+ * Bounds follow from a point of each face. These two points are the nearest points except for
+ * rounding. The distance of the points is an upper bound. The gap of the faces along the line
+ * through both points is a lower bound. All coordinates are relative to A's first corner, so that
+ * rounding does not depend on the position of the faces. If bounds do not decide a comparison, the
+ * squared distance is computed as a fraction of integers. It is the least of the squared distances
+ * of a corner from the other face, and of two edges whose nearest points are not ends. See
  * docs/develop/collision.md, "Distance of two faces". All functions are pure and can be called from
  * any thread; results do not depend on compilers and their flags. */
 #include "core/strict_fp.h"
@@ -23,6 +23,7 @@
 /* The range of 1-norms for which squares neither overflow nor underflow. */
 static const double max_norm = 0x1p200, least_norm = 0x1p-200;
 
+/* Limits t to 0 .. 1; NaN becomes 0. */
 static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 
 /* The nearest pair of points so far. Coordinates are relative to A's first corner. */
@@ -31,11 +32,13 @@ typedef struct search {
     double norm;                /* upper bound of the corners' 1-norms */
     double square, point[2][3]; /* the points of A and B, and their squared distance */
     int feature[2];             /* features of the points, as in ebpo_pair_distance_bounds */
-    double space; /* distance of the points from the ends of their features; INFINITY at corners */
+    double space; /* least distance of the points from the borders of their features: the ends of an
+                   * edge or the edges of a face; INFINITY for corners, which are exact; 0 if it is
+                   * not known */
 } search;
 
-/* Keeps the points p and q if they are nearer than the pair so far. first: p is a point of A (0) or
- * B (1), and q of the other face. on_p, on_q, space: as in `search`. */
+/* Keeps the points p and q if they are nearer than the pair so far. first: face of p, 0 for A or 1
+ * for B; q is a point of the other face. on_p, on_q: features of p and q. space: as in `search`. */
 static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
                          int on_q, double space)
 {
@@ -54,6 +57,7 @@ static void offer_points(search *s, int first, const double p[3], const double q
 
 /* --- edges with edges --- */
 
+/* Computes the point at the fraction t of an edge, which begins at `from`. */
 static void point_along(const double from[3], const double edge[3], double t, double out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -63,8 +67,8 @@ static void point_along(const double from[3], const double edge[3], double t, do
 /* Returns the feature of the point at the fraction t of edge i. */
 static int on_edge(int i, double t) { return t == 0 ? i : t == 1 ? (i + 1) % 3 : 3 + i; }
 
-/* Returns the distance from the point at the fraction t of an edge to the nearer end of the edge;
- * INFINITY at an end, because ends are exact. square: the edge's squared length. */
+/* Returns the distance of the point at the fraction t of an edge from the nearer end of the edge.
+ * At an end, returns INFINITY, because ends are exact. square: the edge's squared length. */
 static double space_on_edge(double t, double square)
 {
     return t == 0 || t == 1 ? INFINITY : fmin(t, 1 - t) * sqrt(square);
@@ -86,16 +90,18 @@ static void offer_edges(search *s, int i, int j)
     on_e = ee > 0 ? within_unit((on_f * ef - ew) / ee) : 0;
     point_along(p, e, on_e, x);
     point_along(q, f, on_f, y);
-    bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
+    bool no_ends = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
     double space = fmin(space_on_edge(on_e, ee), space_on_edge(on_f, ff));
-    offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
-                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : space);
+    if (no_ends && !(area > 0x1p-20 * ee * ff)) /* the edges are almost parallel */
+        space = 0;
+    offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f), space);
 }
 
 /* --- corners with planes --- */
 
-/* Offers corner i of face `which` and its nearest point on the other face, if that point is in the
- * other face's interior. If it is on an edge, the pairs of edges include this pair of points. */
+/* Offers corner i of face `which` and its nearest point on the other face, if this nearest point is
+ * in the other face's interior. If the nearest point is on an edge, the pairs of edges include this
+ * pair of points. */
 static void offer_corner(search *s, int which, int i)
 {
     double(*plane)[3] = s->face[!which];
@@ -122,8 +128,8 @@ static void offer_corner(search *s, int which, int i)
 
 /* --- bounds --- */
 
-/* Begins a search: computes coordinates relative to A's first corner. Returns false if these are
- * too large or too small. */
+/* Begins a search: computes the coordinates relative to A's first corner. Returns false if these
+ * relative coordinates are too large or too small. */
 static bool make_relative(const double a[3][3], const double b[3][3], search *s)
 {
     s->norm = 0;
@@ -165,21 +171,22 @@ static bool is_on(int corner, int feature)
            (feature >= 3 && (corner == feature - 3 || corner == (feature - 2) % 3));
 }
 
-/* Returns true if the features of the points certainly contain the nearest points. This is true if,
- * along n, the corners of A that are not on A's feature are behind A's point, and the corners of B
- * that are not on B's feature are ahead of B's point, by more than the errors of n and of the
- * points: docs/develop/collision.md, "Which features are nearest". */
+/* Returns true if the features of the points certainly contain the nearest points. n: vector from
+ * A's point to B's point. The features are certain if, in the direction of n, the corners of A that
+ * are not on A's feature are behind A's point, and the corners of B that are not on B's feature are
+ * ahead of B's point, by more than the errors of n and of the points: docs/develop/collision.md,
+ * "Which features are nearest". */
 static bool features_certain(const search *s, const double n[3])
 {
-    const double enough = 0x1p-24;
-    if (!(s->space > enough * s->norm))
+    const double margin = 0x1p-24; /* more than the relative errors */
+    if (!(s->space > margin * s->norm))
         return false;
     for (int which = 0; which < 2; which++)
         for (int i = 0; i < 3; i++) {
             double d[3];
             ebpo_vec3_subtract(s->face[which][i], s->point[which], d);
             double ahead = which ? ebpo_vec3_dot(n, d) : -ebpo_vec3_dot(n, d);
-            if (!is_on(i, s->feature[which]) && !(ahead > enough * s->norm * s->norm))
+            if (!is_on(i, s->feature[which]) && !(ahead > margin * s->norm * s->norm))
                 return false;
         }
     return true;
@@ -188,8 +195,8 @@ static bool features_certain(const search *s, const double n[3])
 /* Returns true if two features have the same corners, in any order. */
 static bool same_feature(const double a[3][3], int on_a, const double b[3][3], int on_b)
 {
-    int count = on_a < 3 ? 1 : on_a < 6 ? 2 : 3, most = on_b < 3 ? 1 : on_b < 6 ? 2 : 3;
-    if (count != most)
+    int corners_a = on_a < 3 ? 1 : on_a < 6 ? 2 : 3, corners_b = on_b < 3 ? 1 : on_b < 6 ? 2 : 3;
+    if (corners_a != corners_b)
         return false;
     for (int i = 0; i < 3; i++) {
         bool found = !is_on(i, on_a);
@@ -202,9 +209,9 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
     return true;
 }
 
-/* Returns true if both faces are perpendicular to the same axis and their projections along it
- * intersect. The distance of the faces is then the distance of their planes, whose coordinates are
- * level[0] and level[1]. */
+/* Returns true if both faces are perpendicular to the same axis, and their projections along this
+ * axis intersect. The distance of the faces is then the distance of their planes, whose coordinates
+ * are level[0] and level[1]. */
 static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
 {
     for (int k = 0; k < 3; k++) {
@@ -223,6 +230,8 @@ static bool level_faces(const double a[3][3], const double b[3][3], double level
     return false;
 }
 
+/* Returns true if the pairs a, b and c, d are pairs of level faces whose planes have the same two
+ * coordinates. */
 static bool same_levels(const double a[3][3], const double b[3][3], const double c[3][3],
                         const double d[3][3])
 {
@@ -270,7 +279,8 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
 
 /* --- exact distances: fractions of integers --- */
 
-/* A squared distance square / denominator, in units of 2^(2 unit). */
+/* A squared distance: square / denominator, in the unit 2^(2 unit), where the coordinates are
+ * integers in the unit 2^unit. */
 typedef struct fraction {
     mpz_t square, denominator;
 } fraction;
@@ -279,6 +289,7 @@ static void fraction_init(fraction *f) { mpz_inits(f->square, f->denominator, NU
 
 static void fraction_clear(fraction *f) { mpz_clears(f->square, f->denominator, NULL); }
 
+/* Compares two fractions; returns a negative number, 0 or a positive number. */
 static int fraction_compare(const fraction *f, const fraction *g)
 {
     mpz_t left, right;
@@ -290,7 +301,7 @@ static int fraction_compare(const fraction *f, const fraction *g)
     return order;
 }
 
-/* Sets *best to `other` if that is less, or if best->denominator is 0 (no fraction so far). */
+/* Sets *best to `other` if `other` is less, or if best->denominator is 0 (no fraction so far). */
 static void keep_lesser(fraction *best, const fraction *other)
 {
     if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)
@@ -301,11 +312,14 @@ static void keep_lesser(fraction *best, const fraction *other)
 
 /* --- edges --- */
 
-/* Two edges, in integers, and temporary values. */
+/* Two edges, in integers. */
 typedef struct edges {
     ebpo_vectorz from[2], along[2]; /* first end, and vector to the other end, of each edge */
-    ebpo_vectorz between, normal, part;
-    mpz_t length2, share;
+    ebpo_vectorz between;           /* vector from the first end of edge 0 to that of edge 1 */
+    ebpo_vectorz normal;            /* vector product of both edges */
+    mpz_t length2;                  /* squared length of `normal` */
+    ebpo_vectorz part;              /* temporary values */
+    mpz_t share;
 } edges;
 
 static void edges_init(edges *e)
@@ -326,6 +340,7 @@ static void edges_clear(edges *e)
     mpz_clears(e->length2, e->share, NULL);
 }
 
+/* Sets an edge to the integers of its ends. */
 static void set_edge(edges *e, int which, const double from[3], const double to[3], int unit)
 {
     for (int k = 0; k < 3; k++) {
@@ -335,7 +350,8 @@ static void set_edge(edges *e, int which, const double from[3], const double to[
     ebpo_vectorz_subtract(&e->along[which], &e->along[which], &e->from[which]);
 }
 
-/* Returns true if the nearest points of the lines are between the ends of edge `which`. */
+/* Returns true if, of the nearest points of both edges' lines, the point on the line of edge
+ * `which` is on the edge. */
 static bool within_edge(edges *e, int which)
 {
     ebpo_vectorz_cross(&e->part, &e->between, &e->along[!which]);
@@ -343,8 +359,8 @@ static bool within_edge(edges *e, int which)
     return mpz_sgn(e->share) >= 0 && mpz_cmp(e->share, e->length2) <= 0;
 }
 
-/* Computes the squared distance of two edges. Returns false if they are parallel or an end is
- * nearer. */
+/* Computes the squared distance of two edges. Returns false if the edges are parallel, or if a
+ * nearest point of their lines is not on an edge: then the nearest points include an end. */
 static bool edges_square(edges *e, fraction *out)
 {
     ebpo_vectorz_subtract(&e->between, &e->from[1], &e->from[0]);
@@ -358,7 +374,8 @@ static bool edges_square(edges *e, fraction *out)
     return true;
 }
 
-/* Returns true if the edges are certainly farther apart than `hi`. */
+/* Returns true if the distance of edge i of a and edge j of b is certainly greater than `hi`. The
+ * bounds are computed for edges in the form of faces with two equal corners. */
 static bool edges_far(const double a[3][3], int i, const double b[3][3], int j, double hi)
 {
     double p[3][3], q[3][3];
@@ -395,7 +412,8 @@ static void update_by_edges(fraction *best, const double a[3][3], const double b
 
 /* --- faces --- */
 
-/* Updates *best by the corners of one face with the other face. */
+/* Updates *best by the distances of the corners of one face from the other face, except those that
+ * are certainly greater than `hi`. */
 static void update_by_corners(fraction *best, const double corner[3][3], const double face[3][3],
                               double hi, int unit)
 {
@@ -412,11 +430,13 @@ static void update_by_corners(fraction *best, const double corner[3][3], const d
     fraction_clear(&f);
 }
 
+/* Returns the exponent of a unit of which all coordinates are multiples, at most `unit`. */
 static int unit_of(const double a[3][3], const double b[3][3], int unit)
 {
     return ebpo_common_unit(&b[0][0], 9, ebpo_common_unit(&a[0][0], 9, unit));
 }
 
+/* Computes the exact squared distance of two faces. */
 static void squared_distance(const double a[3][3], const double b[3][3], int unit, fraction *out)
 {
     if (ebpo_triangle_pair(a, b) != EBPO_PAIR_APART) {
@@ -424,8 +444,7 @@ static void squared_distance(const double a[3][3], const double b[3][3], int uni
         mpz_set_ui(out->denominator, 1);
         return;
     }
-    ebpo_pair_distance_bounds
-        bounds; /* features farther apart than bounds.hi are not the nearest */
+    ebpo_pair_distance_bounds bounds;
     ebpo_triangles_distance_bounds(a, b, &bounds);
     mpz_set_ui(out->denominator, 0);
     update_by_corners(out, a, b, bounds.hi, unit);
@@ -446,6 +465,7 @@ double ebpo_triangles_distance(const double a[3][3], const double b[3][3])
 
 /* --- comparisons --- */
 
+/* Compares the distances of a, b and of c, d exactly. */
 static int compare_exact(const double a[3][3], const double b[3][3], const double c[3][3],
                          const double d[3][3])
 {
@@ -470,6 +490,7 @@ int ebpo_triangles_distance_compare(const double a[3][3], const double b[3][3],
     return x.hi < y.lo ? -1 : x.lo > y.hi ? 1 : compare_exact(a, b, c, d);
 }
 
+/* Compares the distance of a, b with a finite distance exactly. */
 static int compare_to_exact(const double a[3][3], const double b[3][3], double distance)
 {
     fraction f, g;

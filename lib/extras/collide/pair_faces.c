@@ -1,10 +1,11 @@
 /* Looks up the posed faces of pairs by their indices in the file, and computes the intersections of
  * crossing faces.
  *
- * If a model is entirely in memory (a whole model), an array gives the slot of each face, its
- * position in the blocks of the accel. Faces of a partly loaded model are read through the cache of
- * chunks. ebpo_posing_apply poses the corners, as in all exact tests. ebpo_collide_contacts returns
- * the segments of all crossing pairs in the order of the pairs. */
+ * If a model is entirely in memory (a whole model), an array gives the slot of each face: the
+ * position of the face in the blocks of the accel (the acceleration structure). Faces of a partly
+ * loaded model are read through the cache of chunks. ebpo_posing_apply poses the corners, as in all
+ * exact tests. ebpo_collide_contacts returns the segments of all crossing pairs in the order of the
+ * pairs. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -94,7 +95,8 @@ ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, dou
 
 /* --- contact segments --- */
 
-/* Makes the arrays of slots for whole models, once for each collider. Fails with EBPO_E_MEMORY. */
+/* Makes the arrays of slots for the collider's whole models, if they do not exist yet. Fails with
+ * EBPO_E_MEMORY. */
 static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 {
     for (int i = 0; i < 2; i++) {
@@ -153,32 +155,36 @@ void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
     }
 }
 
-enum { SEGMENTS_AT_ONCE = 512 };
+enum {
+    SEGMENTS_AT_ONCE = 512
+}; /* greatest number of segments in a call of the caller's function */
 
 /* The caller's function that receives segments. */
 typedef struct segment_receiver {
-    ebpo_pair_faces faces;
-    ebpo_segments_fn take;
+    ebpo_pair_faces faces; /* the look-up of faces */
+    ebpo_segments_fn take; /* the function, and its argument */
     void *user;
-    ebpo_error *error; /* error of `status` */
-    ebpo_status status;
+    ebpo_status status; /* failure of reading faces, and its error */
+    ebpo_error *error;
 } segment_receiver;
 
+/* Receives pairs from ebpo_collide_all, and passes the segments of the crossing pairs to the
+ * caller. Returns false if the caller needs no more segments, or after a failure. */
 static bool pass_segments(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    segment_receiver *t = user;
+    segment_receiver *r = user;
     ebpo_contact_segment out[SEGMENTS_AT_ONCE];
     uint64_t n = 0;
     for (uint64_t i = 0; i < count; i++) {
         ebpo_posed_pair faces;
         if (pairs[i].kind == EBPO_PAIR_CROSSING) {
-            t->status = ebpo_pose_pair(&t->faces, &pairs[i], &faces, t->error);
-            if (t->status != EBPO_OK)
+            r->status = ebpo_pose_pair(&r->faces, &pairs[i], &faces, r->error);
+            if (r->status != EBPO_OK)
                 return false;
             ebpo_contact_of(&faces, &pairs[i], &out[n++]);
         }
         if (n == SEGMENTS_AT_ONCE || (n > 0 && i + 1 == count)) {
-            if (!t->take(t->user, out, n))
+            if (!r->take(r->user, out, n))
                 return false;
             n = 0;
         }
@@ -191,12 +197,12 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    segment_receiver t = { .take = take, .user = user, .error = error };
+    segment_receiver r = { .take = take, .user = user, .error = error };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
-        status = ebpo_pair_faces_begin(&t.faces, &q, error);
+        status = ebpo_pair_faces_begin(&r.faces, &q, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(c, options, pass_segments, &t, error);
-    ebpo_pair_faces_end(&t.faces);
-    return status == EBPO_OK ? t.status : status;
+        status = ebpo_collide_all(c, options, pass_segments, &r, error);
+    ebpo_pair_faces_end(&r.faces);
+    return status == EBPO_OK ? r.status : status;
 }

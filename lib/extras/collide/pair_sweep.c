@@ -1,15 +1,13 @@
-/* Computes the last time at which two triangles have a common point, if one of them moves along a
- * direction.
+/* Computes the last time at which two faces (triangles) have a common point, if one face moves
+ * along a direction.
  *
- * Projected along the direction, both faces are convex polygons, and each of their points has a
- * height: its coordinate along the direction. Where the polygons overlap, the difference of the
- * heights of both faces is concave, so it is greatest at a corner of one polygon or where edges
- * cross. The exact time is a
- * fraction of integers (GMP). A bound in doubles follows from separating axes: normals, and cross
- * products of edges with each other and with the direction. See docs/develop/collision.md,
- * "Separation distance along a direction". All functions are pure and can be called from any
- * thread.
- */
+ * Projected along the direction, both faces are convex polygons. The height of a point of a face is
+ * the point's coordinate along the direction. Where the polygons overlap, the difference of the
+ * heights of both faces is concave, so it is greatest at a corner of a polygon or where edges of
+ * both polygons cross. The exact time is a fraction of integers (GMP). A bound in doubles follows
+ * from separating axes: the direction, the normals, and the vector products of edges of both faces,
+ * and of edges and the direction. See docs/develop/collision.md, "Separation distance along a
+ * direction". All functions are pure and can be called from any thread. */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"
@@ -59,12 +57,15 @@ double ebpo_sweep_time_round(const ebpo_sweep_time *t)
 
 /* --- in integers --- */
 
-/* A moving face [0] and the other face [1], in integers. */
+/* Two faces in integers: face 0 moves, face 1 does not. */
 typedef struct sweep {
-    ebpo_vectorz d, corner[2][3]; /* direction, corners */
-    ebpo_vectorz u, v, w, n, m;   /* temporary values */
-    mpz_t top, bottom, share;     /* a time top / bottom; a share of an edge, times `bottom` */
-    ebpo_sweep_time *best;        /* the last time so far */
+    ebpo_vectorz d;            /* direction */
+    ebpo_vectorz corner[2][3]; /* corners of both faces */
+    ebpo_vectorz u, v, w;      /* temporary values: two edges, and a vector between the faces */
+    ebpo_vectorz n, m;         /* temporary values: a normal, and the result of a vector product */
+    mpz_t top, bottom;         /* the time top / bottom */
+    mpz_t share;               /* position on an edge, as a share of the edge, times `bottom` */
+    ebpo_sweep_time *best;     /* the last time so far */
 } sweep;
 
 static void sweep_init(sweep *s)
@@ -87,7 +88,7 @@ static void sweep_clear(sweep *s)
     mpz_clears(s->top, s->bottom, s->share, NULL);
 }
 
-/* Computes x . (y cross z); overwrites `m`. */
+/* Computes the triple product x . (y x z); overwrites `m`. */
 static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
                            const ebpo_vectorz *z)
 {
@@ -95,15 +96,15 @@ static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebp
     ebpo_vectorz_dot(out, x, &s->m);
 }
 
-/* Keeps the time top / bottom if it is later than the last time so far. `other`: the time was
- * computed for a motion of the other face, so its sign is reversed. */
-static void keep_later_time(sweep *s, bool other)
+/* Keeps the time top / bottom if it is later than the last time so far. reversed: the time was
+ * computed for a motion of face 1, so its sign is changed. */
+static void keep_later_time(sweep *s, bool reversed)
 {
     if (mpz_sgn(s->bottom) < 0) {
         mpz_neg(s->top, s->top);
         mpz_neg(s->bottom, s->bottom);
     }
-    if (other)
+    if (reversed)
         mpz_neg(s->top, s->top);
     if (s->best->ever) {
         mpz_mul(s->share, s->top, s->best->denominator);
@@ -123,6 +124,7 @@ static bool is_share(const sweep *s)
     return mpz_sgn(s->share) * sign >= 0 && mpz_cmp(s->share, s->bottom) * sign <= 0;
 }
 
+/* Returns the corner after corner i of face `which`. */
 static const ebpo_vectorz *next_corner(const sweep *s, int which, int i)
 {
     return &s->corner[which][i == 2 ? 0 : i + 1];
@@ -152,8 +154,8 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int which)
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Considers the times at which the other face contains a corner of face `which`. The other face
- * must not be parallel to the direction. */
+/* Keeps the last of the times at which the other face contains a corner of face `which`. The other
+ * face must have an area and must not be parallel to the direction. */
 static void corners_and_face(sweep *s, int which)
 {
     (void)find_normal(s, !which);
@@ -167,8 +169,9 @@ static void corners_and_face(sweep *s, int which)
     }
 }
 
-/* Considers the time at which edge i of the moving face intersects edge j of the other face, if the
- * projections of the edges cross: w = t d + x u - y v, by Cramer's rule. */
+/* Keeps the time t at which edge i of face 0 intersects edge j of face 1, if the projections of the
+ * edges cross. Solves w = t d + x u - y v by Cramer's rule, where u and v are the edges, and w is
+ * the vector between their first corners. */
 static void two_edges(sweep *s, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[0][i], *q = &s->corner[1][j];
@@ -188,9 +191,8 @@ static void two_edges(sweep *s, int i, int j)
     keep_later_time(s, false);
 }
 
-/* Considers the time at which corner i of face `which` is on edge j of the other face:
- * w = t d - x v.
- */
+/* Keeps the time t at which corner i of face `which` is on edge j of the other face: w = t d - x v,
+ * where v is the edge, and w is the vector from the corner to the first corner of the edge. */
 static void corner_and_edge(sweep *s, int which, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[which][i], *q = &s->corner[!which][j];
@@ -208,7 +210,8 @@ static void corner_and_edge(sweep *s, int which, int i, int j)
     keep_later_time(s, which == 1);
 }
 
-/* Considers the time at which two corners with the same projection are equal: w = t d. */
+/* Keeps the time t at which corner i of face 0 is equal to corner j of face 1, if their projections
+ * are equal: w = t d, where w is the vector between the corners. */
 static void two_corners(sweep *s, int i, int j)
 {
     ebpo_vectorz_subtract(&s->w, &s->corner[1][j], &s->corner[0][i]);
@@ -221,9 +224,11 @@ static void two_corners(sweep *s, int i, int j)
     keep_later_time(s, false);
 }
 
+/* Finds the last time of contact of both faces. */
 static void inspect_faces(sweep *s)
 {
-    bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) };
+    bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) }; /* parallel to the direction, or
+                                                                   * without area */
     for (int which = 0; which < 2; which++)
         if (!upright[!which])
             corners_and_face(s, which);
@@ -262,17 +267,18 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
 
 /* --- bounds --- */
 
-/* The interval 0 .. most that contains all times of contact from 0 on. Directions n restrict it one
- * after the other: at a time t of contact, t (n . d) is between the differences of the extents of
- * both faces along n. */
+/* The interval 0 .. most that contains all times of contact from 0 to the caller's limit. Vectors n
+ * restrict the interval one after another: at a time t of contact, t (n . d) is between the least
+ * and the greatest difference of y and x along n, where x and y are points of the two faces. */
 typedef struct time_bounds {
-    double x[3][3], y[3][3]; /* corners of both faces, relative to the first corner */
-    double norm;             /* upper bound of the 1-norms of x and y */
-    const double *d;         /* [3] direction of the motion */
-    double most;             /* negative: there is no time of contact */
+    double x[3][3];  /* corners of the moving face, relative to its first corner */
+    double y[3][3];  /* corners of the other face, relative to the same corner */
+    double norm;     /* upper bound of the 1-norms of x and y */
+    const double *d; /* [3] direction of the motion */
+    double most;     /* negative: there is no time of contact */
 } time_bounds;
 
-/* Restricts the interval by the direction n. */
+/* Restricts the interval by the vector n. */
 static void bound_by(time_bounds *b, const double n[3])
 {
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
@@ -296,6 +302,7 @@ static void bound_by(time_bounds *b, const double n[3])
         b->most = fmin(b->most, greatest / c_lo * (1 + 0x1p-50));
 }
 
+/* Restricts the interval by the vector product of x and y. */
 static void bound_by_cross(time_bounds *b, const double x[3], const double y[3])
 {
     double n[3];

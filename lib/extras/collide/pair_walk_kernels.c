@@ -2,10 +2,11 @@
  * time, in floats. This file is compiled for several instruction sets with the same results.
  *
  * Boxes and bounding cylinders of one model's nodes are transformed into the other model's frame
- * and compared along the axes of both frames. Bounds are rounded outwards, so no pair is lost. The
- * larger of two nodes is divided first. The faces of two blocks are compared by the filter of pairs
- * (pair_filter_kernels.c); ebpo_pair_walk_decide decides the pairs that the filter does not
- * exclude. See docs/develop/collision.md, "Going down two hierarchies". */
+ * and compared along the axes of both frames. Bounds are rounded outwards, so no pair is lost. Both
+ * nodes of a pair are divided, or only the larger node if it is much larger. The faces of two
+ * blocks are compared by the filter of pairs (pair_filter_kernels.c); ebpo_pair_walk_decide decides
+ * the pairs that the filter does not exclude. See docs/develop/collision.md, "Going down two
+ * hierarchies". */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -14,18 +15,21 @@
 
 /* --- nodes --- */
 
+/* Returns the scalar products of eight pairs of vectors. */
 EBPO_EIGHT f8 vector_dot8(const f8 a[3], const f8 b[3])
 {
     return f8_add(f8_add(f8_mul(a[0], b[0]), f8_mul(a[1], b[1])), f8_mul(a[2], b[2]));
 }
 
+/* Stores eight vectors. */
 EBPO_EIGHT void store_vector8(float out[3][8], const f8 x[3])
 {
     for (int k = 0; k < 3; k++)
         f8_store(out[k], x[k]);
 }
 
-/* Decodes boxes, and computes boxes around them in the other frame. c: set to their middles. */
+/* Decodes the children's boxes, and computes boxes around these boxes in the other frame. Sets c to
+ * the middles of the decoded boxes. */
 EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound *b,
                                 ebpo_turned_node *out, f8 c[3])
 {
@@ -39,7 +43,7 @@ EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_b
     }
     turn_vector8(p->into[1 - side], c, c2);
     turn_vector8(p->size[1 - side], e, e2);
-    out->size = 255 * longest;
+    out->size = 255 * longest; /* sides of boxes are coded as 0 to 255 steps */
     store_vector8(out->c, c);
     store_vector8(out->e, e);
     f8_store(out->extent, f8_add(f8_add(e[0], e[1]), e[2]));
@@ -47,30 +51,31 @@ EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_b
     store_vector8(out->e2, e2);
 }
 
-/* Decodes and rotates bounding cylinders. A child without a cylinder gets an extreme length, so
- * that the cylinder excludes no pair. c: middles of the boxes. */
+/* Decodes and rotates the children's bounding cylinders. A child without a cylinder gets a cylinder
+ * of extreme length, which excludes no pair. c: middles of the boxes. */
 EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
-                                    const ebpo_bound_cylinder *s, ebpo_turned_node *out,
+                                    const ebpo_bound_cylinder *b, ebpo_turned_node *out,
                                     const f8 c[3])
 {
-    f8 a[3], a2[3], mid[3], mid2[3], inverse, some, unit = f8_all(p->unit[side]);
-    decode_axes8(s, a, &inverse, &some);
-    f8 along = f8_mul(f8_mul(inverse, unit), f8_all(0.5f * s->along_step)),
-       from = f8_mul(f8_from_shorts(s->from), along), to = f8_mul(f8_from_shorts(s->to), along);
+    f8 a[3], a2[3], mid[3], mid2[3], inverse, exists, unit = f8_all(p->unit[side]);
+    decode_axes8(b, a, &inverse, &exists);
+    f8 along = f8_mul(f8_mul(inverse, unit), f8_all(0.5f * b->along_step)),
+       from = f8_mul(f8_from_shorts(b->from), along), to = f8_mul(f8_from_shorts(b->to), along);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++)
         mid[k] = f8_add(c[k], f8_mul(a[k], f8_add(from, to)));
     turn_vector8(p->into[1 - side], a, a2);
     turn_vector8(p->into[1 - side], mid, mid2);
-    out->cylinders = f8_bits(some) != 0;
-    f8_store(out->half, f8_pick(some, f8_sub(to, from), f8_all(0x1p100f)));
-    f8_store(out->radius, f8_mul(f8_mul(f8_from_shorts(s->radius), f8_all(s->aside_step)), unit));
+    out->cylinders = f8_bits(exists) != 0;
+    f8_store(out->half, f8_pick(exists, f8_sub(to, from), f8_all(0x1p100f)));
+    f8_store(out->radius, f8_mul(f8_mul(f8_from_shorts(b->radius), f8_all(b->aside_step)), unit));
     store_vector8(out->axis, a);
     store_vector8(out->mid, mid);
     store_vector8(out->axis2, a2);
     store_vector8(out->mid2, mid2);
 }
 
+/* Computes the children of a node in both frames. */
 static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_turned_node *out)
 {
     const ebpo_bound *b = &p->accel[side]->bound[node];
@@ -90,7 +95,8 @@ static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, eb
     out->lanes = (uint8_t)((1u << b->count) - 1);
 }
 
-/* Returns the children of a node in both frames; transforms them unless they are kept. */
+/* Returns the children of a node in both frames; transforms them if the cache does not have them.
+ */
 EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint32_t node)
 {
     ebpo_turned_node *out =
@@ -102,19 +108,19 @@ EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint
 
 /* --- eight children against one --- */
 
-/* Two nodes P and Q, whose children are compared. */
+/* Two nodes P and Q, whose children are compared: all children of P with one child of Q. */
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
-    float in_p[3];               /* Q's origin minus P's origin, in P's frame */
-    float in_q[3];               /* P's origin minus Q's origin, in Q's frame */
-    float slack, cylinder_slack; /* greatest errors by which computed gaps of boxes and of cylinders
-                                  * may be too large */
-    float sine;                  /* 1 plus ebpo_accel_pair.sine_capacity */
-    bool cylinders;              /* a child has a cylinder */
+    float in_p[3];        /* Q's origin minus P's origin, in P's frame */
+    float in_q[3];        /* P's origin minus Q's origin, in Q's frame */
+    float slack;          /* greatest error by which computed gaps of boxes may be too large */
+    float cylinder_slack; /* greatest error by which computed gaps of cylinders may be too large */
+    float sine;           /* 1 plus ebpo_accel_pair.sine_capacity */
+    bool cylinders;       /* a child has a cylinder */
 } two_nodes;
 
-/* Prepares the comparison of a, a node of the first model, and b, a node of the second one. p_side:
- * 0: P is a, 1: P is b. */
+/* Prepares the comparison of a, a node of the first model, and b, a node of the second model.
+ * p_side: 0 if P is a, 1 if P is b. */
 EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned_node *a,
                                   const ebpo_turned_node *b, int p_side)
 {
@@ -139,8 +145,8 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
     return t;
 }
 
-/* Returns, for each box of P, the greatest gap to box j of Q along the six axes of both boxes;
- * negative if they overlap. */
+/* Returns, for each box of P, the greatest gap between this box and box j of Q along the six axes
+ * of both frames; negative if the boxes overlap along all axes. */
 EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -158,44 +164,48 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
     return gap;
 }
 
-/* Returns, for each cylinder of P, the greatest gap to cylinder j of Q along the axes of both
- * cylinders, computed in P's frame. */
+/* Returns, for each cylinder of P, the greatest gap between P's child and child j of Q along the
+ * axes of both cylinders, computed in P's frame. Along the axis of a cylinder, the extent of the
+ * other child is bounded by its cylinder and by its box. */
 EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
-    f8 axis[3], axis2[3], other[3], from_mid[3], from_box[3], own_box[3], e[3], zero = f8_all(0);
+    /* between_mids, to_q_box, to_p_box: vectors between the middles of both cylinders, between P's
+     * cylinder and Q's box, and between Q's cylinder and P's box */
+    f8 p_axis[3], p_size[3], q_axis[3], between_mids[3], to_q_box[3], to_p_box[3], e[3],
+        zero = f8_all(0);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         f8 mid = f8_load(p->mid[k]), q_mid = f8_all(q->mid2[k][j] + t->in_p[k]);
-        axis[k] = f8_load(p->axis[k]);
-        axis2[k] = f8_abs(f8_load(p->axis2[k]));
-        other[k] = f8_all(q->axis2[k][j]);
-        from_mid[k] = f8_sub(mid, q_mid);
-        from_box[k] = f8_sub(mid, f8_all(q->c2[k][j] + t->in_p[k]));
-        own_box[k] = f8_sub(f8_load(p->c[k]), q_mid);
+        p_axis[k] = f8_load(p->axis[k]);
+        p_size[k] = f8_abs(f8_load(p->axis2[k]));
+        q_axis[k] = f8_all(q->axis2[k][j]);
+        between_mids[k] = f8_sub(mid, q_mid);
+        to_q_box[k] = f8_sub(mid, f8_all(q->c2[k][j] + t->in_p[k]));
+        to_p_box[k] = f8_sub(f8_load(p->c[k]), q_mid);
         e[k] = f8_all(q->e[k][j]);
     }
-    f8 cosine = f8_abs(vector_dot8(axis, other)),
+    f8 cosine = f8_abs(vector_dot8(p_axis, q_axis)),
        sine = f8_sqrt(f8_max(f8_sub(f8_all(t->sine), f8_mul(cosine, cosine)), zero));
     f8 p_half = f8_load(p->half), p_radius = f8_load(p->radius), q_half = f8_all(q->half[j]),
        q_radius = f8_all(q->radius[j]);
-    f8 by_cylinder = f8_sub(f8_abs(vector_dot8(axis, from_mid)),
+    f8 by_cylinder = f8_sub(f8_abs(vector_dot8(p_axis, between_mids)),
                             f8_add(f8_mul(cosine, q_half), f8_mul(sine, q_radius))),
-       by_box = f8_sub(f8_abs(vector_dot8(axis, from_box)), vector_dot8(axis2, e));
+       by_box = f8_sub(f8_abs(vector_dot8(p_axis, to_q_box)), vector_dot8(p_size, e));
     f8 gap = f8_sub(f8_max(by_cylinder, by_box), p_half);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         e[k] = f8_load(p->e[k]);
-        axis[k] = f8_abs(other[k]);
+        p_axis[k] = f8_abs(q_axis[k]);
     }
-    by_cylinder = f8_sub(f8_abs(vector_dot8(other, from_mid)),
+    by_cylinder = f8_sub(f8_abs(vector_dot8(q_axis, between_mids)),
                          f8_add(f8_mul(cosine, p_half), f8_mul(sine, p_radius)));
-    by_box = f8_sub(f8_abs(vector_dot8(other, own_box)), vector_dot8(axis, e));
+    by_box = f8_sub(f8_abs(vector_dot8(q_axis, to_p_box)), vector_dot8(p_axis, e));
     return f8_max(gap, f8_sub(f8_max(by_cylinder, by_box), q_half));
 }
 
-/* Returns a bit for each child of P, 1 if it may intersect child j of Q (or if the gap is NaN). If
- * `first`, sets the keys of the pairs. */
+/* Returns a bit for each child of P, 1 if the child may intersect child j of Q (or if the computed
+ * gap is NaN). first: sets `key` to the keys of the pairs. */
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
     f8 gap = box_gaps(t, j);
@@ -215,17 +225,17 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 /* --- pairs of nodes --- */
 
 /* Begins a group: in a search for the first contact, the pairs into which one pair of nodes is
- * divided are a group on the stack. A group is not sorted; pop_deepest finds its deepest pair when
- * this is needed, because the search leaves most groups early. Below each group on the stack is an
- * entry with the start of the previous group. */
+ * divided are a group on the stack. A group is not sorted, because the search leaves most groups
+ * early; pop_deepest finds the pair with the deepest overlap when a pair of the group is needed.
+ * Below each group on the stack is an entry with the start of the previous group. */
 EBPO_EIGHT void open_group(ebpo_pair_walk *w)
 {
     w->stack[w->top++] = (ebpo_node_pair){ 0, (uint32_t)w->group, 0 };
     w->group = w->top;
 }
 
-/* Pops the pair with the deepest overlap of the last group; of several such pairs, the one with the
- * greatest indices. Returns false if the stack is empty. */
+/* Pops the pair with the deepest overlap of the last group; of several pairs with equal overlap,
+ * the pair with the greatest indices. Returns false if the stack is empty. */
 EBPO_EIGHT bool pop_deepest(ebpo_pair_walk *w, ebpo_node_pair *out)
 {
     ebpo_node_pair *s = w->stack;
@@ -237,36 +247,38 @@ EBPO_EIGHT bool pop_deepest(ebpo_pair_walk *w, ebpo_node_pair *out)
     }
     uint64_t best = w->group, last = --w->top;
     for (uint64_t i = best + 1; i <= last; i++) {
-        bool later = s[i].b != s[best].b ? s[i].b > s[best].b : s[i].a > s[best].a;
-        best = s[i].key > s[best].key || (s[i].key == s[best].key && later) ? i : best;
+        bool greater = s[i].b != s[best].b ? s[i].b > s[best].b : s[i].a > s[best].a;
+        best = s[i].key > s[best].key || (s[i].key == s[best].key && greater) ? i : best;
     }
     *out = s[best];
     s[best] = s[last];
     return true;
 }
 
+/* Pushes a pair of children. */
 EBPO_EIGHT void push_pair(ebpo_pair_walk *w, uint32_t a, uint32_t b, float key)
 {
     w->stack[w->top++] = (ebpo_node_pair){ a, b, key };
 }
 
 /* Pushes the pairs of the children of p, a node of the first model, with the children of q whose
- * bits are set in `of_b`. First collects a bit for each pair, because the processor predicts one
- * loop over these bits better than a loop for each child. */
+ * bits are set in `lanes_q`, if they may intersect. First collects a bit for each pair, because the
+ * processor predicts one loop over these bits better than a loop for each child. first: computes
+ * the keys of the pairs. */
 EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
-                          unsigned of_b, bool first)
+                          unsigned lanes_q, bool first)
 {
     const ebpo_accel *a = w->pair->accel[0], *b = w->pair->accel[1];
     uint32_t node_a = p->node, node_b = q->node;
     two_nodes t = two_nodes_of(w->pair, p, q, 0);
     float key[64];
     uint64_t near = 0;
-    bool same = w->self && node_a == node_b;
-    for (unsigned rest = t.q->lanes & of_b; rest; rest &= rest - 1) {
-        int j = __builtin_ctz(rest);
+    bool same_node = w->self && node_a == node_b;
+    for (unsigned lanes = t.q->lanes & lanes_q; lanes; lanes &= lanes - 1) {
+        int j = __builtin_ctz(lanes);
         unsigned with_j = near_children_of(&t, j, first, key + 8 * j);
-        if (same)
-            with_j &= (2u << j) - 1;
+        if (same_node)
+            with_j &= (2u << j) - 1; /* only children 0 to j, so that each pair is pushed once */
         if (with_j)
             fetch_below(b, b->bound[node_b].child[j], t.cylinders);
         near |= (uint64_t)with_j << 8 * j;
@@ -278,30 +290,30 @@ EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
     }
 }
 
-/* Returns a bit for each child of p, a node of model `side`, 1 if it may intersect `one`, a child
- * of q (as in ebpo_node_pair). */
+/* Returns a bit for each child of p, a node of model `side`, 1 if the child may intersect
+ * `q_child`, a child of q (as in ebpo_node_pair). first, key: as for near_children_of. */
 EBPO_EIGHT unsigned near_children_of_side(const ebpo_pair_walk *w, int side,
                                           const ebpo_turned_node *p, const ebpo_turned_node *q,
-                                          uint32_t one, bool first, float key[8])
+                                          uint32_t q_child, bool first, float key[8])
 {
     two_nodes t = two_nodes_of(w->pair, side == 0 ? p : q, side == 0 ? q : p, side);
-    return near_children_of(&t, (int)(one & 7), first, key);
+    return near_children_of(&t, (int)(q_child & 7), first, key);
 }
 
-/* Pushes the pairs of the children of `node`, a node of model `down`, with the child of the other
- * model in r. q: the node whose child that is. */
-EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t node,
+/* Pushes the pairs of the children of `node`, a node of model `side`, with the undivided child of
+ * r: the child of the other model. q: the node whose child this is. */
+EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int side, uint32_t node,
                               const ebpo_turned_node *q, bool first)
 {
-    const ebpo_accel *s = w->pair->accel[down];
-    uint32_t stays = down == 0 ? r.b : r.a;
+    const ebpo_accel *s = w->pair->accel[side];
+    uint32_t undivided = side == 0 ? r.b : r.a;
     float key[8] = { 0 };
     for (unsigned near =
-             near_children_of_side(w, down, turned_node(w, down, node), q, stays, first, key);
+             near_children_of_side(w, side, turned_node(w, side, node), q, undivided, first, key);
          near; near &= near - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(near), ref = node << 3 | i;
+        uint32_t i = (uint32_t)__builtin_ctz(near), child = node << 3 | i;
         fetch_below(s, s->bound[node].child[i], w->pair->cylinders);
-        push_pair(w, down == 0 ? ref : stays, down == 0 ? stays : ref, key[i]);
+        push_pair(w, side == 0 ? child : undivided, side == 0 ? undivided : child, key[i]);
     }
 }
 
@@ -309,8 +321,8 @@ EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int down, uin
  * child is divided. */
 #define LONGER 4.0f
 
-/* Returns which of two children is divided: 0 or 1, or 2 for both. a, b: the node or block that
- * each child is; at least one is a node. */
+/* Returns the index, 0 or 1, of the child to be divided; 2: both children. a, b: the node or block
+ * that each child is; at least one child is a node. size_a, size_b: sizes of their boxes. */
 EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b)
 {
     if (a & EBPO_IS_BLOCK)
@@ -320,12 +332,12 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
     return size_a > LONGER * size_b ? 0 : size_b > LONGER * size_a ? 1 : 2;
 }
 
-/* Divides a pair of children, which are the nodes or blocks a and b. Returns false without
- * memory. */
+/* Divides a pair r of children, which are the nodes or blocks a and b, and pushes the new pairs
+ * that may intersect. first: the new pairs are a group. Returns false if memory is short. */
 EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
-    if (!ebpo_pair_walk_capacity(w, 65))
+    if (!ebpo_pair_walk_capacity(w, 65)) /* 8 x 8 pairs, and the entry of a group */
         return false;
     if (first)
         open_group(w);
@@ -345,6 +357,7 @@ EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uin
 
 /* --- pairs of blocks --- */
 
+/* Returns the posed faces of a block. */
 static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t block)
 {
     return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
@@ -365,8 +378,8 @@ EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const doubl
     return b->error + 0x1.2p-24f * b->extent + 2.5f * 0x1p-24f * most;
 }
 
-/* Finds the pairs of intersecting faces of two blocks. Returns false without memory. */
-static bool blocks_intersect(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b)
+/* Finds the pairs of intersecting faces of two blocks. Returns false if memory is short. */
+static bool visit_blocks(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b)
 {
     const ebpo_posed_faces *a = posed_faces(w, 0, block_a), *b = posed_faces(w, 1, block_b);
     float placed[9][8];
@@ -380,7 +393,8 @@ static bool blocks_intersect(ebpo_pair_walk *w, uint32_t block_a, uint32_t block
 
 /* --- the stack --- */
 
-/* Visits at most `pairs` pairs of the stack. Returns false without memory. */
+/* Visits at most `pairs` pairs of the stack. first: value of w->first, as a constant, so that the
+ * compiler makes a separate loop for each value. Returns false if memory is short. */
 EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
 {
     const ebpo_accel *sa = w->pair->accel[0], *sb = w->pair->accel[1];
@@ -391,9 +405,8 @@ EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
         else if (!pop_deepest(w, &r))
             break;
         uint32_t a = below_child(sa, r.a), b = below_child(sb, r.b);
-        bool ok = a & b & EBPO_IS_BLOCK
-                      ? blocks_intersect(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
-                      : divide_pair(w, r, a, b, first);
+        bool ok = a & b & EBPO_IS_BLOCK ? visit_blocks(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
+                                        : divide_pair(w, r, a, b, first);
         if (!ok)
             return false;
         if (first && w->found_count)
@@ -402,6 +415,7 @@ EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
     return true;
 }
 
+/* The functions of ebpo_walk_kernels. */
 static bool walk_run(ebpo_pair_walk *w, uint64_t pairs)
 {
     return w->first ? run_any(w, pairs, true) : run_any(w, pairs, false);

@@ -1,12 +1,12 @@
 /* Poses models in floats, with proved error bounds: computes the vertices of blocks for the filter
  * of pairs, and the relative position of the frames of two models.
  *
- * Coordinates are multiplied by a unit, a power of two, which brings them into the range of floats.
- * Blocks (of up to eight faces) are rotated in floats relative to their first vertex, whose posed
- * coordinates are doubles. The absolute values of the entries of each matrix between frames are
- * stored, too; kernels compute sizes of boxes from these values. If two frames are too different
- * for floats, no pair of nodes is dropped. See docs/develop/collision.md, "From blocks to the
- * filter". All functions are pure and can be called from any thread. */
+ * Coordinates are multiplied by a power of two (the unit), so that they are in the range of floats.
+ * A block of up to eight faces is rotated in floats relative to its first vertex, whose posed
+ * coordinates are doubles. For each matrix between two frames, the absolute values of its entries
+ * are also stored; kernels compute sizes of boxes from these values. If two frames are too
+ * different for floats, no pair of nodes is dropped. See docs/develop/collision.md, "From blocks to
+ * the filter". All functions are pure and can be called from any thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,6 +18,7 @@
 
 enum { LIMIT = EBPO_POSED_VERTICES };
 
+/* Returns the greater of two numbers. */
 static float greater_of(float a, float b) { return a > b ? a : b; }
 
 double ebpo_block_unit(double max_coordinate)
@@ -93,7 +94,7 @@ float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const doubl
     return b->error + 0x1.2p-24f * b->extent + 2.5f * 0x1p-24f * most;
 }
 
-/* Inverts a 3x3 matrix near a rotation, in doubles. */
+/* Inverts a 3x3 matrix in doubles. The matrix is close to a rotation times a factor. */
 static void invert_matrix(const double m[3][3], double out[3][3])
 {
     double det = 0;
@@ -108,12 +109,14 @@ static void invert_matrix(const double m[3][3], double out[3][3])
         out[i / 3][i % 3] /= det;
 }
 
+/* Multiplies a matrix by a vector. */
 static void rotate_vector(const double m[3][3], const double x[3], double out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = m[i][0] * x[0] + m[i][1] * x[1] + m[i][2] * x[2];
 }
 
+/* Rounds a matrix to floats. size: set to the absolute values of its entries, rounded up. */
 static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
 {
     for (int i = 0; i < 9; i++) {
@@ -122,8 +125,8 @@ static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
     }
 }
 
-/* Prepares a pair whose frames are too different for floats, or have coordinates out of their
- * range. The walk then visits every pair of nodes. */
+/* Prepares a pair whose frames are too different for floats, or whose coordinates are out of the
+ * range of floats. The walk then visits every pair of nodes. */
 static void visit_all_pairs(ebpo_accel_pair *out)
 {
     out->unit[0] = out->unit[1] = 1;
@@ -152,8 +155,8 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
     return false;
 }
 
-/* Chooses the factors of lengths in both frames. per_world: [model] length in its frame of a length
- * of 1 in the world. */
+/* Chooses the factors of lengths in both frames. per_world: [model] the length in the model's frame
+ * that is 1 in the world. */
 static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 {
     double ratio = per_world[0] / per_world[1];
@@ -203,6 +206,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     out->apart = turned_boxes_apart(out);
 }
 
+/* Returns the greatest absolute value of a point's coordinates. */
 static double greatest_coordinate(const double x[3])
 {
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));

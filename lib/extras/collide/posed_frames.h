@@ -1,8 +1,8 @@
 /* Transforms models by their poses in floats, with proved error bounds. Results are posed blocks
- * (a block is up to eight faces of an accel) for the filter of pairs of faces, and the relative
- * position of two models' frames. The frame of a model is its accel's coordinate system. See
- * docs/develop/collision.md, "From blocks to the filter" and "Going down two hierarchies". All
- * functions are pure and can be called from any thread. */
+ * for the filter of pairs of faces, and the relative position of two models' frames. A block is up
+ * to eight faces of an accel (the acceleration structure of a subtree). The frame of a model is its
+ * accel's coordinate system. See docs/develop/collision.md, "From blocks to the filter" and "Going
+ * down two hierarchies". All functions are pure and can be called from any thread. */
 #ifndef EBPO_COLLIDE_POSED_FRAMES_H
 #define EBPO_COLLIDE_POSED_FRAMES_H
 
@@ -14,17 +14,18 @@
 /* A pose, prepared for posing blocks. */
 typedef struct ebpo_block_posing {
     ebpo_posing posing;
-    double unit;        /* a power of two: floats are world coordinates times this unit */
+    double unit;        /* a power of two: floats are world coordinates times the unit */
     float matrix[3][3]; /* the posing's matrix times unit */
-    float size;         /* greatest length of a row of `matrix` */
+    float size;         /* upper bound of the lengths of the rows of `matrix` */
     float uncertainty;  /* bound of the distance of posed coordinates from the exact motion of the
                          * vertex, times unit */
     bool fits;          /* the matrix is in the range of floats; if false, only blocks of doubles
                          * are used */
 } ebpo_block_posing;
 
-/* Returns the unit for two models whose posed coordinates are at most `max_coordinate` in size:
- * multiplied by the unit, they are below 2^30. max_coordinate <= 2^1000. */
+/* Returns the unit for two models whose posed coordinates have absolute values of at most
+ * `max_coordinate`: multiplied by the unit, coordinates are below 2^30. max_coordinate <= 2^1000.
+ */
 double ebpo_block_unit(double max_coordinate);
 
 /* Prepares a posing. max_coordinate: as for ebpo_block_unit, the same for both models of a pair. */
@@ -39,14 +40,14 @@ enum { EBPO_POSED_VERTICES = 24 };
 typedef struct ebpo_posed_block {
     _Alignas(32) float x[3][EBPO_POSED_VERTICES]; /* entries from `vertices` on are 0 */
     double base[3];                               /* posed coordinates of the first vertex */
-    unsigned vertices;
+    unsigned vertices;                            /* number of vertices, 1 to 24 */
     float error;  /* bound of the difference between x + base * unit and the exact posed coordinate
                    * times unit */
-    float extent; /* greatest |x| */
+    float extent; /* upper bound of the absolute values in x */
 } ebpo_posed_block;
 
-/* Returns an upper bound of |x| of rotated vertices, for unrotated vertices whose 1-norms, relative
- * to the first vertex, are at most `most`. */
+/* Returns ebpo_posed_block.extent for a block whose vertices, relative to its first vertex and
+ * before the rotation, have 1-norms of at most `most`. */
 static inline float ebpo_posed_block_extent(const ebpo_block_posing *p, float most)
 {
     return p->size * most * (1 + 0x1p-20f);
@@ -57,58 +58,57 @@ static inline float ebpo_posed_block_error(const ebpo_block_posing *p, float ext
     return 6 * 0x1p-24f * extent + p->uncertainty;
 }
 
-/* Compute a posed block from a block's 1 to 24 vertices. vertex: [3][vertices], all x, all y, all
- * z. The first function is for blocks of floats, and needs p->fits; the second function is for
- * blocks of doubles. */
+/* Computes a posed block from a block's 1 to 24 vertices in floats; needs p->fits. vertex:
+ * [3][vertices], first all x, then all y, then all z. */
 void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *vertex,
                            unsigned vertices);
+/* Computes a posed block from a block's vertices in doubles. */
 void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,
                                 const double *vertex, unsigned vertices);
 
-/* Computes the vertices relative to `origin`, a point of the world, times `unit`. Returns the bound
- * of their error. The corners of the faces that ebpo_pair_kernels compare are among these
- * vertices. */
+/* Computes the posed vertices of a block relative to `origin`, a point of the world, times `unit`,
+ * for ebpo_pair_kernels. Returns a bound of the errors of their coordinates. */
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
                              float out[3][EBPO_POSED_VERTICES]);
 
-/* Eight faces of a block for ebpo_pair_kernels, relative to `base`. */
+/* The posed faces of a block for ebpo_pair_kernels, relative to `base`, times unit. */
 typedef struct ebpo_posed_faces {
-    _Alignas(32) float x[9][8]; /* index: 3 * corner + axis */
+    _Alignas(32) float x[9][8]; /* [3 * corner + axis][lane] */
     double base[3];             /* posed coordinates of the block's first vertex */
     float error, extent;        /* as in ebpo_posed_block */
-    uint32_t block;             /* EBPO_NO_CHILD: the entry is empty */
-    uint8_t lanes;
+    uint32_t block;             /* the block's index; EBPO_NO_CHILD: the entry is empty */
+    uint8_t lanes;              /* a bit for each lane that has a face */
 } ebpo_posed_faces;
 
-/* Number of posed blocks of each model that a walk keeps. */
+/* Number of posed blocks of each model that a walk keeps (a cache). */
 enum { EBPO_POSED_FACES = 32 };
 
-/* Marks all kept blocks as empty. */
+/* Marks all entries of the cache as empty. */
 static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_FACES])
 {
     for (int i = 0; i < 2 * EBPO_POSED_FACES; i++)
         faces[i / EBPO_POSED_FACES][i % EBPO_POSED_FACES].block = EBPO_NO_CHILD;
 }
 
-/* Two accels (acceleration structures of subtrees) at their poses, each in its own frame, prepared
- * for descending both hierarchies together. The struct does not change afterwards, so any thread
- * may use it.
+/* Two accels at their poses, prepared for a walk through both hierarchies together. The coordinates
+ * of each accel are in the frame of its model. The struct does not change after it has been made,
+ * so any thread may use it.
  *
- * Both frames use one unit of length: the larger one of the two frames' units. Boxes of one model
- * are transformed to the other model's frame by linear maps, for all pose matrices; only cylinders
- * need a map that keeps lengths (docs/develop/collision.md, "Going down two hierarchies"). */
-
+ * Lengths in both frames are multiplied by the factors `unit`, so that they have the same unit: the
+ * larger of the two frames' units. Boxes of one model are transformed to the other model's frame by
+ * linear maps, for all pose matrices; only cylinders need a map that keeps lengths
+ * (docs/develop/collision.md, "Going down two hierarchies"). */
 typedef struct ebpo_accel_pair {
     const ebpo_accel *accel[2];
     const ebpo_block_posing *posing[2];
     float unit[2];     /* factor of lengths in each frame */
-    double turn[3][3]; /* matrix from vectors of the second frame to vectors of the first one */
-    double place[3];   /* origin of the second frame in the first */
+    double turn[3][3]; /* matrix from vectors of the second frame to vectors of the first frame */
+    double place[3];   /* origin of the second frame in the first frame */
     /* In floats: into[i] is the matrix from vectors of the other frame to vectors of frame i;
-     * size[i] has the absolute values of its entries, rounded up. */
+     * size[i] has the absolute values of the entries of into[i], rounded up. */
     float into[2][3][3], size[2][3][3];
-    float uncertainty; /* bound of the errors of posing and of the matrices, in the unit; INFINITY:
-                        * no pair of nodes is dropped */
+    float uncertainty; /* bound of the errors of posing and of the matrices, in the common unit of
+                        * both frames; INFINITY: no pair of nodes is dropped */
     float cylinder_share; /* distances of cylinders are reduced by this share of the nodes' sizes */
     float sine_capacity;  /* margin that is added to the squared sine of the angle between two
                            * cylinders' axes */
@@ -121,15 +121,17 @@ typedef struct ebpo_accel_pair {
 void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
                           const ebpo_block_posing *const posing[2], double max_coordinate);
 
-/* The map from one model's frame to the other model's frame. A point x of the accel's frame has the
- * coordinates y = x * unit. In the other model's frame they are turn * y + shift. turn_size:
- * absolute values of `turn`. */
+/* The map from one model's frame to the other model's frame. A point x of the frame has the
+ * coordinates y = x * unit in the unit of ebpo_two_frames, and turn * y + shift in the other
+ * model's frame. */
 typedef struct ebpo_turned_frame {
-    float unit, turn[3][3], turn_size[3][3], shift[3];
-    float in_world[3][3]; /* matrix; its transpose maps a direction of the world to the frame */
+    float unit, turn[3][3], shift[3];
+    float turn_size[3][3]; /* absolute values of `turn` */
+    float in_world[3][3];  /* matrix; its transpose maps a direction of the world to the frame */
 } ebpo_turned_frame;
 
-/* Lengths are world lengths times the unit of ebpo_block_posing, the same for both models. */
+/* The frames of two models, for searches for the nearest faces. Lengths are world lengths times the
+ * unit of ebpo_block_posing, which is the same for both models. */
 typedef struct ebpo_two_frames {
     ebpo_turned_frame frame[2];
     /* The greatest error by which a computed gap of boxes may be too large, on each axis of either

@@ -1,12 +1,13 @@
 /* Computes the winding number of a posed solid at a point of the world, exactly for posed
  * coordinates.
  *
- * The point is transformed into the model's coordinates with an error bound. If no face is within
- * the bound, the result is the model's winding number at that point. Otherwise the faces near the
- * point are posed. A segment parallel to an axis leads from an anchor (a point farther away, whose
- * winding number is known) to the query point, and its crossings with posed faces are counted
- * exactly. If the coordinates of the query point are fractions, three such segments lead to it from
- * the point with the nearest doubles as coordinates.
+ * The query point is transformed into the model's coordinates with an error bound. If no face is
+ * within the bound of the transformed point, the result is the model's winding number at this
+ * point. Otherwise the faces close to the point are posed. A segment parallel to an axis leads from
+ * an anchor (a point farther away, whose winding number is known) to the query point, and its
+ * crossings with posed faces are counted exactly. If the coordinates of the query point are
+ * fractions, three segments parallel to axes lead to the query point from the point whose
+ * coordinates are the nearest doubles.
  *
  * Functions do not change a posed solid: several threads may use one, each with a separate context.
  * Proofs: docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
@@ -63,7 +64,7 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
 
 /* --- points in the coordinates of the model --- */
 
-/* Factor by which bounds are widened; it exceeds the rounding errors of their computation. */
+/* Factor by which bounds are widened. It covers the rounding errors of their computation. */
 static const double margin_factor = 1 + 0x1p-40;
 
 /* Sets the box of all posed vertices. */
@@ -106,7 +107,7 @@ ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, cons
     if (!(out->moved / out->posing.scale <= 0x1p990))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "pose: the model is too small for its position: rounding moves it by "
-                         "%.3g of its own units",
+                         "%.3g in the model's unit; move the model closer to the origin",
                          out->moved / out->posing.scale);
     return EBPO_OK;
 }
@@ -130,27 +131,27 @@ void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], doub
     for (int k = 0; k < 3; k++)
         p[k] = ((s->rotation[0][k] * y[0] + s->rotation[1][k] * y[1]) + s->rotation[2][k] * y[2]) /
                scale;
-    double far = s->moved + length * (2 * s->posing.error_bound + 8 * 0x1p-53) + 0x1p-1060;
-    *uncertainty = far / scale * margin_factor + 0x1p-1060;
+    double error_bound = s->moved + length * (2 * s->posing.error_bound + 8 * 0x1p-53) + 0x1p-1060;
+    *uncertainty = error_bound / scale * margin_factor + 0x1p-1060;
 }
 
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3])
 {
-    double middle[3], half[3], all = 0, p[3], uncertainty;
+    double middle[3], half[3], sum = 0, p[3], uncertainty;
     for (int k = 0; k < 3; k++) {
         middle[k] = a[k] / 2 + b[k] / 2;
         half[k] = fmax(fabs(a[k] - middle[k]), fabs(b[k] - middle[k])) * (1 + 0x1p-50);
-        all += half[k];
+        sum += half[k];
     }
     ebpo_unpose(s, middle, p, &uncertainty);
     for (int k = 0; k < 3; k++) {
-        double width = 2 * s->posing.error_bound * all; /* half the width of the result */
+        double half_width = 2 * s->posing.error_bound * sum;
         for (int i = 0; i < 3; i++)
-            width += fabs(s->rotation[i][k]) * half[i];
-        width = width / s->posing.scale * (1 + 0x1p-40) + uncertainty;
-        low[k] = nextafter(p[k] - width, -INFINITY);
-        high[k] = nextafter(p[k] + width, INFINITY);
+            half_width += fabs(s->rotation[i][k]) * half[i];
+        half_width = half_width / s->posing.scale * (1 + 0x1p-40) + uncertainty;
+        low[k] = nextafter(p[k] - half_width, -INFINITY);
+        high[k] = nextafter(p[k] + half_width, INFINITY);
     }
 }
 
@@ -178,13 +179,13 @@ typedef struct side_segment {
     const double *w;   /* [3] the query point */
     int axis;          /* the segment is parallel to this axis */
     double low[3], to; /* the segment's lower end; the coordinate of its upper end on the axis */
-    int32_t crossed;   /* winding number at the upper end minus that at the lower end */
-    int32_t jump;      /* winding number above w minus that below it */
+    int32_t crossed;   /* winding number at the upper end minus winding number at the lower end */
+    int32_t jump;      /* winding number above w minus winding number below w */
     ebpo_posed_sides *out;
 } side_segment;
 
 /* Returns the axis that separates the two sides of a face: the first axis that is not parallel to
- * its plane; -1: the face has no area. */
+ * the face's plane; -1: the face has no area. */
 static int side_axis(const double t[3][3])
 {
     for (int k = 0; k < 3; k++)
@@ -217,6 +218,9 @@ static void add_face_at_point(side_segment *l, const double t[3][3])
     l->jump += ebpo_axis_crossing(from, nextafter(l->w[axis], INFINITY), axis, t[0], t[1], t[2]);
 }
 
+/* Updates the result by the faces close to the segment. Returns true, so that all faces are
+ * visited.
+ */
 static bool receive_near_triangles(void *user, const ebpo_triangles *triangles)
 {
     side_segment *l = user;
@@ -235,12 +239,12 @@ static bool receive_near_triangles(void *user, const ebpo_triangles *triangles)
 
 /* A point with a known winding number. */
 typedef struct anchor {
-    double at[3];
+    double at[3];    /* position in the world */
     int axis;        /* axis along which the anchor is displaced from w */
     int32_t winding; /* winding number at the anchor */
 } anchor;
 
-/* Sets *found to true, and the winding number, if a->at is certainly far enough from faces. */
+/* Sets *found to true, and sets a->winding, if a->at is certainly far enough from faces. */
 static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, anchor *a,
                               bool *found, ebpo_error *error)
 {
@@ -258,8 +262,8 @@ static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, 
     return status;
 }
 
-/* Finds an anchor. Tries points at increasing distances from w; a point beyond the solid's box
- * always succeeds. */
+/* Finds an anchor: tries points at increasing distances from w, beginning with `step`. A point
+ * beyond the solid's box is always an anchor. */
 static ebpo_status find_anchor(const ebpo_posed_solid *s, ebpo_context *context, const double w[3],
                                double step, anchor *a, ebpo_error *error)
 {
@@ -320,22 +324,23 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
     return status;
 }
 
-/* --- winding numbers at points with fractions --- */
+/* --- winding numbers at points whose coordinates are fractions --- */
 
-/* A path from w, the point of doubles nearest to x, to x. Its integers are coordinates in units of
+/* A path from w to x, where w has the doubles nearest to the coordinates of x. The path consists of
+ * three segments parallel to the axes. Points and corners are integers: coordinates in the unit
  * 2^unit / denominator. */
 typedef struct path {
     const ebpo_posed_solid *solid;
-    const mpq_t *x; /* [3] */
-    double w[3];
-    mpz_t denominator;
+    const mpq_t *x;         /* [3] the query point */
+    double w[3];            /* the first point of the path */
+    mpz_t denominator;      /* a common denominator of the coordinates of x */
     mpz_t number[4];        /* temporary values */
-    ebpo_vectorz at[4];     /* at[0] is w; at[1] to at[3] replace one coordinate after the
-                             * other by that of x */
+    ebpo_vectorz at[4];     /* points of the path: at[0] is w; at[i] is x on axes 0 to i - 1 */
     ebpo_vectorz corner[3]; /* corners of the current face */
-    int32_t crossed;        /* winding number at x minus that at w */
+    int32_t crossed;        /* winding number at x minus winding number at w */
 } path;
 
+/* Initialises the integers of a path whose x and w are set. */
 static void make_path(path *p)
 {
     mpz_init_set_ui(p->denominator, 1);
@@ -379,7 +384,8 @@ static void set_points(path *p, const double t[3][3], int unit)
     }
 }
 
-/* Returns the orientation of a, b, c in the projection along the axis. */
+/* Returns the orientation (1, 0 or -1) of a, b, c in the projection along the axis. p->number[0] is
+ * set to the determinant. */
 static int orientation_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz *b,
                           const ebpo_vectorz *c)
 {
@@ -393,9 +399,9 @@ static int orientation_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_v
     return mpz_sgn(p->number[0]);
 }
 
-/* Returns the side of the line of edge i, in the projection along the axis, of the point `at`,
- * which is shifted by the infinitesimal vector of geometry/triangle_predicates.c; 0: the edge has
- * no length in the projection. */
+/* Returns the side (1 or -1) of the line of edge i on which the point `at` is, in the projection
+ * along the axis. The point is shifted by the infinitesimal vector of
+ * geometry/triangle_predicates.c. Returns 0 if the edge has no length in the projection. */
 static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[i], *b = &p->corner[i == 2 ? 0 : i + 1];
@@ -439,6 +445,8 @@ static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebp
     return -turn;
 }
 
+/* Updates p->crossed by the faces close to the path. Returns true, so that all faces are visited.
+ */
 static bool receive_path_triangles(void *user, const ebpo_triangles *triangles)
 {
     path *p = user;

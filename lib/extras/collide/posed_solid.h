@@ -1,7 +1,7 @@
 /* Computes the extent of posed models, and the winding number of a posed solid at a point of the
  * world. The winding number is exact for the posed coordinates, which are rounded to doubles.
  * Proofs: docs/develop/booleans.md. Functions do not change a posed solid: several threads may use
- * one, each with a separate context. */
+ * the same posed solid, each thread with a separate context. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
@@ -20,9 +20,10 @@ void ebpo_model_extent(const ebpo_model *model, double max_coordinate[3]);
 double ebpo_posed_extent(const ebpo_posing *posing, const double max_coordinate[3]);
 
 /* Returns true if both models come from files with the same content and have the same kind (solid
- * or surface) and rule. They then have the same faces in the same order. */
+ * or surface) and rule. Then they have the same faces in the same order. */
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
 
+/* A model at a pose. */
 typedef struct ebpo_posed_solid {
     ebpo_model *model;
     ebpo_posing posing;
@@ -37,8 +38,8 @@ typedef struct ebpo_posed_solid {
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
-/* Returns false if w is certainly outside: beyond the box by more than `margin` (0 or more) on some
- * axis. */
+/* Returns false if w is certainly farther than `margin` (0 or more) from all posed vertices and
+ * faces: if it is beyond the box by more than `margin` on an axis. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
 
 /* Returns the greatest of the gaps between two boxes on the three axes; negative if they overlap on
@@ -58,21 +59,22 @@ static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
  * number of the model at p. */
 void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *uncertainty);
 
-/* Computes a box in the model's coordinates from a box of the world: every face whose posed face
- * may have a point in the world box intersects the result. a and b are opposite corners of the
- * world box, in any order. */
+/* Computes a box in the model's coordinates from a box of the world (the world box). A face of the
+ * model intersects the computed box if the posed face may have a point in the world box. a and b
+ * are opposite corners of the world box, in any order. */
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3]);
 
 /* Winding numbers of a posed solid around a point of the world. */
 typedef struct ebpo_posed_sides {
     bool on;            /* a posed face with an area contains the point */
-    bool flat;          /* all such faces are in one plane */
-    double plane[3][3]; /* if `on`: corners of one of these faces */
+    bool flat;          /* all posed faces that contain the point are in one plane */
+    double plane[3][3]; /* if `on`: corners of a face that contains the point */
     /* Winding numbers next to the point, on both sides of the plane: `above` on the side of greater
      * x (of greater y if the plane is parallel to the x axis, of greater z if it is also parallel
-     * to the y axis), `below` on the other side. They are equal if not `on`. If `on` and not
-     * `flat`, only `above` is valid: the winding number at some point next to the query point. */
+     * to the y axis), `below` on the other side. Both are equal if `on` is false. If `on` is true
+     * and `flat` is false, only `above` is valid: the winding number at some point next to the
+     * query point. */
     int32_t above, below;
 } ebpo_posed_sides;
 
@@ -82,8 +84,8 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo
                                                  ebpo_error *error);
 
 /* Computes the winding number at the point x, which is shifted by the infinitesimal vector (d0, d1,
- * d2) of ebpo_axis_crossing (geometry/predicates.h), so that it is on no face. The coordinates of x
- * are canonical fractions within the range of doubles. */
+ * d2) of ebpo_axis_crossing (geometry/predicates.h), so that the shifted point is on no face. The
+ * coordinates of x are canonical fractions in the range of doubles. */
 EBPO_MUST_USE ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
                                              const mpq_t x[3], int32_t *winding, ebpo_error *error);
 

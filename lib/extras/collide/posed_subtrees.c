@@ -2,11 +2,11 @@
  * of envelopes. A partly loaded model has subtrees that are loaded on demand; a model that is
  * entirely in memory (a whole model) is a single subtree.
  *
- * An envelope is computed from the cell: the planes of the node and of its nearest ancestors, which
- * are in memory, cut the cell, and the result is posed. A hash table keeps envelopes by octcode
- * (locational code). A gap is a lower bound of the distance of two convex sets, found by the
- * iteration of Gilbert (1966): every direction gives a bound, so the iteration may stop at any
- * time. */
+ * An envelope is computed from the cell of a node: the planes of the node and of its nearest
+ * ancestors, which are in memory, cut the cell, and the resulting polytope is posed. A hash table
+ * keeps envelopes by octcode (locational code). A gap is a lower bound of the distance of two
+ * convex sets. It is found by the iteration of Gilbert (1966), in which every direction gives a
+ * bound, so the iteration may stop at any time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,6 +22,7 @@
 #include "geometry/polytope.h"
 #include "query/query_node.h"
 
+/* Computes the mean of the points of a hull, which is a point of the hull. */
 static void middle_of(const ebpo_convex *c, double out[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -32,8 +33,7 @@ static void middle_of(const ebpo_convex *c, double out[3])
     }
 }
 
-/* Returns the point that is farthest along the direction n, or, if sign is -1, in the opposite
- * direction. */
+/* Returns the point of a hull that is farthest in the direction sign * n. sign: 1 or -1. */
 static const double *farthest_point(const ebpo_convex *c, const double n[3], double sign)
 {
     int best = 0;
@@ -48,21 +48,22 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
     return c->point[best];
 }
 
-/* Maximum number of iterations. Sets that are nearly in contact need more for an accurate gap. */
-enum { DIRECTIONS = 32 };
+/* Maximum number of iterations. For sets that are nearly in contact, the gap after this number of
+ * iterations is a valid bound, but not an accurate one. */
+enum { ITERATIONS = 32 };
 
-/* The distance is equal to the distance of the origin from the convex set of all differences of a
- * point of b and a point of a. `v` is such a difference. Each step finds the difference w that is
- * least along v, which gives a lower bound of the distance. Then v becomes the point nearest to the
- * origin on the segment from v to w (Gilbert 1966). */
+/* The distance of both hulls is equal to the distance of the origin from the set of all differences
+ * of a point of b and a point of a, which is convex. `v` is a point of this set. Each iteration
+ * finds the point w of the set that is least along v, which gives a lower bound of the distance.
+ * Then v becomes the point nearest to the origin on the segment from v to w (Gilbert 1966). */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
-    double v[3], w[3], from[3], best = 0;
-    middle_of(a, from);
+    double v[3], w[3], middle[3], best = 0;
+    middle_of(a, middle);
     middle_of(b, v);
     for (int k = 0; k < 3; k++)
-        v[k] -= from[k];
-    for (int turn = 0; turn < DIRECTIONS; turn++) {
+        v[k] -= middle[k];
+    for (int i = 0; i < ITERATIONS; i++) {
         double length2 = ebpo_vec3_dot(v, v), along, step2 = 0, back = 0;
         if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* the squares overflow, underflow or are
                                                          * not numbers */
@@ -78,7 +79,7 @@ double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough
             back += v[k] * (v[k] - w[k]);
             step2 += (v[k] - w[k]) * (v[k] - w[k]);
         }
-        if (!(back > 0x1p-40 * length2))
+        if (!(back > 0x1p-40 * length2)) /* v is nearest to the origin except for rounding */
             break;
         double share = back < step2 ? back / step2 : 1;
         for (int k = 0; k < 3; k++)
@@ -98,26 +99,27 @@ double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b)
 
 /* The posed envelope of a cell. */
 typedef struct posed_hull {
-    ebpo_octcode code;
-    int count;
+    ebpo_octcode code; /* octcode of the cell */
+    int count;         /* number of points */
     double point[][3];
 } posed_hull;
 
-/* Number of levels whose planes cut an envelope. It limits the rounding errors of corners, which
- * grow from level to level. */
+/* Number of levels whose planes cut an envelope. This number is limited, because the rounding
+ * errors of corners grow from level to level. */
 enum { LEVELS_OF_PLANES = 8 };
-/* Bound of the error of an envelope, as a share of the cell's side: the error of 255 planes of each
- * level, each with an error of 1e-10 of its cell. */
+/* Bound of the error of an envelope, as a share of the cell's side. Each level has at most 255
+ * planes, and the error of each plane is at most 1e-10 of the level's cell. */
 static const double cut_share = 0x1p-15;
 
 /* --- order of subtrees --- */
 
-/* A subtree, with the key that orders subtrees as the file does. */
+/* A subtree, with the key of the order in which the file has the subtrees. */
 typedef struct subtree_position {
     uint64_t code;   /* octcode of the subtree's first cell at the deepest level */
     uint32_t number; /* index of the subtree */
 } subtree_position;
 
+/* Compares the codes of two subtrees for qsort. */
 static int by_code(const void *x, const void *y)
 {
     const subtree_position *p = x, *q = y;
@@ -167,6 +169,7 @@ void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
 
 /* --- tables of nodes --- */
 
+/* Returns the table of the nodes that are in memory. */
 static const ebpo_node_table *nodes_of(const ebpo_posed_subtrees *s)
 {
     return s->model->whole ? &s->model->whole->nodes : &s->model->top->nodes;
@@ -222,6 +225,7 @@ double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
 
 /* --- envelopes --- */
 
+/* Cuts an envelope by the planes of a node. */
 static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
                      ebpo_polytope *envelope)
 {
@@ -232,28 +236,29 @@ static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
     ebpo_planes_cut(envelope, codes, count);
 }
 
-/* Computes the envelope in the coordinates of the cell. */
+/* Computes the envelope in coordinates in which the cell is a unit cube. */
 static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_polytope *out)
 {
     ebpo_posed_node node = ebpo_posed_root(s);
-    ebpo_polytope above;
+    ebpo_polytope parent;
     ebpo_polytope_cube(out);
     for (int level = 0;; level++) {
-        bool matters = level + LEVELS_OF_PLANES > cell.level;
-        if (matters)
+        bool cuts = level + LEVELS_OF_PLANES > cell.level; /* the planes of this level are used */
+        if (cuts)
             cut_node(s, &node, out);
         if (level == cell.level)
             return;
         unsigned octant = ebpo_cell_octant(cell, level);
         node = ebpo_posed_child(s, &node, octant);
-        if (matters) {
-            ebpo_polytope_copy(&above, out);
-            (void)ebpo_polytope_child(&above, octant, out); /* if this fails, `out` is a box around
-                                                             * the content */
+        if (cuts) {
+            ebpo_polytope_copy(&parent, out);
+            (void)ebpo_polytope_child(&parent, octant, out); /* if this fails, `out` is a box around
+                                                              * the content */
         }
     }
 }
 
+/* Returns the new posed envelope of a cell; NULL if memory is short. */
 static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
     ebpo_box box = ebpo_model_box(s->model);
@@ -274,7 +279,8 @@ static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
     return out;
 }
 
-/* Returns the entry of an octcode in the table, or the free entry for it. */
+/* Returns the entry of the table that has an octcode, or, if no entry has it, the free entry for
+ * the octcode. */
 static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode code)
 {
     uint64_t at;
@@ -282,7 +288,7 @@ static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode co
     return &hull[at];
 }
 
-/* Makes space for one more entry of the table. Returns false without memory. */
+/* Makes space for one more entry of the table. Returns false if memory is short. */
 static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)

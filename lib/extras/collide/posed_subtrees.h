@@ -8,17 +8,17 @@
 
 /* The convex hull of some points. */
 typedef struct ebpo_convex {
-    int count; /* at least 1 */
+    int count; /* number of points, at least 1 */
     const double (*point)[3];
 } ebpo_convex;
 
-/* Returns a lower bound of the distance of two hulls, which may be too great by 2^-48 times the
- * greatest coordinate; 0 if no bound was found. In most cases the bound is close to the distance.
- * The search ends when it finds a bound above `enough`. The result is the same on every
- * processor. */
+/* Returns a lower bound of the distance of two hulls; 0 if no greater bound was found. Because of
+ * rounding, the bound may be too great by 2^-48 times the greatest coordinate. In most cases the
+ * bound is close to the distance. The search ends when it finds a bound above `enough`. The result
+ * is the same on every processor. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough);
 
-/* Returns an upper bound of the distance of a point of a from a point of b, rounded up. */
+/* Returns an upper bound of the distances of all points of a from all points of b. */
 double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b);
 
 /* The subtrees of a posed model. They are loaded on demand; a model that is entirely in memory (a
@@ -28,12 +28,13 @@ typedef struct ebpo_posed_subtrees {
     ebpo_posing posing;
     uint64_t count;           /* number of subtrees */
     uint32_t *rank;           /* [count] rank of each subtree in the order of the file's faces */
-    struct posed_hull **hull; /* [slots] hash table by octcodes of envelopes that were requested */
+    struct posed_hull **hull; /* [slots] hash table, by octcodes, of the envelopes that were
+                               * requested; NULL: the entry is free */
     uint64_t hulls, slots;    /* number of envelopes; size of the table */
-    uint64_t bytes;           /* memory of the envelopes and their table */
+    uint64_t bytes;           /* memory of the envelopes and of the table */
 } ebpo_posed_subtrees;
 
-/* A node of the part of the tree that is in memory. */
+/* A node in the part of the tree that is in memory. */
 typedef struct ebpo_posed_node {
     uint32_t entry; /* the node's entry in the model (ebpo_entry_kind_of) */
     ebpo_cell cell;
@@ -44,11 +45,12 @@ typedef struct ebpo_posed_node {
 EBPO_MUST_USE ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out,
                                                    const ebpo_model *model,
                                                    const ebpo_posing *posing, ebpo_error *error);
+/* Frees the memory; a zero struct is allowed. */
 void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s);
 
 /* Sets *out to the posed envelope of a cell, which belongs to a node in memory or to the root of a
  * subtree; the subtree is not loaded. Except for errors up to ebpo_posed_slack, the envelope
- * contains the part of every face that is in the cell. It lives as long as `s`. */
+ * contains the part of every face that is in the cell. *out is valid as long as `s`. */
 EBPO_MUST_USE ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell,
                                               ebpo_convex *out, ebpo_error *error);
 
@@ -60,11 +62,11 @@ ebpo_posed_node ebpo_posed_subtree_root(const ebpo_posed_subtrees *s);
 /* Returns a child of a gray node. */
 ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
                                  unsigned octant);
-/* Computes the posed corners of a cell. Bit k of a corner's index: the upper coordinate on axis k.
- */
+/* Computes the posed corners of a cell. If bit k of a corner's index is 1, the corner has the
+ * cell's upper coordinate on axis k. */
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3]);
-/* Bounds the errors that posing and cutting cause in the corners of the envelope of a cell.
- * `max_coordinate`: bound of posed coordinates. */
+/* Returns a bound of the errors that posing and cutting cause in the corners of the envelope of a
+ * cell. max_coordinate: upper bound of the absolute values of posed coordinates. */
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate);
 /* Returns the length of the cell's diagonal in the world. */
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell);

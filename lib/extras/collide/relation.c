@@ -2,17 +2,17 @@
  * or equal.
  *
  * The boundaries of two models divide space into parts. The relation depends on which kinds of
- * parts exist: parts inside both models, parts inside only the first one, parts inside only the
- * second one. Each part is bounded by pieces of faces, so the parts are found around these pieces
- * (around_face.h).
+ * parts exist: parts inside both models, parts inside the first model only, and parts inside the
+ * second model only. Each part is bounded by pieces of faces, so the parts are found around these
+ * pieces (around_face.h).
  *
  * In nearly all cases a crossing pair of faces decides the relation. If it does not, all faces that
- * intersect the other model are examined, then one face of each patch without contact. Such a patch
- * (a set of connected faces, none of which intersects the other model) is entirely on one side of
- * the other model. A patch is skipped if its side is known and adds no information; its subtree is
- * then not loaded. If the deadline passes, the relation is undecided. A search runs in one
- * thread. See docs/develop/collision.md, "Relation of
- * two models". */
+ * intersect the other model are examined, then one face of each patch without contact. A patch
+ * without contact is a set of connected faces that do not intersect the other model, so the whole
+ * patch is inside or outside the other model. A subtree is not loaded if the side of all its faces
+ * without contact is known and adds no information. If the deadline passes, the relation is
+ * undecided. A search runs in one thread. See docs/develop/collision.md, "Relation of two models".
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,17 +35,19 @@
 /* --- patches without contact --- */
 
 /* The patches without contact of the query's model m, subtree by subtree. A model that is entirely
- * in memory (a whole model) is a single subtree. */
+ * in memory (a whole model) is a single subtree. A subtree owns a face if no earlier subtree lists
+ * the face. */
 typedef struct separate_patches {
     const ebpo_collision *collision;
     ebpo_two_models *two;
     int m;
-    uint64_t subtrees;     /* number of subtrees */
-    uint64_t first, count; /* owned faces of the current subtree: index of the first one in the
-                            * file, and their number */
-    uint32_t *patch;       /* [count] the patch of each owned face, as in ebpo_face_patches */
+    uint64_t subtrees; /* number of subtrees */
+    uint64_t first;    /* index in the file of the first face that the current subtree owns */
+    uint64_t count;    /* number of faces that the current subtree owns */
+    uint32_t *patch;   /* [count] the patch of each owned face, as in ebpo_face_patches */
 } separate_patches;
 
+/* Begins with no current subtree. */
 static void separate_patches_begin(separate_patches *u, const ebpo_collision *collision,
                                    ebpo_two_models *two, int m)
 {
@@ -56,6 +58,7 @@ static void separate_patches_begin(separate_patches *u, const ebpo_collision *co
 
 static void separate_patches_end(separate_patches *u) { free(u->patch); }
 
+/* Finds the patches of a subtree, which becomes the current subtree. */
 static ebpo_status find_patches(separate_patches *u, const ebpo_accel *subtree,
                                 const uint32_t *slots, const uint64_t *intersecting,
                                 ebpo_error *error)
@@ -88,6 +91,7 @@ static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
     return status;
 }
 
+/* Sets *user to true if triangles are received. Returns false then, to end the search. */
 static bool record_any(void *user, const ebpo_triangles *triangles)
 {
     bool *any = user;
@@ -95,15 +99,15 @@ static bool record_any(void *user, const ebpo_triangles *triangles)
     return !*any;
 }
 
-/* Sets *in to 1 if a ball around a point of the world is entirely inside the other model, and to 0
- * if the ball is entirely outside. Does not change *in if faces of the other model may be near. */
+/* Sets *in to 1 if a ball in the world is entirely inside the other model, and to 0 if the ball is
+ * entirely outside. Does not change *in if faces of the other model may intersect the ball. */
 static ebpo_status side_of_ball(const separate_patches *u, const double middle[3], double radius,
                                 int *in, ebpo_error *error)
 {
     const ebpo_posed_solid *other = &u->two->model[!u->m];
     ebpo_context *context = u->two->context[!u->m];
     double low[3], high[3], p[3], uncertainty;
-    bool near = false;
+    bool has_faces = false;
     ebpo_inside_result inside;
     ebpo_unpose(other, middle, p, &uncertainty);
     double space = (radius / other->posing.scale + 2 * uncertainty) * (1 + 0x1p-20);
@@ -111,18 +115,18 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
         low[k] = nextafter(p[k] - space, -INFINITY);
         high[k] = nextafter(p[k] + space, INFINITY);
     }
-    ebpo_status status = ebpo_triangles_in_box(context, low, high, record_any, &near, error);
-    if (status != EBPO_OK || near)
+    ebpo_status status = ebpo_triangles_in_box(context, low, high, record_any, &has_faces, error);
+    if (status != EBPO_OK || has_faces)
         return status;
     status = ebpo_inside(context, p, NULL, &inside, error);
     *in = ebpo_rule_inside(u->two->rule[!u->m], inside.winding);
     return status;
 }
 
-/* Finds on which side of the other model those faces of a subtree are that do not intersect the
- * other model: sets *in to 1 (inside), 0 (outside) or -1 (unknown). The ball around the subtree's
- * cell contains a point of each owned face. If no face of the other model is near the ball, the
- * whole ball is on one side of the other model, and so is each of these faces. */
+/* Finds the side of the other model on which the faces without contact of a subtree are: sets *in
+ * to 1 (inside), 0 (outside) or -1 (unknown). The ball around the subtree's cell contains a point
+ * of each face that the subtree owns. If no face of the other model intersects the ball, the ball
+ * is entirely inside or outside the other model, and so is each face without contact. */
 static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
                                          ebpo_error *error)
 {
@@ -146,34 +150,36 @@ static ebpo_status separate_patches_side(const separate_patches *u, uint64_t num
 
 /* --- the state of the search --- */
 
-static const char stage[] = "relation";
+static const char stage[] = "relation"; /* for the progress function */
 
 /* State of the search. Models are in the query's order. */
 typedef struct relation_search {
     const ebpo_collision *collision;
-    ebpo_pair_faces lookup;
+    ebpo_pair_faces lookup; /* the look-up of faces by their indices */
     ebpo_two_models two;
     ebpo_relation_result *out;
     uint64_t *intersecting[2]; /* [model] a bit for each face, 1: it intersects the other model */
     uint64_t *seen[2];         /* [model] a bit for each face, 1: it has been examined */
     bool both;                 /* a point is inside both models */
-    bool only[2];              /* [model] a point is inside this model but not in the other */
-    bool examined;             /* the face that was visited last has an area */
+    bool only[2];              /* [model] a point is inside this model and not in the other model */
     bool touch;                /* a common point exists */
+    bool has_pieces;           /* the face that was visited last has an area, and so pieces */
     bool doubtful;      /* a piece of the face that was visited last is not part of its model */
     unsigned last[2];   /* ebpo_around.in of the piece that was visited last */
     uint64_t inspected; /* number of examined faces */
     bool late;          /* the deadline has passed */
-    ebpo_error *error;  /* error of `status`, within callbacks */
-    ebpo_status status;
+    ebpo_status status; /* failure of a function that receives faces or pairs, and its error */
+    ebpo_error *error;
 } relation_search;
 
-/* Returns true if one model is a solid and the other one a surface. */
+/* Returns true if one model is a solid and the other model is a surface. */
 static bool is_mixed(const relation_search *r) { return r->two.solid[0] != r->two.solid[1]; }
 
+/* Returns true if both models are surfaces. */
 static bool are_surfaces(const relation_search *r) { return !r->two.solid[0] && !r->two.solid[1]; }
 
-/* Returns true if no further face can change the relation. */
+/* Returns true if no further face can change the relation. With a solid and a surface, only the
+ * surface's points outside the solid matter. */
 static bool is_decided(const relation_search *r)
 {
     if (is_mixed(r))
@@ -181,6 +187,7 @@ static bool is_decided(const relation_search *r)
     return r->both && (are_surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
 }
 
+/* Returns the number of faces of model m. */
 static uint64_t face_count(const relation_search *r, int m)
 {
     return r->collision->model[m]->info->face_count;
@@ -211,21 +218,21 @@ static bool record_piece(void *user, const ebpo_around *a)
 {
     const visited_face *f = user;
     relation_search *r = f->r;
-    unsigned other = a->in[!f->m];
-    r->examined = true;
+    unsigned in_other = a->in[!f->m]; /* sides of the piece that are in the other model */
+    r->has_pieces = true;
     memcpy(r->last, a->in, sizeof r->last);
     if (r->two.solid[0] && r->two.solid[1])
         record_solids(r, a);
     else {
-        r->both |= is_mixed(r) && other == EBPO_SIDE_BOTH;
-        r->only[f->m] |= other == 0;
+        r->both |= is_mixed(r) && in_other == EBPO_SIDE_BOTH;
+        r->only[f->m] |= in_other == 0;
     }
     return !is_decided(r);
 }
 
-/* Examines a face, unless it has been examined. Returns false if the search can end, or after a
- * failure (see r->status). If one model is a solid and the other one a surface, examines only faces
- * of the surface. */
+/* Examines a face, unless it has been examined. If one model is a solid and the other model is a
+ * surface, examines only faces of the surface. Returns false if the search must end: the relation
+ * is decided, the deadline has passed, or r->status is a failure. */
 static bool inspect_face(relation_search *r, int m, uint64_t face)
 {
     visited_face f = { r, m };
@@ -250,7 +257,7 @@ static bool inspect_pair(relation_search *r, const ebpo_face_pair *pair)
 
 /* --- contacts --- */
 
-/* Returns true if both faces of a pair have an area. Returns false after a failure, too, and sets
+/* Returns true if both faces of a pair have an area. After a failure, returns false and sets
  * r->status. */
 static bool all_have_area(relation_search *r, const ebpo_face_pair *pair)
 {
@@ -264,7 +271,7 @@ static bool all_have_area(relation_search *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* Records an intersecting pair of faces of two surfaces. Returns false after a failure, and sets
+/* Records an intersecting pair of faces of two surfaces. After a failure, returns false and sets
  * r->status. */
 static bool record_pair(relation_search *r, const ebpo_face_pair *pair)
 {
@@ -273,23 +280,25 @@ static bool record_pair(relation_search *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* Marks the faces of intersecting pairs, and examines the faces that cross. */
+/* Marks the faces of intersecting pairs, and examines the faces that cross. Returns false if the
+ * search must end. */
 static bool receive_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relation_search *r = user;
-    bool swapped = r->collision->swapped, more = true;
-    for (uint64_t i = 0; i < count && more; i++) {
+    bool swapped = r->collision->swapped, go_on = true;
+    for (uint64_t i = 0; i < count && go_on; i++) {
         set_bit(r->intersecting[swapped], pairs[i].file_face_a);
         set_bit(r->intersecting[!swapped], pairs[i].file_face_b);
         if (are_surfaces(r))
-            more = record_pair(r, &pairs[i]);
+            go_on = record_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
-            more = inspect_pair(r, &pairs[i]);
+            go_on = inspect_pair(r, &pairs[i]);
     }
-    return more;
+    return go_on;
 }
 
-/* Returns the query's options with the time that remains until the deadline. */
+/* Returns options for a query that this query makes: the query's options, with the time that
+ * remains until the deadline. */
 static ebpo_collide_options remaining_options(const relation_search *r)
 {
     ebpo_collide_options options = r->collision->options;
@@ -299,7 +308,8 @@ static ebpo_collide_options remaining_options(const relation_search *r)
     return options;
 }
 
-/* Passes all intersecting pairs to `take`. If the deadline passes, sets r->late. */
+/* Finds all intersecting pairs, and passes them to `take`. If the deadline passes, sets r->late and
+ * does not fail. */
 static ebpo_status receive_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
@@ -313,7 +323,8 @@ static ebpo_status receive_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_er
     return status == EBPO_OK ? r->status : status;
 }
 
-/* Returns true if the search must continue. */
+/* Returns true if the search must continue: if there is no failure, the deadline has not passed,
+ * and the relation is not decided. */
 static bool must_continue(const relation_search *r)
 {
     return r->status == EBPO_OK && !r->late && !is_decided(r);
@@ -333,7 +344,7 @@ static void inspect_intersecting(relation_search *r)
 /* --- faces without contact --- */
 
 /* Returns true if a patch without contact of model m adds no information. in: the patch is inside
- * the other model (otherwise outside). */
+ * the other model; false: it is outside the other model. */
 static bool side_adds_nothing(const relation_search *r, int m, bool in)
 {
     if (is_mixed(r))
@@ -341,28 +352,31 @@ static bool side_adds_nothing(const relation_search *r, int m, bool in)
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Examines the owned faces of a subtree that do not intersect the other model, except the faces of
- * patches that add no information. done: a bit for each patch (by its first face), 1: it adds no
- * information; initially 0. */
+/* Examines the faces without contact that a subtree owns, except the faces of patches that add no
+ * information. done: a bit for each patch (by its first face), 1: the patch adds no information;
+ * initially 0. */
 static void inspect_untouched_faces(relation_search *r, const separate_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && must_continue(r); i++) {
         if (has_bit(r->intersecting[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
-        r->examined = false;
+        r->has_pieces = false;
         (void)inspect_face(r, u->m, u->first + i);
-        if (r->examined && side_adds_nothing(r, u->m, r->last[!u->m] != 0))
+        if (r->has_pieces && side_adds_nothing(r, u->m, r->last[!u->m] != 0))
             set_bit(done, u->patch[i]);
     }
 }
 
+/* Returns a new array of `count` bits, which are 0; NULL if memory is short. */
 static uint64_t *make_bits(uint64_t count) { return ebpo_alloc_zero(count / 64 + 1, 8); }
 
+/* Fails because make_bits has returned NULL. */
 static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
 {
     return ebpo_fail_memory(error, count / 8);
 }
 
+/* Loads a subtree and examines its faces without contact. */
 static void inspect_subtree(relation_search *r, separate_patches *u, uint64_t number)
 {
     r->status = separate_patches_find(u, number, r->intersecting[u->m], r->error);
@@ -376,7 +390,7 @@ static void inspect_subtree(relation_search *r, separate_patches *u, uint64_t nu
     free(done);
 }
 
-/* Returns true if the faces without contact of a subtree are on a known side and add no
+/* Returns true if the side of all faces without contact of a subtree is known and adds no
  * information, so that the subtree need not be loaded. */
 static bool is_settled(relation_search *r, const separate_patches *u, uint64_t number)
 {
@@ -386,7 +400,7 @@ static bool is_settled(relation_search *r, const separate_patches *u, uint64_t n
     return in >= 0 && side_adds_nothing(r, u->m, in);
 }
 
-/* Examines the faces without contact of model m. */
+/* Examines the faces without contact of model m, subtree by subtree. */
 static void inspect_patches(relation_search *r, int m)
 {
     separate_patches u;
@@ -407,22 +421,24 @@ static void inspect_patches(relation_search *r, int m)
 static bool record_doubtful_piece(void *user, const ebpo_around *a)
 {
     const visited_face *f = user;
-    f->r->examined = true;
+    f->r->has_pieces = true;
     f->r->doubtful |= a->in[f->m] == 0;
     return !f->r->doubtful;
 }
 
 /* Returns true if every piece of a face belongs to the face's model. Then a common point of this
- * face and another one also belongs to the model. */
+ * face and another face also belongs to this model. */
 static bool belongs_to_model(relation_search *r, int m, uint64_t face)
 {
     visited_face f = { r, m };
-    r->examined = r->doubtful = false;
+    r->has_pieces = r->doubtful = false;
     if (r->status == EBPO_OK)
         r->status = ebpo_visit_around_face(&r->two, m, face, record_doubtful_piece, &f, r->error);
-    return r->status == EBPO_OK && r->examined && !r->doubtful;
+    return r->status == EBPO_OK && r->has_pieces && !r->doubtful;
 }
 
+/* Sets r->touch if both faces of an intersecting pair belong to their models. Returns false if the
+ * search must end. */
 static bool find_touching_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relation_search *r = user;
@@ -435,7 +451,7 @@ static bool find_touching_faces(void *user, const ebpo_face_pair *pairs, uint64_
     return !r->touch && r->status == EBPO_OK && !r->late;
 }
 
-/* Sets r->touch if both models, with their boundaries, have a common point. */
+/* Sets r->touch if both models, including their boundaries, have a common point. */
 static ebpo_status find_common_point(relation_search *r, ebpo_error *error)
 {
     ebpo_status status = receive_pairs(r, find_touching_faces, error);
@@ -462,14 +478,14 @@ static bool has_separate_area(relation_search *r, int m)
     return has;
 }
 
-/* Returns true if both models are one file at one pose. */
+/* Returns true if both models are the same model at the same pose. */
 static bool is_same(const ebpo_collision *q)
 {
     return ebpo_same_model(q->model[0], q->model[1]) &&
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 
-/* Sets the result for two identical models: r->both is true if the model has at least one point. */
+/* Sets the result for two identical models: r->both becomes true if the model has a point. */
 static void find_any(relation_search *r)
 {
     uint64_t count = face_count(r, 0);
@@ -547,12 +563,14 @@ static ebpo_relation swap_relation(ebpo_relation r)
     return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
 }
 
+/* Returns true if the boxes of both models are disjoint. */
 static bool are_boxes_apart(const ebpo_two_models *two)
 {
     const double *a = two->model[0].box, *b = two->model[1].box;
     return ebpo_box_gap(a, a + 3, b, b + 3) > 0;
 }
 
+/* Sets r->both, r->only and r->touch, from which relation_of computes the relation. */
 static ebpo_status find_relation(relation_search *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
@@ -575,15 +593,18 @@ static ebpo_status find_relation(relation_search *r, ebpo_error *error)
     return r->status;
 }
 
-/* Adds the loads of this query to the collider's counts, and sets the bytes read. Nested queries
- * have added their bytes to the collider's count, so the count is replaced, not increased. */
-static void count_loads(const relation_search *r, uint64_t bytes_before, uint64_t read_before)
+/* Adds the loads of this query to the collider's count, and sets the collider's count of bytes. The
+ * queries that this query has made have added their bytes to the count, so the count is computed
+ * from its value at the beginning. count_before, read_before: at the beginning of this query, the
+ * collider's count and the bytes that had been read from the files. */
+static void count_loads(const relation_search *r, uint64_t count_before, uint64_t read_before)
 {
     ebpo_collider *c = r->collision->collider;
     c->loads += ebpo_two_models_loads(&r->two);
-    c->bytes_read = bytes_before + ebpo_collision_bytes_read(r->collision) - read_before;
+    c->bytes_read = count_before + ebpo_collision_bytes_read(r->collision) - read_before;
 }
 
+/* Frees the state of the search. */
 static void end_search(relation_search *r)
 {
     ebpo_two_models_end(&r->two);
@@ -606,11 +627,11 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
         status = ebpo_pair_faces_begin(&r.lookup, &q, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t bytes_before = c->bytes_read, before = ebpo_collision_bytes_read(&q);
+    uint64_t count_before = c->bytes_read, read_before = ebpo_collision_bytes_read(&q);
     status = find_relation(&r, error);
     ebpo_relation relation = relation_of(&r);
     out->relation = (int32_t)(q.swapped ? swap_relation(relation) : relation);
-    count_loads(&r, bytes_before, before);
+    count_loads(&r, count_before, read_before);
     end_search(&r);
     return status;
 }

@@ -1,10 +1,10 @@
-/* Visits pairs of nodes of two posed trees, the pair with the least gap first, down to subtrees
- * that are loaded on demand. The gap of two envelopes is a lower bound of the distance of the
- * nodes' faces.
+/* Visits pairs of nodes of two posed trees, the pair with the least gap first, down to subtrees,
+ * which are loaded on demand. The gap of two nodes' envelopes is a lower bound of the distance of
+ * the nodes' faces.
  *
  * Queries of levels, distances and separation distances use this search, and decide when it ends.
- * The larger one of two nodes is divided first. If one model is entirely in memory and the other
- * one is partly loaded, several pairs of nodes may need the same subtree, which is visited once. A
+ * The larger of two nodes is divided first. If one model is entirely in memory and the other model
+ * is partly loaded, several pairs of nodes may need the same subtree, which is visited once. A
  * search runs in one thread. */
 #include "core/strict_fp.h"
 
@@ -38,7 +38,7 @@ int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
            ebpo_posed_diagonal(&g->side[1], node[1].cell);
 }
 
-/* Returns a bound of the errors of both envelopes. */
+/* Returns the sum of the error bounds of both nodes' envelopes. */
 static double slack_of(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 {
     return ebpo_posed_slack(&g->side[0], node[0].cell, g->max_coordinate) +
@@ -61,14 +61,14 @@ ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g) { return heap_take(g->heap, 
 
 double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 {
-    double corner[2][8][3], outside = 0; /* outside: margin for faces outside the cells */
+    double corner[2][8][3], margin = 0; /* margin: for faces outside the cells */
     ebpo_convex convex[2];
     for (int i = 0; i < 2; i++) {
         ebpo_posed_cell(&g->side[i], node[i].cell, corner[i]);
         convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
-        outside += EBPO_FACE_MARGIN * ebpo_posed_diagonal(&g->side[i], node[i].cell);
+        margin += EBPO_FACE_MARGIN * ebpo_posed_diagonal(&g->side[i], node[i].cell);
     }
-    return ebpo_convex_span(&convex[0], &convex[1]) + outside + slack_of(g, node);
+    return ebpo_convex_span(&convex[0], &convex[1]) + margin + slack_of(g, node);
 }
 
 ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2], double *out,
@@ -112,13 +112,14 @@ void ebpo_subtree_search_end(ebpo_subtree_search *s)
     ebpo_node_gaps_free(&s->nodes);
 }
 
+/* Returns true if a node has children in memory. */
 static bool is_gray(const ebpo_posed_node *node)
 {
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY;
 }
 
-/* Nodes of a model that is entirely in memory are divided only to get better bounds, and not below
- * the size of the other model's subtree. */
+/* The nodes of a model that is entirely in memory are divided only to get better bounds, and only
+ * if they are larger than the other model's node. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2])
 {
     int larger = ebpo_node_larger(&s->nodes, node);
@@ -127,8 +128,9 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
     return is_gray(&node[!larger]) && !s->collision->model[!larger]->whole ? !larger : -1;
 }
 
-/* Returns true if a pair of subtrees has been visited. If one model is entirely in memory and the
- * other one is partly loaded, several pairs of nodes need the same pair of subtrees. */
+/* Returns true if a pair of subtrees has been visited. This happens if one model is entirely in
+ * memory and the other model is partly loaded, because then several pairs of nodes need the same
+ * pair of subtrees. */
 static bool was_visited(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)
@@ -153,14 +155,14 @@ ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_no
         return EBPO_OK;
     c->subtree_pairs++;
     for (int i = 0; i < 2; i++) {
-        ebpo_accel *decoded = s->collision->model[i]->whole; /* NULL: partly loaded */
+        ebpo_accel *subtree = s->collision->model[i]->whole; /* NULL: partly loaded */
         ebpo_status status =
-            decoded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &decoded, error);
+            subtree ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &subtree, error);
         if (status != EBPO_OK)
             return status;
         c->subtrees += !s->visited[i][number[i]];
         s->visited[i][number[i]] = true;
-        accel[i] = decoded;
+        accel[i] = subtree;
     }
     *loaded = true;
     return EBPO_OK;

@@ -1,12 +1,12 @@
 /* Finds pairs of intersecting faces of partly loaded models, with the same result as for models
  * that are entirely in memory (whole models).
  *
- * Two faces with a common point are listed by subtrees whose cells contain that point. So only
- * pairs of subtrees whose envelopes may touch need to be searched. These pairs of subtrees are
- * found before any subtree is loaded, and are sorted so that a loaded subtree is soon reused.
- * Several threads search pairs of subtrees. A pair of faces is found more than once if several
- * subtrees list one of the faces. So the pairs of faces are stored, sorted and made unique before
- * they are returned.
+ * Two faces with a common point are listed by subtrees whose cells contain this point. So only
+ * pairs of subtrees whose envelopes may have a common point must be searched. These pairs of
+ * subtrees are found before any subtree is loaded, and are sorted so that a loaded subtree is used
+ * again soon. Several threads search pairs of subtrees. A pair of faces is found more than once if
+ * several subtrees list one of its faces. So the pairs of faces are stored, sorted and made unique
+ * before they are returned.
  *
  * If the collider's memory is too small for all pairs of faces, the search has several rounds. A
  * round drops the pairs of the last faces of the first model, and the next round finds these pairs
@@ -30,32 +30,32 @@
 typedef struct subtree_pair {
     uint32_t a, b;           /* indices of the subtrees */
     uint32_t rank_a, rank_b; /* ranks of the subtrees in the order of the files' faces */
-    double apart;            /* distance of the middles of both cells, divided by the sum of their
-                              * diagonals */
+    double apart;            /* distance of the middles of both cells, divided by half the sum of
+                              * the cells' diagonals */
 } subtree_pair;
 
 typedef struct subtree_pairs {
-    subtree_pair *pair;
+    subtree_pair *pair; /* [count] */
     uint64_t count, capacity;
     uint64_t subtrees[2]; /* number of different subtrees of each model */
 } subtree_pairs;
 
-/* Two intersecting faces by their indices; [0] is the face of the query's first model. */
+/* Two intersecting faces. */
 typedef struct stored_pair {
-    uint32_t file[2], source[2];
-    int32_t kind;
+    uint32_t file[2], source[2]; /* [model] indices of the faces in the file and in the source */
+    int32_t kind;                /* ebpo_pair_kind */
 } stored_pair;
 
-/* Search of one thread. Zero at the beginning. */
+/* The search of one thread. Zero at the beginning. */
 typedef struct subtree_walk {
     const ebpo_collision *collision;
-    bool self;                /* both models are the same one, at one pose */
-    ebpo_context *context[2]; /* for partly loaded models; each holds the last subtree */
+    bool self;                /* both models are the same model at the same pose */
+    ebpo_context *context[2]; /* contexts of partly loaded models; each holds the last subtree */
     ebpo_pair_walk walk;
     stored_pair *stored; /* [count] pairs of faces of the last pair of subtrees, in no order */
     uint64_t count, capacity;
-    uint64_t first_end; /* greater than the indices of all faces that the first one of the last two
-                         * subtrees lists */
+    uint64_t first_end; /* greater than the indices of all faces that the first subtree of the last
+                         * pair lists */
     bool late;          /* the deadline passed before all pairs were found */
 } subtree_walk;
 
@@ -63,13 +63,14 @@ typedef struct subtree_walk {
 typedef struct subtree_pair_search {
     subtree_pairs *out;
     ebpo_posed_subtrees *side[2];
-    double max_coordinate;
-    bool self;
+    double max_coordinate; /* upper bound of the absolute values of posed coordinates */
+    bool self;             /* as in subtree_walk */
     ebpo_error *error;
 } subtree_pair_search;
 
 /* --- pairs of nodes --- */
 
+/* Returns the sum of the error bounds of both nodes' envelopes. */
 static double slack_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     return ebpo_posed_slack(f->side[0], node[0].cell, f->max_coordinate) +
@@ -100,19 +101,21 @@ static double apart_of(const subtree_pair_search *f, const ebpo_posed_node node[
                                          ebpo_posed_diagonal(f->side[1], node[1].cell));
 }
 
+/* Returns true if a subtree is pruned: its faces are not in this file. */
 static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
 {
     return !s->model->whole && s->model->top->below[number].pruned;
 }
 
-/* Adds a pair of subtrees, unless their envelopes are certainly apart. */
+/* Adds the pair of subtrees whose roots are the two nodes, unless their envelopes are certainly
+ * apart. */
 static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
     ebpo_convex convex[2];
     double slack = slack_of(f, node);
     if (is_pruned(f->side[0], a) || is_pruned(f->side[1], b))
-        return EBPO_OK; /* the faces of a pruned node are not in this file */
+        return EBPO_OK;
     subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
     if (f->self && pair.rank_a > pair.rank_b)
         return EBPO_OK;
@@ -130,26 +133,26 @@ static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_pos
 
 /* --- the descent --- */
 
-/* Finds the pairs of subtrees below two nodes whose envelopes may touch. */
+/* Finds the pairs of subtrees below two nodes whose envelopes may have a common point. */
 static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
-    bool below[2];
+    bool is_root[2]; /* the node is the root of a subtree */
     for (int i = 0; i < 2; i++) {
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
-        below[i] = ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
+        is_root[i] = ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
     }
     if (cells_apart(f, node))
         return EBPO_OK;
-    if (below[0] && below[1])
+    if (is_root[0] && is_root[1])
         return add_subtree_pair(f, node);
-    bool larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
-                  ebpo_posed_diagonal(f->side[1], node[1].cell);
-    int down = below[0] ? 1 : below[1] ? 0 : larger ? 0 : 1;
+    bool first_is_larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
+                           ebpo_posed_diagonal(f->side[1], node[1].cell);
+    int divided = is_root[0] ? 1 : is_root[1] ? 0 : first_is_larger ? 0 : 1;
     ebpo_posed_node part[2] = { node[0], node[1] };
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        part[down] = ebpo_posed_child(f->side[down], &node[down], octant);
+        part[divided] = ebpo_posed_child(f->side[divided], &node[divided], octant);
         status = descend_pair(f, part);
     }
     return status;
@@ -157,6 +160,7 @@ static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_n
 
 /* --- order of pairs --- */
 
+/* Compares two pairs by their ranks for qsort. */
 static int by_rank(const void *x, const void *y)
 {
     const subtree_pair *p = x, *q = y;
@@ -165,17 +169,19 @@ static int by_rank(const void *x, const void *y)
     return (p->rank_b > q->rank_b) - (p->rank_b < q->rank_b);
 }
 
+/* Reverses the order of pairs. */
 static void reverse_pairs(subtree_pair *pair, uint64_t count)
 {
     for (uint64_t i = 0; i < count / 2; i++) {
-        subtree_pair other = pair[i];
+        subtree_pair first = pair[i];
         pair[i] = pair[count - 1 - i];
-        pair[count - 1 - i] = other;
+        pair[count - 1 - i] = first;
     }
 }
 
-/* Sorts by the rank of the first subtree, then by the rank of the second one, which alternately
- * ascends and descends. Sets subtrees[0] to the number of different first subtrees. */
+/* Sorts pairs by the rank of the first subtree. Among the pairs with the same first subtree, the
+ * rank of the second subtree ascends or, for every second first subtree, descends. Sets subtrees[0]
+ * to the number of different first subtrees. */
 static void sort_back_and_forth(subtree_pairs *p)
 {
     if (p->count)
@@ -188,7 +194,7 @@ static void sort_back_and_forth(subtree_pairs *p)
     }
 }
 
-/* Counts the different second subtrees, which have indices below `most`. */
+/* Sets subtrees[1] to the number of different second subtrees, which have indices below `most`. */
 static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_error *error)
 {
     bool *visited = ebpo_alloc_zero(most, sizeof *visited);
@@ -203,10 +209,10 @@ static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_e
 }
 
 /* Finds the pairs of subtrees that may have intersecting faces, sorted by sort_back_and_forth, so
- * that loaded subtrees are reused soon. Two intersecting faces have a common point, and each model
- * has a subtree that lists its face and whose cell contains the point; these two subtrees are a
- * pair of the result. `self`: both models are the same one at one pose; each pair is found once,
- * with rank_a <= rank_b. The caller frees out->pair, even after a failure. */
+ * that loaded subtrees are used again soon. Two intersecting faces have a common point, and each
+ * model has a subtree that lists the model's face and whose cell contains the point; these two
+ * subtrees are a pair of the result. self: both models are the same model at the same pose; each
+ * pair is found once, with rank_a <= rank_b. The caller frees out->pair, even after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
                                       ebpo_posed_subtrees *b, double max_coordinate, bool self,
                                       ebpo_error *error)
@@ -221,6 +227,7 @@ static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a
     return count_second_subtrees(out, b->count, error);
 }
 
+/* Compares two pairs by `apart`, then by their ranks, for qsort. */
 static int by_nearness(const void *x, const void *y)
 {
     const subtree_pair *p = x, *q = y;
@@ -236,6 +243,9 @@ static void sort_nearest_first(subtree_pairs *p)
         qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
 }
 
+/* --- the walk of a thread --- */
+
+/* Prepares the walk of a thread. */
 static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *collision, bool self,
                                       ebpo_error *error)
 {
@@ -259,7 +269,8 @@ static uint64_t subtree_walk_loads(const subtree_walk *w)
     return loads;
 }
 
-/* Releases the subtrees that the walk holds, so that others can use their memory. */
+/* Releases the subtrees that the walk holds, so that their memory can be used for other subtrees.
+ */
 static void subtree_walk_let_go(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
@@ -274,6 +285,7 @@ static void subtree_walk_free(subtree_walk *w)
     free(w->stored);
 }
 
+/* Compares two pairs by the indices of their faces in the file, for qsort. */
 static int compare_stored_pairs(const void *x, const void *y)
 {
     const stored_pair *p = x, *q = y;
@@ -282,14 +294,16 @@ static int compare_stored_pairs(const void *x, const void *y)
     return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
 }
 
-static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *t)
+/* Converts a pair to the pair that the caller receives. */
+static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *p)
 {
     int a = q->swapped, b = !q->swapped;
-    return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
+    return (ebpo_face_pair){ p->source[a], p->source[b], p->file[a], p->file[b], p->kind, 0 };
 }
 
-/* --- one pair --- */
+/* --- one pair of subtrees --- */
 
+/* Loads a subtree, unless its model is entirely in memory. */
 static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
                                 ebpo_error *error)
 {
@@ -300,8 +314,8 @@ static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, cons
     return status;
 }
 
-/* Stores the pairs of faces that the walk has found. If w->self, orders each pair by its indices
- * and omits pairs of a face with itself. */
+/* Stores the pairs of faces that the walk has found. If w->self, stores the face with the lesser
+ * index first, and omits pairs of a face with itself. */
 static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
@@ -309,20 +323,21 @@ static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2]
         return ebpo_fail_memory(error, found->found_count * sizeof *w->stored);
     for (uint64_t i = 0; i < found->found_count; i++) {
         uint32_t local[2] = { found->found_pairs[i].a, found->found_pairs[i].b };
-        stored_pair t = { .kind = found->found_pairs[i].kind };
+        stored_pair p = { .kind = found->found_pairs[i].kind };
         for (int side = 0; side < 2; side++) {
-            t.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
-            t.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
+            p.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
+            p.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
         }
-        if (w->self && t.file[0] == t.file[1])
+        if (w->self && p.file[0] == p.file[1])
             continue;
-        if (w->self && t.file[0] > t.file[1])
-            t = (stored_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
-        w->stored[w->count++] = t;
+        if (w->self && p.file[0] > p.file[1])
+            p = (stored_pair){ { p.file[1], p.file[0] }, { p.source[1], p.source[0] }, p.kind };
+        w->stored[w->count++] = p;
     }
     return EBPO_OK;
 }
 
+/* Fails because the stack of a walk cannot grow by the 64 pairs of children of two nodes. */
 static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
 {
     return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
@@ -374,29 +389,30 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
 
 /* --- state of all threads --- */
 
-static const char stage[] = "pairs of subtrees";
+static const char stage[] = "pairs of subtrees"; /* for the progress function */
 
-/* Number of consecutive pairs of subtrees that one thread takes. In most cases they have the same
- * first subtree, which is then loaded once. */
+/* Number of consecutive pairs of subtrees that a thread searches at a time. In most cases these
+ * pairs have the same first subtree, which the thread loads once. */
 enum { PAIRS_IN_A_ROW = 4 };
 
 typedef struct gathering_parts {
     const ebpo_collision *collision;
-    bool self;
-    ebpo_posed_subtrees subtrees[2];
-    subtree_pairs pairs;
+    bool self;                       /* as in subtree_walk */
+    ebpo_posed_subtrees subtrees[2]; /* subtrees of both models */
+    subtree_pairs pairs;             /* pairs of subtrees to be searched */
     uint64_t *end;      /* [subtree of the first model] first_end (subtree_walk) of this subtree; 0:
                          * not known yet */
     subtree_walk *walk; /* [threads] */
     unsigned threads;
-    uint64_t read_before; /* bytes that had been read before the search */
-    pthread_mutex_t lock; /* protects the members below */
+    uint64_t read_before; /* bytes that had been read from both files before the search */
+    pthread_mutex_t lock; /* protects `end` and the members below */
     uint64_t from, to;    /* range of faces of the first model in this round */
     stored_pair *stored;  /* [count] pairs of faces that wait to be passed to the caller */
     uint64_t count, capacity;
-    uint64_t most; /* maximum of `count` */
+    uint64_t most; /* greatest allowed `count` */
 } gathering_parts;
 
+/* Adds the counts of a walk to the collider's counts. */
 static void count_walk(const gathering_parts *g, subtree_walk *w)
 {
     g->collision->collider->loads += subtree_walk_loads(w);
@@ -417,8 +433,9 @@ static void sort_unique(gathering_parts *g)
     g->count = kept;
 }
 
-/* Drops the last waiting pairs, so that at most half of the maximum number remains, but keeps all
- * pairs of the first face. Ends this round's range of faces before the faces of dropped pairs. */
+/* Drops the last waiting pairs, so that at most half of the allowed number remains, but keeps all
+ * pairs of the first face. Ends this round's range of faces before the faces of the dropped pairs.
+ */
 static void drop_last_pairs(gathering_parts *g)
 {
     sort_unique(g);
@@ -463,6 +480,7 @@ static bool is_done(gathering_parts *g, const subtree_pair *pair)
     return end && end <= g->from;
 }
 
+/* Adds the result of a walk to the state of all threads. */
 static ebpo_status keep_pairs(gathering_parts *g, const subtree_pair *pair, const subtree_walk *w,
                               ebpo_error *error)
 {
@@ -473,6 +491,7 @@ static ebpo_status keep_pairs(gathering_parts *g, const subtree_pair *pair, cons
     return status;
 }
 
+/* Searches the pairs of subtrees [begin, end) in a thread. */
 static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -493,19 +512,19 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Runs all threads. Each thread holds two subtrees. If the memory budget is too small for that, one
- * thread searches again from the beginning. */
+/* Runs all threads. Each thread holds two subtrees. If the memory budget is too small for the
+ * subtrees of all threads, one thread searches again from the beginning. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
     const ebpo_progress *progress = &g->collision->options.progress;
-    ebpo_error many = EBPO_ERROR_INIT;
+    ebpo_error first_error = EBPO_ERROR_INIT; /* of the search with several threads */
     ebpo_status status = EBPO_E_LIMIT;
     if (g->threads > 1)
         status = ebpo_parallel_for(g->threads, NULL, g->pairs.count, PAIRS_IN_A_ROW, run_pairs, g,
-                                   progress, stage, &many);
+                                   progress, stage, &first_error);
     if (status != EBPO_E_LIMIT) {
         if (status != EBPO_OK && error)
-            *error = many;
+            *error = first_error;
         return status;
     }
     for (unsigned i = 1; i < g->threads; i++) {
@@ -519,7 +538,7 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
                              error);
 }
 
-enum { PASSED_AT_ONCE = 1024 };
+enum { PASSED_AT_ONCE = 1024 }; /* greatest number of pairs in a call of the caller's function */
 
 /* Passes the waiting pairs to the caller. Returns false if the caller needs no more pairs. */
 static bool pass_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
@@ -558,6 +577,7 @@ static ebpo_status search_in_rounds(gathering_parts *g, ebpo_pairs_fn take, void
 
 /* --- both queries --- */
 
+/* Prepares the search of `threads` threads, and finds the pairs of subtrees. */
 static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
     const ebpo_collision *q = g->collision;
@@ -583,6 +603,7 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
     return g->end ? EBPO_OK : ebpo_fail_memory(error, g->subtrees[0].count * sizeof *g->end);
 }
 
+/* Adds the counts to the collider's counts, and frees the memory. */
 static void end_gathering(gathering_parts *g)
 {
     g->collision->collider->bytes_read += ebpo_collision_bytes_read(g->collision) - g->read_before;
@@ -612,8 +633,8 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     return status;
 }
 
-/* Finds the first pair of subtrees that has intersecting faces, and of its intersecting pairs of
- * faces the first one in the order of the files. *found: as of ebpo_collide_first. */
+/* Finds the first pair of subtrees that has intersecting faces. Sets *out to the first intersecting
+ * pair of its faces, in the order of the files. *found: as for ebpo_collide_first. */
 static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
                                       ebpo_error *error)
 {

@@ -27,10 +27,9 @@
 #include "mesh/sum.h"
 
 /* The values are divided by their sizes into three bins of small, ordinary and large values, whose
- * limits are 2^-400 and 2^400 (see add_to). The unit of values in bin i is 2^(MAP_BIN_UNIT (i -
- * 1)). In this unit, all values are between 2^-474 and 2^424, so that their squares are normal
- * numbers.
- */
+ * limits are 2^-400 and 2^400 (see add_to). The units of values in bins 0, 1 and 2 are
+ * 2^-MAP_BIN_UNIT, 1 and 2^MAP_BIN_UNIT. In these units, all values are between 2^-474 and 2^424,
+ * so that their squares are normal numbers. */
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
 /* The state of statistics while values are added. Percentiles are computed separately. */
