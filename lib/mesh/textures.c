@@ -129,8 +129,7 @@ typedef struct words {
 
 /* Names that face attributes refer to by index, in the order of the header's comments. */
 typedef struct numbered {
-    const ebpo_attribute
-        *find_face_attribute; /* attribute of faces that refers to the names; NULL: none */
+    const ebpo_attribute *of_faces; /* attribute of faces that refers to the names; NULL: none */
     words *name;
     bool *used; /* [count] true: a kept face refers to the name */
     uint64_t count, capacity;
