@@ -164,7 +164,7 @@ static void make_side(separation_search *s, int which, const ebpo_accel *accel)
 
 /* Returns true if a pair precedes s->pair: by the index of the face of the query's first model,
  * then by the index of the other face. */
-static bool precedes(const separation_search *s, const ebpo_found_pair *pair)
+static bool is_earlier_pair(const separation_search *s, const ebpo_found_pair *pair)
 {
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, pair->a),
              b = ebpo_accel_file_face(s->side[1].accel, pair->b);
@@ -186,7 +186,7 @@ static void inspect_faces(separation_search *s, const double a[3][3], const doub
     ebpo_sweep_time_init(&t);
     ebpo_sweep_last(a, b, s->direction, &t);
     int order = t.ever && mpz_sgn(t.numerator) >= 0 ? ebpo_sweep_time_compare(&t, &s->last) : -1;
-    if (order > 0 || (order == 0 && precedes(s, pair))) {
+    if (order > 0 || (order == 0 && is_earlier_pair(s, pair))) {
         mpz_swap(t.numerator, s->last.numerator);
         mpz_swap(t.denominator, s->last.denominator);
         s->last.unit = t.unit;
