@@ -130,8 +130,8 @@ static bool has_parts(const ebpo_cap_tree *t, uint32_t entry)
     return !(entry & EBPO_CAP_TRIANGLE) && (n->weight == 0 || n->to - n->from > 2);
 }
 
-/* Writes the parts of a node: the two nodes of a group; or the triangle of a stretch, and those of
- * its two halves that have triangles. Returns the number of parts. */
+/* Writes the parts of a node. The parts of a group are its two nodes. The parts of a stretch are
+ * its triangle, and each of its two halves that has triangles. Returns the number of parts. */
 static uint32_t find_parts(const ebpo_cap_tree *t, uint32_t entry, uint32_t part[3])
 {
     const ebpo_cap_node *n = &t->node[entry];

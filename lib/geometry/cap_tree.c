@@ -57,8 +57,8 @@ static void add_part(ebpo_cap_node *n, const ebpo_cap_node *part)
         n->vector[k] += part->vector[k];
 }
 
-/* Sets the sums to those of the triangle (from, m, to). The rounding error of its vector area is
- * below 2^-49 times the product of two edges. */
+/* Sets the sums of the node to the sums of the triangle (from, m, to). The rounding error of the
+ * triangle's vector area is below 2^-49 times the product of two edges. */
 static void set_triangle(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t m)
 {
     double u[3], v[3], cross[3], weight = n->weight;

@@ -16,7 +16,8 @@ static inline uint64_t ebpo_cap_middle(uint64_t i, uint64_t j) { return i + (j -
 static inline uint64_t ebpo_cap_count(uint64_t i, uint64_t j) { return j - i < 2 ? 0 : j - i - 1; }
 
 /* Computes triangle t of the stretch [i, j], as positions in the loop. Triangles are numbered in
- * preorder: the stretch's triangle, the triangles of its first half, those of its second half. */
+ * preorder: the stretch's triangle, the triangles of its first half, the triangles of its second
+ * half. */
 static inline void ebpo_cap_triangle(uint64_t i, uint64_t j, uint64_t t, uint64_t out[3])
 {
     uint64_t m = ebpo_cap_middle(i, j);

@@ -232,7 +232,7 @@ static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, i
 
 typedef uint64_t ebpo_octcode;
 
-/* Returns true if the code is that of a cell at one of the levels 0 .. EBPO_MAX_LEVEL. */
+/* Returns true if the code is the code of a cell at one of the levels 0 .. EBPO_MAX_LEVEL. */
 static inline bool ebpo_octcode_valid(ebpo_octcode code)
 {
     if (code == 0)

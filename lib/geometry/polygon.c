@@ -867,7 +867,8 @@ static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3]
     return empty ? EBPO_POLYGON_DEGENERATE : turned ? EBPO_POLYGON_GUESSED : EBPO_POLYGON_CONCAVE;
 }
 
-/* Computes the triangles of least area, or those of the smallest ears for long outlines. */
+/* Computes the triangulation with the least area; for long outlines, computes a triangulation by
+ * the smallest ears. */
 static ebpo_polygon_kind guess_triangles(const polygon *p, uint32_t (*triangle)[3])
 {
     double(*point)[3] = ebpo_alloc(p->n, sizeof *point);

@@ -152,7 +152,7 @@ typedef struct ebpo_half_spaces {
 /* Adds planes of the current cell. */
 void ebpo_half_spaces_add(ebpo_half_spaces *spaces, const uint32_t *codes, uint64_t count);
 
-/* Converts the half-spaces from the coordinates of the cell to those of its child. */
+/* Converts the half-spaces from the coordinates of the cell to the coordinates of its child. */
 void ebpo_half_spaces_to_child(ebpo_half_spaces *spaces, unsigned octant);
 
 /* Cuts the cell by the half-spaces, each moved outwards by `slack` (in units of n . xi / 511: 1 is

@@ -432,7 +432,7 @@ static void put_colour(uint8_t kind, uint8_t rgb[3])
 }
 
 /* Returns the indices of vertices or faces, sorted by their source indices, or NULL when memory is
- * short. source: [count] source indices, from which those of dropped faces may be missing. */
+ * short. source: [count] source indices; the indices of dropped faces may be missing. */
 static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, uint64_t count)
 {
     uint64_t size = count;

@@ -285,8 +285,8 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     return status;
 }
 
-/* Records the number of removed vertices whose attribute values differ from those of the remaining
- * vertex. */
+/* Records the number of removed vertices whose attribute values differ from the values of the
+ * remaining vertex. */
 static void record_differences(const welding *w)
 {
     const ebpo_mesh *mesh = w->mesh;

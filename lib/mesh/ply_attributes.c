@@ -15,7 +15,7 @@
 
 _Static_assert((int)EBPO_PLY_INT8 == (int)EBPO_ATTRIBUTE_INT8 &&
                    (int)EBPO_PLY_FLOAT64 == (int)EBPO_ATTRIBUTE_FLOAT64,
-               "a property's type is that of its attribute");
+               "a property and its attribute have the same type");
 
 static ebpo_status fail_rows(const ebpo_ply_parser *p, uint64_t bytes)
 {

@@ -501,7 +501,8 @@ static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled
     return status;
 }
 
-/* Counts the bytes between the used bytes, and those of them that are not zero (*filled). */
+/* Counts the bytes between the used bytes (*spare), and the bytes among them that are not zero
+ * (*filled). */
 static ebpo_status inspect_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
 {
     uint64_t file_end = ebpo_reader_own(s->file)->in.source.size;

@@ -109,8 +109,8 @@ static void check_leaf(ebpo_tally *tally, const ebpo_reference_tree *view,
             report_face(tally, leaf, list.refs[i], "the list names the face twice or not in order");
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
         report_face(tally, leaf, list.refs[list.ref_count - 1],
-                    "the list refers to a face whose index is not less than that of the list's "
-                    "first new face");
+                    "the list refers to a face whose index is not less than the index of the "
+                    "list's first new face");
     tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
     /* listed faces that do not touch the leaf */
     uint64_t extra = (uint64_t)list.ref_count + list.new_count - found;

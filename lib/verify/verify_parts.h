@@ -64,8 +64,8 @@ EBPO_MUST_USE ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_fil
 EBPO_MUST_USE ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progress,
                                            uint64_t *spare, uint64_t *filled, ebpo_error *error);
 
-/* Decodes every chunk of faces by ebpo_plain_gates_read, and compares the corners with those of the
- * tree. Does nothing if the file does not have the coding `gates`. */
+/* Decodes every chunk of faces by ebpo_plain_gates_read, and compares the corners with the corners
+ * in the tree. Does nothing if the file does not have the coding `gates`. */
 EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file,
                                            const ebpo_tree *tree, ebpo_error *error);
 

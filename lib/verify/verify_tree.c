@@ -635,7 +635,8 @@ static void check_leaf(descent *d, const ebpo_reference_node *leaf)
     uint64_t listed = (uint64_t)level->leaf_new[leaf->rank] + level->leaf_ref_count[leaf->rank];
     record_check(
         d, leaf, level->leaf_first[leaf->rank] == d->next_face,
-        "the leaf's new faces do not follow those of the leaf before it in depth-first order");
+        "the leaf's new faces do not follow the new faces of the previous leaf in depth-first "
+        "order");
     record_check(d, leaf, listed > 0, "the leaf lists no face");
     record_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
                  "the leaf lists more faces than leaf_faces, and is above max_level");

@@ -29,7 +29,7 @@ enum {
     SUBTREE_FACES_MAX = 1 << 18
 };
 
-/* A stack of face indices: the faces of a node, then those of its child, and so on down. */
+/* A stack of face indices: the faces of a node, then the faces of its child, and so on down. */
 typedef struct face_stack {
     uint32_t *faces;
     uint8_t *octants; /* for each face, the children that it touches, as bits */

@@ -82,8 +82,9 @@ struct ebpo_pair_walk {
     uint32_t found_slot[2];                  /* slots of the faces of the last pair found */
     uint64_t node_pairs, block_pairs, exact; /* numbers of visited pairs of nodes and of blocks, and
                                               * of pairs of faces decided by the exact test */
-    ebpo_turned_node turned[2][EBPO_TURNED_NODES]; /* the last nodes and blocks that the walk has */
-    ebpo_posed_faces posed[2][EBPO_POSED_FACES];   /* transformed */
+    /* [model] the last nodes and blocks that the walk has transformed (caches) */
+    ebpo_turned_node turned[2][EBPO_TURNED_NODES];
+    ebpo_posed_faces posed[2][EBPO_POSED_FACES];
 };
 
 /* Frees the memory of a walk, which may be used again. */
@@ -174,8 +175,9 @@ struct ebpo_gap_search {
     unsigned waiting_count;
     uint64_t node_pairs, block_pairs; /* numbers of visited pairs of nodes and of blocks */
 
-    ebpo_gap_node node[2][EBPO_GAP_NODES];       /* the last nodes and blocks that the search has */
-    ebpo_posed_faces faces[2][EBPO_POSED_FACES]; /* transformed */
+    /* [model] the last nodes and blocks that the search has transformed (caches) */
+    ebpo_gap_node node[2][EBPO_GAP_NODES];
+    ebpo_posed_faces faces[2][EBPO_POSED_FACES];
 };
 
 /* Allocates a search. Returns NULL if memory is short. */

@@ -315,7 +315,8 @@ static void keep_lesser(fraction *best, const fraction *other)
 /* Two edges, in integers. */
 typedef struct edges {
     ebpo_vectorz from[2], along[2]; /* first end, and vector to the other end, of each edge */
-    ebpo_vectorz between;           /* vector from the first end of edge 0 to that of edge 1 */
+    ebpo_vectorz between;           /* vector from the first end of edge 0 to the first end of
+                                     * edge 1 */
     ebpo_vectorz normal;            /* vector product of both edges */
     mpz_t length2;                  /* squared length of `normal` */
     ebpo_vectorz part;              /* temporary values */
