@@ -1,14 +1,16 @@
-/* Searches along the routes of pairs of instances: the first time at which a pair comes within its
- * clearance, and the least distance of a pair over an interval of time.
+/* Searches along the routes of pairs of instances. One search finds the first time at which a pair
+ * comes within its clearance, the other one finds the least distance of a pair over an interval of
+ * time.
  *
  * Both searches evaluate the distance at some times, and use one bound: the distance of two
  * instances changes by at most their motion. The first search goes forward in time from one
  * evaluation to the next. Between two evaluations the motion is shorter than the distance minus the
  * clearance, so no contact is missed.
- * The second search divides the interval of time into shorter ones, and keeps these in a heap,
+ * The second search divides the interval of time into shorter intervals, and keeps these in a heap,
  * ordered by a lower bound of the distance in each interval. It halves the first interval of the
- * heap until the result is within the tolerance. Routes jump only at ends of intervals. A result is
- * a pair of guaranteed bounds. A search that needs too many evaluations returns its current bounds.
+ * heap until the result is within the tolerance. Routes jump only at ends of intervals.
+ * A result is a pair of guaranteed bounds. A search that reaches the maximum number of evaluations
+ * returns its current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -36,13 +38,14 @@ static ebpo_status next_evaluation(const approach_search *search,
                                    const ebpo_scene_approach_result *result, double max_motion,
                                    double *next, ebpo_error *error)
 {
+    /* the motion from result->time to `low` is short enough, to `high` it is too long */
     double low = result->time, high = search->to, at = high, length = 0;
     ebpo_status status = ebpo_scene_evaluations_motion(evaluations, low, at, &length, error);
     if (status != EBPO_OK || length < max_motion) {
         *next = at;
         return status;
     }
-    /* bisection: at least eight steps, and until a time after result->time fits */
+    /* bisection: at least eight steps, and then until `low` is later than result->time */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == result->time || n < 8); n++) {
         at = low + (high - low) / 2;
         status = ebpo_scene_evaluations_motion(evaluations, result->time, at, &length, error);
@@ -70,12 +73,14 @@ static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
     return status;
 }
 
-/* Returns true if the pair is within its clearance, plus the tolerance. */
+/* Returns true if the distance is certainly at most the clearance plus the tolerance. */
 static bool is_reached(const approach_search *search, const ebpo_scene_approach_result *result)
 {
     return ebpo_scene_is_within(result->hi, result->clearance, search->options.tolerance);
 }
 
+/* Evaluates the distance at result->time, and sets the result's bounds. Fails with EBPO_E_ABSENT if
+ * omitted faces may be within the clearance, unless other faces are. */
 static ebpo_status approach_evaluate(const approach_search *search,
                                      ebpo_scene_evaluations *evaluations,
                                      ebpo_scene_approach_result *result, ebpo_error *error)
@@ -90,8 +95,9 @@ static ebpo_status approach_evaluate(const approach_search *search,
                                    result->time, false, error);
 }
 
-/* Evaluates the distance at increasing times, until the pair is within its clearance, the interval
- * of time ends, or the search must be given up (result->reached is -1). */
+/* Evaluates the distance at increasing times. Ends when the pair is within its clearance, at the
+ * end of the interval of time, or without a decision (result->reached is -1) at the maximum number
+ * of evaluations or if no later time is possible. */
 static ebpo_status follow_pair(const approach_search *search, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *result, ebpo_error *error)
 {
@@ -139,18 +145,18 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
                                 ebpo_scene_approaches_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    approach_search t = {
+    approach_search context = {
         .scene = scene, .options = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to
     };
     void *approaches = NULL;
     uint64_t count = 0;
-    ebpo_status status = ebpo_scene_take_approach_options(&t.options, options, error);
+    ebpo_status status = ebpo_scene_take_approach_options(&context.options, options, error);
     ebpo_scene_search search = { find_approach,
-                                 &t,
+                                 &context,
                                  sizeof(ebpo_scene_approach_result),
                                  1,
-                                 t.options.threads,
-                                 &t.options.progress,
+                                 context.options.threads,
+                                 &context.options.progress,
                                  "following routes" };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, from, to, &search, &approaches, &count, error);
@@ -162,6 +168,7 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 
 /* --- the least distance --- */
 
+/* The search for the least distance of each pair. */
 typedef struct least_search {
     const ebpo_scene *scene;
     double from, to, tolerance;
@@ -176,6 +183,7 @@ typedef struct time_interval {
     double least;          /* lower bound of the distance in the interval */
 } time_interval;
 
+/* The search for the least distance of one pair. */
 typedef struct interval_search {
     ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
@@ -254,7 +262,8 @@ static double next_jump(const interval_search *s, double from, double to)
                : ebpo_scene_pair_next(s->evaluations.scene, s->evaluations.pair, from, to);
 }
 
-/* Makes intervals between consecutive keys, so that routes jump only between intervals. */
+/* Makes an interval from each key to the last representable time before the next key, so that
+ * routes jump only between intervals. The last interval is the time `to`. */
 static ebpo_status begin_intervals(interval_search *s, double from, double to, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -274,13 +283,14 @@ static ebpo_status begin_intervals(interval_search *s, double from, double to, e
     return status;
 }
 
-/* Returns true if the lower bound of the first interval p is within the tolerance or cannot be
- * improved, because omitted faces limit it, evaluations are used up, or p is too short. */
+/* Returns true if the lower bound of p, the first interval, is within the tolerance or cannot be
+ * improved: omitted faces limit it, the maximum number of evaluations is reached, or p is too
+ * short. */
 static bool is_done(const interval_search *s, const time_interval *p, double middle,
                     const least_search *search)
 {
     double hi = s->out->hi;
-    double min_width = hi - s->limit; /* hi - lo cannot be less, because of omitted faces */
+    double min_width = hi - s->limit; /* omitted faces make hi - lo at least this wide */
     return ebpo_scene_is_within(hi, p->least, search->tolerance) ||
            s->limit - p->least <= min_width / 8 || s->out->evaluations >= search->max_evaluations ||
            p->motion <= search->tolerance / 8 || !(middle > p->from && middle < p->to);

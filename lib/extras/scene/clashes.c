@@ -24,9 +24,9 @@
 #include "extras/collide/pair_faces.h"
 #include "extras/scene/instance_pair.h"
 
-/* A query of two instances at their poses. */
+/* A query of a pair of instances at their poses. */
 typedef struct scene_two {
-    const ebpo_scene_clash_options *requested;
+    const ebpo_scene_clash_options *requested; /* the results that the caller wants */
     ebpo_collider *collider;
     const ebpo_collide_options *options; /* the poses of both instances */
     bool solid[2];                       /* true: the model is a solid, false: a surface */
@@ -151,7 +151,8 @@ static ebpo_status common_point(ebpo_pair_faces *models, const ebpo_face_pair *p
 }
 
 /* Finds a location of contact by a distance query, which returns a point of the first contact that
- * it finds. Unlike ebpo_pair_faces it needs no array of slots of all faces. */
+ * it finds. This takes less memory than ebpo_pair_faces, which has an array with an entry for each
+ * face. */
 static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_collide_distance_result found;
@@ -213,8 +214,8 @@ static ebpo_status count_with_location(const scene_two *two, const ebpo_face_pai
     return status;
 }
 
-/* Finds the kind of the clash. Ends the search at the first crossing pair of faces, which decides
- * it. */
+/* Counts pairs of faces by kind up to the first crossing pair, which decides the kind of the clash.
+ * first: an intersecting pair. */
 static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first,
                              ebpo_scene_clash *clash, ebpo_error *error)
 {
@@ -238,8 +239,9 @@ static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_p
                                                           : status;
 }
 
-/* Returns true if a point of one model is inside the other model. If not, the depth is 0 and needs
- * no search, which would take long for faces that overlap in one plane. */
+/* Returns true if a point of one model may be inside the other model. If it returns false, the
+ * depths are 0 without a search. (The search would take long for faces that overlap in one plane.)
+ */
 static bool is_any_inner(int32_t relation)
 {
     return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
@@ -250,7 +252,7 @@ static bool is_any_inner(int32_t relation)
 static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *clash,
                                        ebpo_error *error)
 {
-    static const ebpo_value_bounds none = { 0, 0, EBPO_VALUE_EXACT, 0 };
+    static const ebpo_value_bounds zero = { 0, 0, EBPO_VALUE_EXACT, 0 };
     if (!(two->requested->depth > 0))
         return EBPO_OK;
     if (is_any_inner(clash->relation) && (two->solid[0] || two->solid[1]))
@@ -259,7 +261,7 @@ static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *c
                                   two->solid[0] ? &clash->depth[1] : NULL, error);
     for (int i = 0; i < 2; i++)
         if (two->solid[!i])
-            clash->depth[i] = none;
+            clash->depth[i] = zero;
     return EBPO_OK;
 }
 
@@ -279,8 +281,8 @@ static ebpo_clash_kind kind_of(const ebpo_scene_clash *clash)
                              : EBPO_CLASH_NONE;
 }
 
-/* Compares the distance with the clearance, which takes less time than computing the distance.
- * Computes the distance only if it is less than the clearance. */
+/* Compares the distance with the clearance, which takes less time than computing the distance. Only
+ * if the distance is less than the clearance, computes it and sets the kind EBPO_CLASH_NEAR. */
 static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_collide_distance_options limit = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
@@ -348,16 +350,17 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *clash, eb
 
 /* Checks that faces omitted from a file cannot change the result. If the relation is requested, any
  * omitted face may change it, because one instance may be inside the other one. */
-static ebpo_status check_omitted_faces(const clash_query *a, const ebpo_scene_pair *pair,
+static ebpo_status check_omitted_faces(const clash_query *query, const ebpo_scene_pair *pair,
                                        ebpo_error *error)
 {
     double distance = INFINITY; /* lower bound of the distance of omitted faces */
     uint64_t omitted_in = 0;
-    ebpo_status status = ebpo_scene_omitted(a->scene, pair, a->time, &distance, &omitted_in, error);
+    ebpo_status status =
+        ebpo_scene_omitted(query->scene, pair, query->time, &distance, &omitted_in, error);
     if (status == EBPO_OK &&
-        (!(distance > pair->clearance) || (a->requested.relate && distance < INFINITY)))
-        status = ebpo_scene_fail_omitted(a->scene, pair, omitted_in, a->time, a->requested.relate,
-                                         error);
+        (!(distance > pair->clearance) || (query->requested.relate && distance < INFINITY)))
+        status = ebpo_scene_fail_omitted(query->scene, pair, omitted_in, query->time,
+                                         query->requested.relate, error);
     return status;
 }
 
@@ -370,22 +373,22 @@ static bool is_solid(const ebpo_scene *scene, uint64_t instance)
 static ebpo_status query_pair(const void *context, const ebpo_scene_pair *pair, void *result,
                               ebpo_error *error)
 {
-    const clash_query *a = context;
+    const clash_query *query = context;
     ebpo_scene_clash *clash = result;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
     *clash = (ebpo_scene_clash){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
     clear_results(clash);
-    ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(query->scene, pair, query->time, &options, error);
     if (status == EBPO_OK)
-        status = check_omitted_faces(a, pair, error);
+        status = check_omitted_faces(query, pair, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_collider(a->scene, pair, 1, &collider, error);
+        status = ebpo_scene_collider(query->scene, pair, 1, &collider, error);
     scene_two two = {
-        &a->requested,
+        &query->requested,
         collider,
         &options,
-        { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) },
+        { is_solid(query->scene, pair->a), is_solid(query->scene, pair->b) },
     };
     if (status == EBPO_OK && collider)
         status = query_faces(&two, clash, error);
@@ -411,21 +414,23 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                                     ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    clash_query a = { .scene = scene, .requested = EBPO_SCENE_CLASH_OPTIONS_INIT, .time = time };
+    clash_query query = { .scene = scene,
+                          .requested = EBPO_SCENE_CLASH_OPTIONS_INIT,
+                          .time = time };
     void *clashes = NULL;
     uint64_t count = 0;
-    ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &a.requested, options, error);
-    if (status == EBPO_OK && !(a.requested.depth >= 0 && a.requested.depth < INFINITY))
+    ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &query.requested, options, error);
+    if (status == EBPO_OK && !(query.requested.depth >= 0 && query.requested.depth < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "expected a tolerance of depths that is a length of 0 or more, got %g",
-                         a.requested.depth);
-    a.requested.relate |= a.requested.depth > 0;
+                         query.requested.depth);
+    query.requested.relate |= query.requested.depth > 0;
     ebpo_scene_search search = { query_pair,
-                                 &a,
+                                 &query,
                                  sizeof(ebpo_scene_clash),
                                  4,
-                                 a.requested.threads,
-                                 &a.requested.progress,
+                                 query.requested.threads,
+                                 &query.requested.progress,
                                  "evaluating pairs" };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, time, time, &search, &clashes, &count, error);
@@ -441,7 +446,7 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
                                unsigned threads, ebpo_pairs_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    clash_query one = { .scene = scene, .time = time };
+    clash_query query = { .scene = scene, .time = time };
     ebpo_scene_pair pair = { a, b, 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
@@ -449,7 +454,7 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
     if (status == EBPO_OK)
         status = ebpo_scene_make_models(scene, &pair, 1, error);
     if (status == EBPO_OK)
-        status = check_omitted_faces(&one, &pair, error);
+        status = check_omitted_faces(&query, &pair, error);
     if (status == EBPO_OK)
         status = ebpo_scene_collider(scene, &pair, threads, &collider, error);
     if (status == EBPO_OK && collider)

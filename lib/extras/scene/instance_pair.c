@@ -30,6 +30,9 @@ static const ebpo_scene_model_entry *model_of_instance(const ebpo_scene *scene, 
     return &scene->models[scene->instances[instance].description.model];
 }
 
+/* Makes the posing of an instance at a time: its checked pose with an error bound of the rotation
+ * (geometry/pose.h). Fails with EBPO_E_ARGUMENT if the pose or posed coordinates are out of range.
+ */
 static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
                              ebpo_posing *out, ebpo_error *error)
 {
@@ -42,7 +45,7 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
     return status == EBPO_OK ? ebpo_posing_make(out, &pose, max_coordinate, error) : status;
 }
 
-/* The posed box of a model. */
+/* The box of a model at a pose. Its sides need not be parallel to the axes of the world. */
 typedef struct posed_box {
     double middle[3];  /* centre of the box, in the world */
     double half[3][3]; /* [axis of the box] vector from the centre to the middle of a side */
@@ -114,9 +117,10 @@ double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds
     return ebpo_scene_length_above(apart) * (1 - 8 * slack);
 }
 
-/* Computes a box all of whose faces are in the model's file; empty if there is no such box. Returns
- * false if the file has all faces. */
-static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_bounds *out)
+/* Returns false if the file of the instance's model has all faces. Otherwise sets *out to the kept
+ * box: the file has all faces of the model in this box. The box is empty if the file guarantees no
+ * box. */
+static bool get_kept_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_bounds *out)
 {
     const ebpo_info *info =
         ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].description.model));
@@ -124,55 +128,55 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_boun
     if (mesh && !info->pruned)
         return false;
     for (int k = 0; k < 3; k++) {
-        bool box = mesh && info->boxed && !info->cut_levels && !(info->kept_error > 0);
-        out->min[k] = box ? info->kept_box[k] : INFINITY;
-        out->max[k] = box ? info->kept_box[3 + k] : -INFINITY;
+        bool has_box = mesh && info->boxed && !info->cut_levels && !(info->kept_error > 0);
+        out->min[k] = has_box ? info->kept_box[k] : INFINITY;
+        out->max[k] = has_box ? info->kept_box[3 + k] : -INFINITY;
     }
     return true;
 }
 
 /* Returns a lower bound of the distance of the box `other` from the points of the box `all` that
- * are outside the box `held`. These points are in up to six boxes, one for each face of `held`. */
-static double distance_outside(const ebpo_scene_bounds *all, const ebpo_scene_bounds *held,
+ * are outside the box `kept`. These points are in up to six boxes, one for each face of `kept`. */
+static double distance_outside(const ebpo_scene_bounds *all, const ebpo_scene_bounds *kept,
                                const ebpo_scene_bounds *other)
 {
     double distance = INFINITY;
     for (int k = 0; k < 3; k++) {
         ebpo_scene_bounds beside = *all;
-        beside.max[k] = fmin(held->min[k], all->max[k]);
-        if (all->min[k] < held->min[k])
+        beside.max[k] = fmin(kept->min[k], all->max[k]);
+        if (all->min[k] < kept->min[k])
             distance = fmin(distance, ebpo_scene_bounds_gap(&beside, other));
         beside = *all;
-        beside.min[k] = fmax(held->max[k], all->min[k]);
-        if (all->max[k] > held->max[k])
+        beside.min[k] = fmax(kept->max[k], all->min[k]);
+        if (all->max[k] > kept->max[k])
             distance = fmin(distance, ebpo_scene_bounds_gap(&beside, other));
     }
     return distance;
 }
 
-/* Sets *distance to a lower bound of the distance between the faces that the file of the instance
- * `self` omits and the instance `other`; INFINITY if no faces are omitted. */
+/* Sets *distance to a lower bound of the distance between the instance `other` and the faces that
+ * the file of the instance `self` omits; INFINITY if no faces are omitted. */
 static ebpo_status bound_omitted(const ebpo_scene *scene, uint64_t self, uint64_t other,
                                  double time, double *distance, ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = model_of_instance(scene, self);
-    ebpo_scene_bounds held, all;
+    ebpo_scene_bounds kept, all;
     ebpo_scene_relative_box other_box;
     *distance = INFINITY;
-    if (!held_box(scene, self, &held))
+    if (!get_kept_box(scene, self, &kept))
         return EBPO_OK;
     memcpy(all.min, m->min, sizeof all.min);
     memcpy(all.max, m->max, sizeof all.max);
     ebpo_status status = ebpo_scene_make_relative_box(scene, self, other, time, &other_box, error);
     if (status == EBPO_OK)
-        *distance = distance_outside(&all, &held, &other_box.box) * other_box.unit;
+        *distance = distance_outside(&all, &kept, &other_box.box) * other_box.unit;
     return status;
 }
 
 ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
                                double *distance, uint64_t *omitted_in, ebpo_error *error)
 {
-    double from_a, from_b; /* distance of the faces omitted from the file of a, and of b */
+    double from_a, from_b; /* distances of the faces omitted from the file of a, and of b */
     ebpo_status status = bound_omitted(scene, pair->a, pair->b, time, &from_a, error);
     if (status == EBPO_OK)
         status = bound_omitted(scene, pair->b, pair->a, time, &from_b, error);
@@ -214,8 +218,8 @@ static bool follows_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pa
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-/* Returns an upper bound of the change of the pair's distance that rounding causes in the poses of
- * the routes; 0 if neither instance has a route. */
+/* Returns an upper bound of the change of the pair's distance that follows from the rounding of the
+ * routes' poses; 0 if neither instance has a route. */
 static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
@@ -324,10 +328,11 @@ static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_sc
     return status;
 }
 
+/* Context of find_in_range. */
 typedef struct pair_results {
     const ebpo_scene_search *search;
     const ebpo_scene_pair *pairs;
-    char *results;
+    char *results; /* [pairs] each of search->result_size bytes */
 } pair_results;
 
 static ebpo_status find_in_range(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -352,11 +357,11 @@ ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
     *results = ebpo_alloc(list.count, search->result_size);
     if (status == EBPO_OK && !*results)
         status = ebpo_fail_memory(error, list.count * search->result_size);
-    pair_results finds = { search, list.pairs, *results };
+    pair_results context = { search, list.pairs, *results };
     if (status == EBPO_OK)
         status =
             ebpo_parallel_for(ebpo_thread_count(search->threads), NULL, list.count, search->grain,
-                              find_in_range, &finds, search->progress, search->stage, error);
+                              find_in_range, &context, search->progress, search->stage, error);
     free(list.pairs);
     return status;
 }
@@ -400,7 +405,9 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
     ebpo_collide_distance_options query = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     query.tolerance = l->tolerance;
-    /* lo and hi may depend on the last query, so each pair of instances has a separate collider */
+    /* A warm query begins with the result of the previous query of its collider, so lo and hi may
+     * depend on it. Each pair of instances has a separate collider, so that results do not depend
+     * on the order in which pairs are evaluated. */
     query.warm = true;
     ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)
@@ -427,8 +434,7 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
                                          ebpo_error *error)
 {
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
-    /* a smaller tolerance takes long, and its additional digits are only rounding errors of poses
-     */
+    /* with a smaller tolerance, a query takes longer and only finds rounding errors of the poses */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
     l->shares_route = follows_one_route(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);

@@ -1,6 +1,7 @@
 /* Computes data of two instances of a scene at a time: the box of one instance in the coordinates
  * of the other one, their relative motion and distance, and the distance of the faces that their
- * files omit. Bounds are valid for posed coordinates, which are rounded. */
+ * files omit (a subset file omits a part of the model's faces). Bounds are valid for posed
+ * coordinates, which are rounded. */
 #ifndef EBPO_SCENE_INSTANCE_PAIR_H
 #define EBPO_SCENE_INSTANCE_PAIR_H
 
@@ -19,8 +20,9 @@ typedef struct ebpo_scene_relative_box {
     double unit;     /* least length in the world of a length of 1 in these coordinates */
 } ebpo_scene_relative_box;
 
-/* Computes a box in the coordinates of the model of the instance `self`. The box contains the box
- * of the instance `other` at a time. Fails with EBPO_E_ARGUMENT if a pose is out of range. */
+/* Computes a box that contains the box of the instance `other` at a time. The computed box is in
+ * the coordinates of the model of the instance `self`. Fails with EBPO_E_ARGUMENT if a pose is out
+ * of range. */
 EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t self,
                                                        uint64_t other, double time,
                                                        ebpo_scene_relative_box *out,

@@ -50,7 +50,7 @@ ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_val
         depth -= (c == '}' || c == ']') && depth > 0;
         if (values > max_values)
             return ebpo_fail(error, EBPO_E_LIMIT,
-                             "byte %zu: more than %llu values (the limit is an option)", i,
+                             "byte %zu: more than %llu values, the limit (max_values)", i,
                              (unsigned long long)max_values);
     }
     return EBPO_OK;
@@ -62,12 +62,14 @@ typedef struct cursor {
     uint64_t line;
 } cursor;
 
+/* Skips blanks, and counts lines. */
 static void json_text_blanks(cursor *c)
 {
     for (; *c->at && strchr(" \t\r\n", *c->at); c->at++)
         c->line += *c->at == '\n';
 }
 
+/* Skips a string; the cursor is at its first quotation mark. */
 static void json_text_string(cursor *c)
 {
     for (c->at++; *c->at && *c->at != '"'; c->at++)
@@ -216,6 +218,7 @@ ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value, const ch
     return EBPO_OK;
 }
 
+/* Returns EBPO_OK for a missing member, or fails if the member is needed. */
 static ebpo_status json_reader_missing(ebpo_json_reader *r, const char *key, bool needed)
 {
     return needed ? ebpo_json_bad(r, "has no member %s", key) : EBPO_OK;

@@ -8,7 +8,7 @@ typedef struct ebpo_json_reader {
     ebpo_scene *scene;
     const char *text, *name; /* the scene file's text, and its name for messages */
     const ebpo_scene_options *options;
-    uint64_t pose_bytes; /* number of bytes that may still be read from files of poses */
+    uint64_t pose_bytes; /* number of bytes that may still be read from CSV files of poses */
     ebpo_scene_at path[EBPO_SCENE_DEPTH];
     int depth; /* number of steps in `path` */
     ebpo_error *error;
@@ -33,8 +33,9 @@ ebpo_status ebpo_json_locate_error(ebpo_json_reader *r, ebpo_status status, cons
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
                                             const char *const *known);
 
-/* Read a member. If the member is missing, do not change *out, and fail with EBPO_E_FORMAT if it is
- * `needed`. */
+/* Each of the next functions reads a member of an object. If the member is missing, the function
+ * does not change *out, and fails with EBPO_E_FORMAT if the member is `needed`. It also fails if
+ * the member has another type. ebpo_json_get_flag: the member is never needed. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,
@@ -45,9 +46,10 @@ EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t 
                                               const char *key, bool needed, double *out,
                                               size_t count);
 
-/* The function that is called for each member of the object `key`, or for each item of the array
- * `key`, if there is a member `key`. The path of the reader includes this member or item. `name` is
- * NULL for items. */
+/* ebpo_json_each_member calls a function for each member of the object `key`, and
+ * ebpo_json_each_item for each item of the array `key`. Both do nothing if the member `key` is
+ * missing. During a call, the path of the reader ends with the member or item. name: key of the
+ * member; NULL for items. */
 typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name,
                                          const json_t *value);
 EBPO_MUST_USE ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object,

@@ -28,7 +28,7 @@ void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4])
     double trace = m[0][0] + m[1][1] + m[2][2];
     int i = m[1][1] > m[0][0] ? 1 : 0;
     i = m[2][2] > m[i][i] ? 2 : i;
-    if (trace > m[i][i]) { /* the real part is the greatest */
+    if (trace > m[i][i]) { /* the real fraction is the greatest */
         quaternion[0] = m[2][1] - m[1][2];
         quaternion[1] = m[0][2] - m[2][0];
         quaternion[2] = m[1][0] - m[0][1];
@@ -43,7 +43,7 @@ void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4])
 }
 
 /* Returns true if the time, translation and scale of a key are in range. */
-static bool route_fits(const ebpo_route_key *key)
+static bool key_is_in_range(const ebpo_route_key *key)
 {
     static const double origin[3] = { 0, 0, 0 };
     ebpo_pose pose = EBPO_POSE_INIT;
@@ -57,7 +57,7 @@ ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *ke
                                ebpo_error *error)
 {
     ebpo_route_key k = *key;
-    if (!route_fits(&k))
+    if (!key_is_in_range(&k))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "a number is not finite, the time is beyond 2^1000, or the scale is not from "
@@ -88,7 +88,8 @@ static uint64_t key_at(const ebpo_scene_route *route, double time)
 }
 
 /* Interpolates at constant speed along the shorter arc. u: fraction of the arc, 0 to 1. Halves the
- * arc 28 times; the length of the rest is equal to its chord, so this is interpolated linearly. */
+ * arc 28 times. The remaining arc is so short that it is equal to its chord in doubles, so `out` is
+ * interpolated linearly along the chord. */
 static void interpolate_rotation(const double from[4], const double to[4], double u, double out[4])
 {
     double a[4], b[4];
@@ -103,7 +104,7 @@ static void interpolate_rotation(const double from[4], const double to[4], doubl
             middle[k] = a[k] + b[k];
         ebpo_quaternion_normalise(middle); /* never near 0: the angle of a and b is at most 90
                                             * degrees */
-        bool later = u >= 0.5;
+        bool later = u >= 0.5;             /* the result is in the second half */
         memcpy(later ? a : b, middle, sizeof middle);
         u = later ? 2 * u - 1 : 2 * u;
     }
@@ -191,20 +192,21 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
 {
     uint64_t n = key_at(route, from);
     const ebpo_route_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
-    double part = a == b ? 0 : (to - fmax(from, a->time)) / (b->time - a->time);
-    if (!(part > 0) || from < a->time || route->jumps)
+    /* the fraction of the time from key a to key b that is between `from` and `to` */
+    double fraction = a == b ? 0 : (to - fmax(from, a->time)) / (b->time - a->time);
+    if (!(fraction > 0) || from < a->time || route->jumps)
         return (ebpo_scene_step){ 0, 0 };
-    part = part * (1 + slack) + slack;
+    fraction = fraction * (1 + slack) + slack;
     double vector[3], size = 0;
     for (int k = 0; k < 3; k++) {
         vector[k] = b->translation[k] - a->translation[k];
         size += fabs(a->translation[k]) + fabs(b->translation[k]);
     }
     double angle = angle_between(a->quaternion, b->quaternion), scale = fmax(a->scale, b->scale);
-    double step_angle = angle * part, scale_change = fabs(b->scale - a->scale) * part;
+    double step_angle = angle * fraction, scale_change = fabs(b->scale - a->scale) * fraction;
     double rounding = slack * (size + (extent.max_distance + extent.size) * scale);
     return (ebpo_scene_step){
-        (ebpo_scene_length_above(vector) * part +
+        (ebpo_scene_length_above(vector) * fraction +
          extent.max_distance * (scale * step_angle + scale_change)) *
                 (1 + slack) +
             rounding,
@@ -216,10 +218,10 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
 
 /* Statistics of the scales and translations of a sequence of poses. */
 typedef struct pose_statistics {
-    double scale;        /* scale of the last pose */
+    double scale;        /* scale of the pose that was added last */
     double scale_change; /* sum of the absolute changes of the scale */
-    double most;         /* greatest scale */
-    double size;         /* greatest 1-norm of a translation */
+    double max_scale;
+    double max_size; /* greatest 1-norm of a translation */
 } pose_statistics;
 
 /* Adds a pose to the statistics. */
@@ -230,8 +232,8 @@ static void add_pose_statistics(pose_statistics *g, double scale, const double t
         size += fabs(translation[k]);
     g->scale_change += fabs(scale - g->scale);
     g->scale = scale;
-    g->most = fmax(g->most, scale);
-    g->size = fmax(g->size, size);
+    g->max_scale = fmax(g->max_scale, scale);
+    g->max_size = fmax(g->max_size, size);
 }
 
 double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
@@ -249,7 +251,7 @@ double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, doubl
     ebpo_scene_route_at(route, to, &at);
     add_pose_statistics(&g, at.scale, at.translation);
     return extent.max_distance * g.scale_change * (1 + slack) +
-           slack * (2 * g.size + (extent.max_distance + extent.size) * g.most);
+           slack * (2 * g.max_size + (extent.max_distance + extent.size) * g.max_scale);
 }
 
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_extent extent)
@@ -257,5 +259,5 @@ double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_exten
     pose_statistics g = { .scale = 0 };
     for (uint64_t n = 0; n < route->count; n++)
         add_pose_statistics(&g, route->keys[n].scale, route->keys[n].translation);
-    return slack * (g.size + (extent.max_distance + extent.size) * g.most);
+    return slack * (g.max_size + (extent.max_distance + extent.size) * g.max_scale);
 }

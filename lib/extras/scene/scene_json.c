@@ -21,7 +21,8 @@
 #include "geometry/pose.h"
 #include "io/file_source.h"
 
-/* The first NEEDED columns must exist. */
+/* COLUMNS: number of known columns of a CSV file; the first NEEDED of them must exist. FIELDS_MAX:
+ * maximum number of fields of a line. */
 enum { COLUMNS = 9, NEEDED = 8, FIELDS_MAX = 64 };
 static const char *const columns[COLUMNS] = {
     "time", "x", "y", "z", "qx", "qy", "qz", "qw", "scale"
@@ -228,7 +229,7 @@ static ebpo_status pose_members(ebpo_json_reader *r, const json_t *value, read_p
     return status;
 }
 
-/* Appends a pose to a route, as a key with a unit quaternion. */
+/* Appends a key to a route: a time, and a pose with a unit quaternion. */
 static ebpo_status add_pose_key(ebpo_json_reader *r, const read_pose *p, double time,
                                 ebpo_scene_route *route)
 {
@@ -266,7 +267,7 @@ static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, con
         free(single.keys);
     }
     ebpo_json_leave(r);
-    *out = p.pose; /* ebpo_scene_add_instance checks a rotation that is a matrix */
+    *out = p.pose; /* if the rotation is a matrix, ebpo_scene_add_instance checks it */
     return status;
 }
 
@@ -329,7 +330,7 @@ static ebpo_status read_csv(ebpo_json_reader *r, const json_t *value)
         return ebpo_json_bad_at(r, "csv", refused);
     char *joined = ebpo_scene_join_path(r->scene->folder, path);
     status = joined ? EBPO_OK : ebpo_fail_memory(r->error, strlen(path));
-    if (status == EBPO_OK && !local.outside)
+    if (status == EBPO_OK && !local.allow_outside)
         status = ebpo_scene_stays_within(r->scene->folder, joined, r->error);
     if (status == EBPO_OK)
         status = read_csv_file(last_route(r), joined, &r->pose_bytes, r->error);
@@ -339,7 +340,8 @@ static ebpo_status read_csv(ebpo_json_reader *r, const json_t *value)
 
 static ebpo_status read_between(ebpo_json_reader *r, const json_t *value)
 {
-    /* even: interpolated at even speed; jump: the pose of a key holds until the next key */
+    /* even: poses between two keys are interpolated at constant speed; jump: the pose of a key
+     * holds until the next key */
     const char *between = "even";
     ebpo_status status = ebpo_json_get_text(r, value, "between", false, &between);
     if (status != EBPO_OK)
@@ -595,7 +597,7 @@ static ebpo_status read_ignored(ebpo_json_reader *r, const char *key, const json
     (void)key;
     uint64_t set[2];
     ebpo_status status = read_selectors(r, value, set);
-    const double ignore = -1; /* a clearance below 0: ebpo_scene_add_rule */
+    const double ignore = -1; /* a clearance below 0 means: ignore the pairs */
     return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], ignore, r->error)
                              : status;
 }

@@ -72,8 +72,8 @@ uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const c
     return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
 }
 
-/* Stores the index of the object with this kind and name. Fails with EBPO_E_ARGUMENT if the name
- * exists already. */
+/* Stores the index of the object with this kind and name in scene->names. Fails with
+ * EBPO_E_ARGUMENT if the name exists already. */
 static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
                             ebpo_error *error)
 {
@@ -127,7 +127,8 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
         return "is on a server; to allow files on servers, use ebpo scene --remote";
     if (ebpo_is_url(path) && !has_digest)
         return "is on a server; add its content_sha256 to the model in the scene";
-    if (!ebpo_is_url(path) && !options->outside && (ebpo_path_is_absolute(path) || goes_up(path)))
+    if (!ebpo_is_url(path) && !options->allow_outside &&
+        (ebpo_path_is_absolute(path) || goes_up(path)))
         return "is outside the scene's folder; to allow this, use ebpo scene --allow-outside";
     return NULL;
 }
@@ -144,6 +145,8 @@ char *ebpo_scene_join_path(const char *folder, const char *path)
     return joined;
 }
 
+/* Returns true if the path is in the folder or in a folder below it. Both paths are without
+ * symbolic links. */
 static bool is_below(const char *folder, const char *path)
 {
     size_t size = strlen(folder);
@@ -322,10 +325,10 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
  * `set`, which has only this instance. */
 static ebpo_status put_newest_into_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
-    const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
+    const ebpo_scene_instance_entry *newest = &scene->instances[scene->instances_count - 1];
     ebpo_status status = ebpo_scene_put_newest_into(scene, EBPO_SCENE_ALL_SET, error);
-    if (status == EBPO_OK && i->description.layer != EBPO_SCENE_NONE)
-        status = ebpo_scene_put_newest_into(scene, scene->layers[i->description.layer], error);
+    if (status == EBPO_OK && newest->description.layer != EBPO_SCENE_NONE)
+        status = ebpo_scene_put_newest_into(scene, scene->layers[newest->description.layer], error);
     return status == EBPO_OK ? ebpo_scene_put_newest_into(scene, set, error) : status;
 }
 
@@ -444,6 +447,7 @@ ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, doubl
 
 /* --- returning members --- */
 
+/* Adds the number of poses of all routes, and sets the first and the last time. */
 static void add_times(const ebpo_scene *scene, ebpo_scene_counts *c)
 {
     double begin = INFINITY, end = -INFINITY;

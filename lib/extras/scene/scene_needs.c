@@ -1,5 +1,5 @@
-/* Finds what a scene needs of each model's file in an interval of time: a box for collisions and
- * for inside tests, and the last level for views.
+/* Finds the content of each model's file that the queries of a scene need in an interval of time: a
+ * box for collisions and for inside tests, and the last level for views.
  *
  * Boxes are in the coordinates of the model, and contain all points that come near another
  * instance. They are computed over steps of time so short that no instance moves far. They are
@@ -54,7 +54,7 @@ static ebpo_status bound_distance(const near_search *n, const ebpo_scene_route *
                                   double to, double *distance)
 {
     double min[3], max[3], far[3];
-    ebpo_pose at[2];
+    ebpo_pose at[2]; /* pose of the route at `from` and at `to` */
     ebpo_scene_route_at(route, from, &at[0]);
     ebpo_scene_route_at(route, to, &at[1]);
     ebpo_status status =
@@ -73,19 +73,20 @@ static ebpo_status bound_distance(const near_search *n, const ebpo_scene_route *
 static ebpo_status relative_motion(const near_search *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->self);
-    double distance = 0, own_motion = 0;
+    double distance = 0, motion_by_route = 0; /* motion caused by the route of this instance */
     ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
     if (status == EBPO_OK && route && from < to) {
         status = bound_distance(n, route, from, to, &distance);
         ebpo_scene_extent extent = { distance, distance };
-        own_motion = ebpo_scene_route_step(route, from, to, extent).length;
+        motion_by_route = ebpo_scene_route_step(route, from, to, extent).length;
     }
-    *out = (*out + own_motion) * (1 + 0x1p-40);
+    *out = (*out + motion_by_route) * (1 + 0x1p-40);
     return status;
 }
 
-/* Computes the smaller box of those points of the model's box that may come near the other instance
- * between two times. *any is false if there are no such points. */
+/* Computes a box of the points of the model's box that may come near the other instance between two
+ * times. *any is false if there are no such points. motion: bound of the relative motion between
+ * the two times, in the world's unit. */
 static ebpo_status near_box(const near_search *n, double from, double to, double motion,
                             ebpo_scene_bounds *out, bool *any)
 {
@@ -112,12 +113,12 @@ static ebpo_status near_box(const near_search *n, double from, double to, double
     return EBPO_OK;
 }
 
-/* Returns true if the needed box contains the box a. */
-static bool is_within(const ebpo_scene_bounds *a, const ebpo_scene_file_need *need)
+/* Returns true if the needed box of a file contains a box. */
+static bool is_within(const ebpo_scene_bounds *box, const ebpo_scene_file_need *need)
 {
     bool within = need->any;
     for (int k = 0; k < 3; k++)
-        within = within && a->min[k] >= need->box.min[k] && a->max[k] <= need->box.max[k];
+        within = within && box->min[k] >= need->box.min[k] && box->max[k] <= need->box.max[k];
     return within;
 }
 
@@ -132,8 +133,8 @@ static void join_need_box(ebpo_scene_file_need *need, const ebpo_scene_bounds *b
     }
 }
 
-/* Adds the points of the model that come near the other instance between two times. Halves the
- * interval while the instances move by more than the margin, but at most `halvings` times. */
+/* Adds the points of the model that come near the other instance between two times. While the
+ * instances move by more than the margin, halves the interval, but at most `halvings` times. */
 static ebpo_status add_near_between(const near_search *n, double from, double to, int halvings)
 {
     double motion, middle = from + (to - from) / 2;
@@ -167,14 +168,14 @@ static ebpo_status add_near_steps(const near_search *n)
     return status == EBPO_OK ? add_near_between(n, to, to, HALVINGS) : status;
 }
 
-/* Returns the longest side of an instance's box in the world. */
+/* Returns the longest side of the instance's model, times the scale of its pose at a time. */
 static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
 {
     const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].description.model];
     ebpo_pose pose = EBPO_POSE_INIT;
     double size = 0;
     if (ebpo_scene_pose(scene, instance, time, &pose, NULL) != EBPO_OK)
-        return 0; /* the error is reported when the pose is computed */
+        return 0; /* add_near_steps computes the pose again and reports the error */
     for (int k = 0; k < 3; k++)
         size = fmax(size, m->max[k] - m->min[k]);
     return size * pose.scale;
@@ -202,7 +203,7 @@ static void add_complete_models(ebpo_scene_needs *needs, const ebpo_scene_pair *
 
 static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
-    if (needs->options.purpose == EBPO_SCENE_FOR_SOLIDS) {
+    if (needs->options.purpose == EBPO_SCENE_FOR_RELATIONS) {
         add_complete_models(needs, pair);
         return EBPO_OK;
     }
@@ -252,7 +253,7 @@ static void begin_files(ebpo_scene_needs *needs)
         need->last_level = -1;
         need->parts = EBPO_PART_PLANES | EBPO_PART_MESH;
         if (needs->options.purpose == EBPO_SCENE_FOR_COLLIDE ||
-            needs->options.purpose == EBPO_SCENE_FOR_SOLIDS)
+            needs->options.purpose == EBPO_SCENE_FOR_RELATIONS)
             need->parts |= EBPO_PART_MAPS;
         if (needs->options.purpose == EBPO_SCENE_FOR_VIEW)
             need->parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
@@ -391,8 +392,8 @@ static bool is_behind(const view_search *s, const ebpo_scene_bounds *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
-/* Returns the first level whose cells have a diagonal of at most `size`; -1: no level
- * before the last one has cells so small, so all levels are needed. */
+/* Returns the first level whose cells have a diagonal of at most `size`; -1: no level before the
+ * last one has such cells, so all levels are needed. */
 static int level_for(const ebpo_info *info, double size)
 {
     double cell = ebpo_scene_length_above(info->box_size);
@@ -456,7 +457,7 @@ ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs)
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < needs->scene->cameras_count && status == EBPO_OK; i++) {
         const ebpo_scene_camera *c = &needs->scene->cameras[i];
-        double half = c->fov * (3.14159265358979323846 / 360);
+        double half = c->fov * (3.14159265358979323846 / 360); /* half of the field of view, rad */
         view_search s = { needs, c, 2 * tan(half) / c->height };
         status = add_views_along_route(&s);
         for (uint64_t f = 0; f < needs->scene->files_count; f++)

@@ -1,4 +1,5 @@
-/* Finds what the queries of a scene need of each model's file. */
+/* Finds the content of each model's file that the queries of a scene need: a box of faces, or
+ * levels of the octree. */
 #ifndef EBPO_SCENE_SCENE_NEEDS_H
 #define EBPO_SCENE_SCENE_NEEDS_H
 
@@ -7,11 +8,11 @@
 /* The needed content of a file. */
 typedef struct ebpo_scene_file_need {
     uint64_t users;          /* number of pairs of instances, or of cameras, that need the file */
-    bool any;                /* false: only the root node is needed */
+    bool any;                /* false: so far only the root node is needed */
     ebpo_scene_bounds box;   /* contains the faces that collisions and inside tests need */
     ebpo_scene_bounds whole; /* box of all faces */
     int last_level;          /* last level that views need; -1: all levels */
-    uint32_t parts;          /* needed kinds of content, EBPO_PART_... */
+    uint32_t parts;          /* needed parts of the file, as EBPO_PART_... bits */
 } ebpo_scene_file_need;
 
 /* The needs of all files in the interval of time from .. to. */
@@ -27,10 +28,12 @@ typedef struct ebpo_scene_needs {
  * caller frees `files`, even on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_begin_needs(ebpo_scene_needs *needs);
 
-/* Adds the points of models that come near the other instance of a pair. */
+/* For each pair of instances that may come near each other: adds to the needed boxes the points of
+ * both models that may be near the other instance. Uses the pairs of ebpo_scene_pairs. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs);
 
-/* Completes the needs. If no need was added for a file, only its root is needed. */
+/* Completes the needs after all were added. If no need was added for a file, only its root is
+ * needed. */
 void ebpo_scene_end_needs(ebpo_scene_needs *needs);
 
 /* Returns the need of a file as options for a subset. */
@@ -40,7 +43,7 @@ ebpo_subset_options ebpo_scene_need_options(const ebpo_scene_needs *needs, uint6
 EBPO_MUST_USE ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model,
                                                  ebpo_scene_need *out);
 
-/* Adds the levels of files that the scene's cameras can resolve. */
+/* Adds the levels of files whose cells the scene's cameras can resolve. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs);
 
 #endif

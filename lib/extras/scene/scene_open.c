@@ -34,7 +34,7 @@ static ebpo_status copy_options(ebpo_scene_options *checked, const ebpo_scene_op
     return status;
 }
 
-/* Keeps the scene file's text for packing. */
+/* Keeps the scene file's text, which ebpo_scene_pack writes with other paths. */
 static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, ebpo_error *error)
 {
     scene->text = malloc(size + 1);
@@ -47,8 +47,8 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
     return EBPO_OK;
 }
 
-/* Makes a scene of the text of a scene file. Takes ownership of `folder`; NULL: its allocation has
- * failed. */
+/* Makes a scene from the text of a scene file. Takes ownership of `folder`, the base of relative
+ * paths; NULL: the allocation of `folder` has failed. */
 static ebpo_status parse_scene(const char *text, size_t size, const char *name, char *folder,
                                const ebpo_scene_options *options, ebpo_scene **out,
                                ebpo_error *error)
@@ -66,7 +66,7 @@ static ebpo_status parse_scene(const char *text, size_t size, const char *name, 
         free(folder);
     }
     if (status == EBPO_OK) {
-        scene->allow_outside = options->outside;
+        scene->allow_outside = options->allow_outside;
         status = keep_text(scene, text, size, error);
     }
     if (status == EBPO_OK)
@@ -156,8 +156,8 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     return EBPO_OK;
 }
 
-/* Sets the model's box. On each axis this is the range of the faces that the file reports, or, if
- * that range is not within the root cell, the range of the root cell. */
+/* Sets the model's box. On each axis, this is the range of the faces' coordinates that the file
+ * states. If the stated range is not within the root cell, it is the range of the root cell. */
 static void set_model_box(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
@@ -188,9 +188,9 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
     char *path = ebpo_scene_join_path(scene->folder, m->path);
     uint64_t number = 0;
     /* true: the model was read from the scene file; false: the caller added it */
-    bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
+    bool from_text = (uint64_t)(m - scene->models) < scene->text_models;
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
-    if (status == EBPO_OK && of_text && !scene->allow_outside)
+    if (status == EBPO_OK && from_text && !scene->allow_outside)
         status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
         status = open_file(scene, path, max_expansion, &number, error);

@@ -40,7 +40,7 @@ static ebpo_status check_plan_options(ebpo_scene_needs *needs, const ebpo_plan_o
     if (status != EBPO_OK)
         return status;
     if (needs->options.purpose < EBPO_SCENE_FOR_COLLIDE ||
-        needs->options.purpose > EBPO_SCENE_FOR_SOLIDS)
+        needs->options.purpose > EBPO_SCENE_FOR_RELATIONS)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown purpose %d", (int)needs->options.purpose);
     if (!(needs->options.margin >= 0 && needs->options.margin < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -56,7 +56,7 @@ static ebpo_status check_plan_options(ebpo_scene_needs *needs, const ebpo_plan_o
     return EBPO_OK;
 }
 
-/* Finds the needed content of each file. Free needs->files, also on failure. */
+/* Finds the needed content of each file. The caller frees needs->files, also on failure. */
 static ebpo_status find_needs(ebpo_scene_needs *needs)
 {
     ebpo_status status = ebpo_scene_begin_needs(needs);
@@ -68,7 +68,7 @@ static ebpo_status find_needs(ebpo_scene_needs *needs)
     return status;
 }
 
-/* Sets *out to a list of the needs of all models; free it, also on failure. */
+/* Sets *out to a list of the needs of all models. The caller frees *out, also on failure. */
 static ebpo_status list_needs(const ebpo_scene_needs *needs, ebpo_scene_need **out)
 {
     uint64_t count = needs->scene->models_count;
@@ -212,9 +212,9 @@ static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_
 typedef struct packing {
     ebpo_scene_needs needs;
     ebpo_pack_options options;
-    const char *folder;
-    char *partial_folder; /* name of the folder until it is complete */
-    ebpo_scene_packed *files;
+    const char *folder;       /* the folder that the caller wants */
+    char *partial_folder;     /* temporary name of the folder; NULL: renamed or not begun */
+    ebpo_scene_packed *files; /* [needs.scene->files_count] the new files */
     ebpo_error *error;
 } packing;
 
@@ -229,6 +229,7 @@ static char *path_in(const char *folder, const char *name)
     return path;
 }
 
+/* Removes a file in the folder, if it exists. */
 static void remove_in(const char *folder, const char *name)
 {
     char path[PATH_MAX];
@@ -321,9 +322,10 @@ static uint64_t sum_of_files(const packing *p)
 }
 
 /* If the sum of the files' sizes is above the target size, writes files again, each reduced by the
- * same factor. Files of which only the root is needed are not reduced. */
+ * same factor. A file of which only the root is needed is not reduced. */
 static ebpo_status shrink_to_target(packing *p)
 {
+    /* fixed: bytes of the files that are not reduced */
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->options.target_bytes;
     ebpo_status status = EBPO_OK;
     if (!target || sum <= target)
@@ -371,8 +373,8 @@ static ebpo_status check_pack_options(packing *p, const ebpo_pack_options *optio
     return check_plan_options(&p->needs, &plan);
 }
 
-/* Makes the list of packed files for the caller, a file for each model. It is made before the
- * folder is published, because nothing may fail afterwards. */
+/* Makes the list of packed files for the caller, with an entry for each model. The list is made
+ * before the folder is published, because nothing may fail after that. */
 static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
 {
     const ebpo_scene *scene = p->needs.scene;

@@ -136,7 +136,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
 
 /* Relative margin for sums of a few products, far greater than their rounding errors. */
 static const double slack = 0x1p-44;
-/* Rotation in one step of a box, in radians. */
+/* Rotation in one step of box_between, in radians. */
 static const double step_angle = 0.125;
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
@@ -207,12 +207,12 @@ static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, do
     }
 }
 
-/* Returns x. If x is NaN, which follows from an overflow, returns `infinite` instead, so that the
- * box is unbounded on this side. */
+/* Returns x, or `infinite` if x is NaN after an overflow. The box is then unbounded on this side.
+ */
 static double or_infinite(double x, double infinite) { return isnan(x) ? infinite : x; }
 
-/* Extends a box so that it contains the box low .. high, enlarged by `distance` on each
- * side. */
+/* Extends the box min .. max so that it contains the box low .. high, enlarged by `distance` on
+ * each side. */
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
                      double distance)
 {
@@ -245,7 +245,7 @@ ebpo_scene_extent ebpo_scene_extent_of(const ebpo_scene *scene, const ebpo_scene
     return extent;
 }
 
-/* Extends min .. max so that it contains the box of the instance at a time, enlarged by
+/* Extends the box min .. max so that it contains the box of the instance at a time, enlarged by
  * `distance` on each side. */
 static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
                    double distance, double min[3], double max[3])
@@ -257,7 +257,8 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
     join_box(min, max, low, high, distance);
 }
 
-/* Extends min .. max so that it contains the instance between two times with no key between them.
+/* Extends the box min .. max so that it contains the instance between two times. No key of its
+ * route may be between them.
  * The number of steps follows from the angle of rotation, which is estimated from the sag of the
  * whole arc: sag = max_distance * angle^2 / 8. */
 static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
@@ -265,8 +266,8 @@ static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry
                         double max[3])
 {
     const ebpo_scene_route *route = route_of(scene, i);
-    ebpo_scene_step all = ebpo_scene_route_step(route, from, to, extent);
-    double angle = extent.max_distance > 0 ? sqrt(8 * all.sag / extent.max_distance) : 0;
+    ebpo_scene_step arc = ebpo_scene_route_step(route, from, to, extent);
+    double angle = extent.max_distance > 0 ? sqrt(8 * arc.sag / extent.max_distance) : 0;
     int steps = angle < 32 * step_angle ? 1 + (int)(angle / step_angle) : 32;
     for (int n = 0; n < steps; n++) {
         double begin = n == 0 ? from : from + (to - from) * n / steps;
@@ -277,7 +278,7 @@ static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry
     }
 }
 
-/* Extends min .. max so that it contains the instance at all times from .. to. */
+/* Extends the box min .. max so that it contains the instance at all times from .. to. */
 static void swept_box(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double from,
                       double to, double min[3], double max[3])
 {
@@ -431,8 +432,8 @@ static bool near_each_other(const box *x, const box *y, double distance)
     return true;
 }
 
-/* Adds a pair of boxes to the result if the rules do not ignore it and its boxes are within its
- * clearance. */
+/* Adds the pair of the boxes' instances to the result, if the rules do not ignore it and the boxes
+ * are within its clearance. */
 static ebpo_status add_pair_of_boxes(sweep *s, const box *x, const box *y, ebpo_error *error)
 {
     ebpo_scene_pair pair = { x->instance, y->instance, 0 };
@@ -453,6 +454,8 @@ static ebpo_status add_pair_of_boxes(sweep *s, const box *x, const box *y, ebpo_
     return EBPO_OK;
 }
 
+/* Compares each box with the boxes that follow it on the first axis, up to the first box that is
+ * farther away than the greatest clearance. */
 static ebpo_status sweep_boxes(sweep *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;

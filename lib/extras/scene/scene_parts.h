@@ -5,7 +5,7 @@
 #include <ebpo/scene.h>
 #include <jansson.h>
 
-/* An open file, shared by all models with the same path. */
+/* An open file. All models with the same path share it. */
 typedef struct ebpo_scene_file_entry {
     char *path; /* path by which the file is opened */
     ebpo_file *file;
@@ -69,11 +69,11 @@ struct ebpo_scene {
     uint64_t ignored_count, clearance_count; /* numbers of rules that ignore pairs, and of rules
                                               * that require a clearance, before sorting */
     char *folder;                            /* base of relative paths, "" or ending with "/" */
-    char *text;                              /* text from which the scene was read; NULL: none */
+    char *text; /* JSON text from which the scene was read; NULL: the scene was not read */
     size_t text_size;
     uint64_t text_models, text_instances; /* numbers of models and instances in that text */
     bool allow_outside;                   /* files that the scene names may be outside the folder */
-    ebpo_model_options model_options;     /* options of ebpo_scene_model */
+    ebpo_model_options model_options;     /* options of the models that ebpo_scene_model makes */
 };
 
 #define EBPO_SCENE_ALL_SET 0
@@ -168,8 +168,9 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
  * shorter intervals of time. */
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_extent extent);
 
-/* Returns an upper bound of the change of the distance of two instances on one route between `from`
- * and `to`, including rounding. extent: the sums of both instances' extents. from < to. */
+/* Returns an upper bound of the change of the distance of two instances on one route between the
+ * times `from` and `to`, including rounding; from < to. extent: each member is the sum of this
+ * member of both instances' extents. */
 double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
                                ebpo_scene_extent extent);
 
@@ -203,7 +204,8 @@ size_t ebpo_scene_bom_length(const char *text, size_t size);
 EBPO_MUST_USE ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_values,
                                                ebpo_error *error);
 
-/* A step of the path to a member: a key, or the index of an item if the key is NULL. */
+/* One step of the path to a value in the JSON text: the key of a member of an object, or, if the
+ * key is NULL, the index of an item of an array. */
 typedef struct ebpo_scene_at {
     const char *key;
     uint64_t item;

@@ -43,19 +43,21 @@ enum {
 static const struct {
     const char *path;
     ebpo_h5_number number;
-    uint32_t cols;
+    uint32_t cols; /* 0: the dataset is one-dimensional */
     const char *meaning;
 } layout[TABLES] = {
     [TIME] = { "/frames/time", EBPO_H5_F64, 0, "the scene's seconds" },
-    [FIRST_CLASH] = { "/frames/first_clash", EBPO_H5_I64, 0, "row of /clashes" },
-    [CLASHES] = { "/frames/clashes", EBPO_H5_I64, 0, "rows of /clashes" },
-    [TESTED] = { "/frames/tested", EBPO_H5_I64, 0, "pairs of instances evaluated" },
+    [FIRST_CLASH] = { "/frames/first_clash", EBPO_H5_I64, 0, "first row of the time in /clashes" },
+    [CLASHES] = { "/frames/clashes", EBPO_H5_I64, 0, "number of rows of the time in /clashes" },
+    [TESTED] = { "/frames/tested", EBPO_H5_I64, 0, "number of pairs of instances evaluated" },
     [NANOSECONDS] = { "/frames/nanoseconds", EBPO_H5_I64, 0, "duration of the query" },
-    [BYTES_READ] = { "/frames/bytes_read", EBPO_H5_I64, 0, "from models' files, during the query" },
-    [MODELS] = { "/frames/models", EBPO_H5_I64, 0, "read into memory, during the query" },
-    [LOADS] = { "/frames/loads", EBPO_H5_I64, 0, "of subtrees, during the query" },
-    [FRAME] = { "/clashes/frame", EBPO_H5_I64, 0, "row of /frames" },
-    [INSTANCES] = { "/clashes/instances", EBPO_H5_I64, 2, "a and b, numbers of /instances" },
+    [BYTES_READ] = { "/frames/bytes_read", EBPO_H5_I64, 0,
+                     "bytes read from models' files during the query" },
+    [MODELS] = { "/frames/models", EBPO_H5_I64, 0,
+                 "number of models read into memory during the query" },
+    [LOADS] = { "/frames/loads", EBPO_H5_I64, 0, "number of subtrees loaded during the query" },
+    [FRAME] = { "/clashes/frame", EBPO_H5_I64, 0, "row in /frames" },
+    [INSTANCES] = { "/clashes/instances", EBPO_H5_I64, 2, "a and b, rows in /instances" },
     [KIND] = { "/clashes/kind", EBPO_H5_U8, 0,
                "1 near, 2 touching, 3 coplanar, 4 crossing, 5 protruding, 6 enclosed, "
                "7 duplicate" },
@@ -63,17 +65,20 @@ static const struct {
                    "0 disjoint, 1 touching, 2 intersecting, 3 a inside b, 4 b inside a, 5 equal, "
                    "6 not requested" },
     [FACES] = { "/clashes/faces", EBPO_H5_I64, 2,
-                "a pair that intersects or is nearest; -1: "
-                "none" },
-    [PAIRS] = { "/clashes/pairs", EBPO_H5_I64, 3, "of faces: touching, coplanar, crossing" },
-    [CONTACTS] = { "/clashes/contacts", EBPO_H5_I64, 0, "lines of contact; -1: not known" },
-    [CLEARANCE] = { "/clashes/clearance", EBPO_H5_F64, 0, "required, the scene's unit" },
-    [DISTANCE] = { "/clashes/distance", EBPO_H5_F64, 0, "of faces, the scene's unit" },
+                "a face of a and a face of b that intersect or are nearest; -1: none" },
+    [PAIRS] = { "/clashes/pairs", EBPO_H5_I64, 3,
+                "numbers of pairs of faces: touching, coplanar, crossing" },
+    [CONTACTS] = { "/clashes/contacts", EBPO_H5_I64, 0,
+                   "number of lines of contact; -1: not known" },
+    [CLEARANCE] = { "/clashes/clearance", EBPO_H5_F64, 0,
+                    "required distance, in the scene's unit" },
+    [DISTANCE] = { "/clashes/distance", EBPO_H5_F64, 0,
+                   "distance of the faces, in the scene's unit" },
     [LOCATION] = { "/clashes/location", EBPO_H5_F64, 3,
                    "x, y, z in the world; nan: not requested" },
     [LOCATION_BOX] = { "/clashes/location_box", EBPO_H5_F64, 6,
-                       "of contacts in the world: least x, y, z, greatest x, y, z" },
-    [DEPTH] = { "/clashes/depth", EBPO_H5_F64, 4, "of a in b from, to; of b in a from, to" },
+                       "box of the contacts in the world: least x, y, z, greatest x, y, z" },
+    [DEPTH] = { "/clashes/depth", EBPO_H5_F64, 4, "bounds of the depth of a in b, then of b in a" },
 };
 
 struct ebpo_scene_report {
@@ -128,7 +133,7 @@ static ebpo_status put_models(ebpo_scene_report *r, ebpo_error *error)
     ebpo_status status =
         ebpo_h5_make_table(&r->out, "/instances/model", EBPO_H5_I64, 0, &table, error);
     if (status == EBPO_OK)
-        status = put_meaning(r, table.id, "its model's number in /models", error);
+        status = put_meaning(r, table.id, "row of the instance's model in /models", error);
     if (status == EBPO_OK)
         status = ebpo_h5_append(&r->out, &table, model, count, error);
     ebpo_h5_close_table(&r->out, &table);
@@ -154,10 +159,10 @@ static ebpo_status make_groups(ebpo_scene_report *r, ebpo_error *error)
     static const struct {
         const char *path, *meaning;
     } groups[] = {
-        { "/instances", "rigid instances, by number" },
-        { "/models", "by number" },
+        { "/instances", "rigid instances; row = index" },
+        { "/models", "models; row = index" },
         { "/frames", "times that were evaluated, in order" },
-        { "/clashes", "pairs of instances that intersect or come too near, frame by frame" },
+        { "/clashes", "pairs of instances that intersect or are too near, frame by frame" },
     };
     ebpo_status status = EBPO_OK;
     for (size_t i = 0; i < sizeof groups / sizeof *groups && status == EBPO_OK; i++) {
@@ -249,6 +254,7 @@ void ebpo_scene_report_free(ebpo_scene_report *r)
 
 enum { ROWS = 256 };
 
+/* A block of rows of /clashes that is written at once, one array for each dataset. */
 typedef struct rows {
     int64_t frame[ROWS], instances[ROWS][2], faces[ROWS][2], pairs[ROWS][3], contacts[ROWS];
     uint8_t kind[ROWS], relation[ROWS];
@@ -316,17 +322,17 @@ ebpo_status ebpo_scene_report_add(ebpo_scene_report *r, const ebpo_scene_frame *
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    rows *some = ebpo_alloc(1, sizeof *some);
-    if (!some)
-        return ebpo_fail_memory(error, sizeof *some);
+    rows *block = ebpo_alloc(1, sizeof *block);
+    if (!block)
+        return ebpo_fail_memory(error, sizeof *block);
     ebpo_status status = put_frame(r, frame, count, error);
     for (uint64_t at = 0; at < count && status == EBPO_OK; at += ROWS) {
         uint64_t n = count - at < ROWS ? count - at : ROWS;
         for (uint64_t i = 0; i < n; i++)
-            fill_row(some, i, &clashes[at + i], r->frames);
-        status = put_rows(r, some, n, error);
+            fill_row(block, i, &clashes[at + i], r->frames);
+        status = put_rows(r, block, n, error);
     }
     r->frames++;
-    free(some);
+    free(block);
     return status;
 }

@@ -67,7 +67,7 @@ typedef struct ebpo_scene_options {
      * folder or below; their paths must be relative and without "..", and no symbolic link may lead
      * out of the folder.
      */
-    bool outside;
+    bool allow_outside;
 
     /* True: models on web servers are allowed. The scene must state their digests. */
     bool remote;
@@ -368,8 +368,8 @@ typedef struct ebpo_load_options {
  * opened as well.
  *
  * EBPO_E_FORMAT: a file is not an .ebpo.h5 file, its digest differs from that in the scene, or a
- * link leads out of the scene's folder (ebpo_scene_options.outside). EBPO_E_ARGUMENT: an instance
- * has a pose that its model cannot have; the message names the instance. EBPO_E_IO.
+ * link leads out of the scene's folder (ebpo_scene_options.allow_outside). EBPO_E_ARGUMENT: an
+ * instance has a pose that its model cannot have; the message names the instance. EBPO_E_IO.
  *
  * Threads: one at a time per scene.
  */
@@ -807,7 +807,7 @@ typedef enum ebpo_scene_purpose {
      * Needs all faces of an instance that is near another one, because any face may be part of a
      * surface around the other instance.
      */
-    EBPO_SCENE_FOR_SOLIDS = 3
+    EBPO_SCENE_FOR_RELATIONS = 3
 } ebpo_scene_purpose;
 
 /* Options of ebpo_scene_plan. */

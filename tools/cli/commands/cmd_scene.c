@@ -435,9 +435,9 @@ static const char *set_purpose(scene_values *v)
 {
     if (!v->solids && !(v->depth > 0))
         return NULL;
-    if (v->purpose != EBPO_SCENE_FOR_COLLIDE && v->purpose != EBPO_SCENE_FOR_SOLIDS)
+    if (v->purpose != EBPO_SCENE_FOR_COLLIDE && v->purpose != EBPO_SCENE_FOR_RELATIONS)
         return "--solids and --depth cannot be used with --for view or --for inside";
-    v->purpose = EBPO_SCENE_FOR_SOLIDS;
+    v->purpose = EBPO_SCENE_FOR_RELATIONS;
     return NULL;
 }
 
@@ -473,7 +473,7 @@ static int run_scene(void *given, const char **operand)
     ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
     load.max_expansion = (uint64_t)v->max_expansion;
-    how.outside = v->outside;
+    how.allow_outside = v->outside;
     how.remote = v->remote;
     const char *wrong = NULL;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);

@@ -27,7 +27,7 @@ def open_scene(path: Path, *, memory: Size | None = None, allow_outside: bool = 
     remote: the scene may name models on web servers.
     """
     def opened(report: Progress | None) -> Handle:
-        options = made(c.ebpo_scene_options, outside=allow_outside, remote=remote)
+        options = made(c.ebpo_scene_options, allow_outside=allow_outside, remote=remote)
         handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
         with Reporter(report) as reported:
             load = made(c.ebpo_load_options, memory=size_in_bytes(memory), progress=reported)
