@@ -1,7 +1,7 @@
 /* Finds the faces of the first operand near the other operands.
  *
- * All other faces are outside of all other operands, so the result either has all of them or none.
- */
+ * Every face that is not found is outside of all other operands. So the result either has all faces
+ * that are not found, or none of them. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/base_faces.h"
@@ -18,7 +18,7 @@ typedef struct gathering {
     ebpo_base_face *face;
     uint64_t count, capacity;
     const ebpo_posing *posing; /* NULL: coordinates stay as they are */
-    bool full;
+    bool full;                 /* there was not enough memory for a face */
 } gathering;
 
 static bool take_triangles(void *user, const ebpo_triangles *triangles)
@@ -27,7 +27,7 @@ static bool take_triangles(void *user, const ebpo_triangles *triangles)
     g->full = !ebpo_grow(&g->face, &g->capacity, g->count + triangles->count, sizeof *g->face);
     for (uint64_t i = 0; i < triangles->count && !g->full; i++) {
         ebpo_base_face *f = &g->face[g->count++];
-        f->number = (uint32_t)triangles->file_faces[i];
+        f->file_face = (uint32_t)triangles->file_faces[i];
         f->source = (uint32_t)triangles->faces[i];
         for (int k = 0; k < 3; k++)
             if (g->posing)
@@ -41,7 +41,7 @@ static bool take_triangles(void *user, const ebpo_triangles *triangles)
 static int order_faces(const void *a, const void *b)
 {
     const ebpo_base_face *x = a, *y = b;
-    return (x->number > y->number) - (x->number < y->number);
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
 /* Computes the box of the other operands. Returns false if there are none. */

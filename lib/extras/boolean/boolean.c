@@ -1,10 +1,10 @@
-/* Evaluates Boolean expressions over solids at poses: union, intersection, difference and symmetric
- * difference, evaluated at points of the world.
+/* Evaluates Boolean expressions over solids at poses (union, intersection, difference, symmetric
+ * difference and complement) at points of the world.
  *
- * An expression is a list of nodes, each of which refers to earlier nodes or to operands. The state
- * of the operands (in, out, or unknown) gives the possible results. If a point is on the boundary
- * of an operand, both sides of the operand count. Only operands that can still change the result
- * are queried. Proofs: docs/develop/booleans.md. The object is immutable after creation; each
+ * An expression is a list of nodes. Each node refers to earlier nodes or to an operand. The states
+ * of the operands (in, out, or unknown) give the possible results. If a point is on the boundary of
+ * an operand, the result is computed on both sides of this boundary. Operands are queried until the
+ * result is certain. Proofs: docs/develop/booleans.md. The object is immutable after creation; each
  * thread has separate contexts. */
 #include "core/strict_fp.h"
 
@@ -24,6 +24,7 @@
 
 /* --- expressions --- */
 
+/* Returns true if the operation refers to one other node (`left`), not two. */
 static bool has_one_node(int32_t operation) { return operation == EBPO_BOOLEAN_COMPLEMENT; }
 
 static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, uint32_t operands,
@@ -41,8 +42,8 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
                          number, node->left, operands);
     if (!operand && (node->left >= number || (!one && node->right >= number)))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "node %" PRIu32 " of the expression names node %" PRIu32
-                         ", which is not before it",
+                         "node %" PRIu32 " of the expression refers to node %" PRIu32
+                         ", but must refer to earlier nodes",
                          number, node->left >= number ? node->left : node->right);
     if (one && !has_box)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -57,24 +58,26 @@ static void add_node(ebpo_expression *e, int32_t operation, uint32_t left, uint3
     e->node[e->count++] = (ebpo_boolean_node){ operation, left, right, 0 };
 }
 
-/* Cuts the expression to an operand. */
+/* Intersects the expression with an operand. */
 static void cut_expression(ebpo_expression *e, uint32_t operand)
 {
     add_node(e, EBPO_BOOLEAN_OPERAND, operand, 0);
     add_node(e, EBPO_BOOLEAN_INTERSECTION, e->count - 2, e->count - 1);
 }
 
-/* Copies the nodes. With a box, the first node is the box, and complements are differences from
- * the box: in it, both are equal. Fails with EBPO_E_LIMIT and EBPO_E_ARGUMENT, as documented at
+/* Copies the caller's nodes. If there is a box, node 0 is the box, and the result is cut to it.
+ * Inside the box, a complement is equal to the difference of the box and its operand, so it becomes
+ * such a difference. Fails with EBPO_E_LIMIT and EBPO_E_ARGUMENT, as documented at
  * ebpo_boolean_new. */
 static ebpo_status make_expression(ebpo_boolean *b, const ebpo_boolean_node *nodes, uint32_t count,
                                    bool has_box, ebpo_error *error)
 {
     ebpo_expression *e = &b->expression;
-    uint32_t shift = has_box ? 1 : 0;
+    uint32_t shift = has_box ? 1 : 0; /* the index of a caller's node increases by this */
     if (count == 0 || count > EBPO_BOOLEAN_NODES_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu32 " nodes; give 1 to %d",
-                         count, EBPO_BOOLEAN_NODES_MAX);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the expression has %" PRIu32 " nodes; give 1 to %d nodes", count,
+                         EBPO_BOOLEAN_NODES_MAX);
     if (has_box)
         add_node(e, EBPO_BOOLEAN_OPERAND, b->given, 0);
     for (uint32_t i = 0; i < count; i++) {
@@ -114,7 +117,7 @@ static unsigned combine_values(int32_t operation, unsigned a, unsigned b)
     case EBPO_BOOLEAN_DIFFERENCE: return may_in_both(a, may_not(b));
     default: break;
     }
-    if (a == EBPO_MAY_BOTH || b == EBPO_MAY_BOTH)
+    if (a == EBPO_MAY_BOTH || b == EBPO_MAY_BOTH) /* symmetric difference */
         return EBPO_MAY_BOTH;
     return a != b ? EBPO_MAY_IN : EBPO_MAY_OUT;
 }
@@ -149,6 +152,8 @@ uint64_t ebpo_expression_operands(const ebpo_expression *e)
     return operands;
 }
 
+/* Computes a box that contains the result of an operation on contents of the boxes a and b. The box
+ * of a difference is a. */
 static void combine_boxes(int32_t operation, const double a[6], const double b[6], double out[6])
 {
     bool smaller = operation == EBPO_BOOLEAN_INTERSECTION;
@@ -168,16 +173,16 @@ static void combine_boxes(int32_t operation, const double a[6], const double b[6
 void ebpo_boolean_box(const ebpo_boolean *b, double out[6])
 {
     const ebpo_expression *e = &b->expression;
-    double of[EBPO_EXPRESSION_NODES][6];
+    double box[EBPO_EXPRESSION_NODES][6]; /* box of each node */
     for (uint32_t i = 0; i < e->count; i++) {
         const ebpo_boolean_node *n = &e->node[i];
         if (n->operation == EBPO_BOOLEAN_OPERAND)
-            memcpy(of[i], b->solid[n->left].box, sizeof of[i]);
+            memcpy(box[i], b->solid[n->left].box, sizeof box[i]);
         else
-            combine_boxes(n->operation, (const double *)of[n->left], (const double *)of[n->right],
-                          of[i]);
+            combine_boxes(n->operation, (const double *)box[n->left], (const double *)box[n->right],
+                          box[i]);
     }
-    memcpy(out, of[e->count - 1], sizeof of[0]);
+    memcpy(out, box[e->count - 1], sizeof box[0]);
 }
 
 /* --- equal operands --- */
@@ -188,31 +193,31 @@ static bool equal_operands(const ebpo_boolean *b, uint32_t i, uint32_t k)
            memcmp(&b->pose[i], &b->pose[k], sizeof b->pose[i]) == 0;
 }
 
-void ebpo_boolean_find_equal(const ebpo_boolean *b, uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX])
+void ebpo_boolean_find_equal(const ebpo_boolean *b, uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX])
 {
     uint64_t used = ebpo_expression_operands(&b->expression);
-    memset(same, 0, EBPO_BOOLEAN_OPERANDS_MAX * sizeof *same);
+    memset(equal, 0, EBPO_BOOLEAN_OPERANDS_MAX * sizeof *equal);
     for (uint32_t i = 0; i < b->count; i++) {
         uint32_t k = 0;
         if (!(used >> i & 1))
             continue;
-        while (k < i && !(same[k] && equal_operands(b, k, i)))
+        while (k < i && !(equal[k] && equal_operands(b, k, i)))
             k++;
-        same[k] |= UINT64_C(1) << i;
+        equal[k] |= UINT64_C(1) << i;
     }
 }
 
 /* --- creation --- */
 
-ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
+ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t operand, const ebpo_error *cause,
                               ebpo_error *error)
 {
-    const char *file = model->file->in.shown, *reported = cause->message;
-    size_t named = strlen(file);
-    if (strncmp(reported, file, named) == 0 && strncmp(reported + named, ": ", 2) == 0)
-        reported += named + 2;
-    return ebpo_fail_file(error, cause->status, file, "operand %" PRIu32 ": %s", number + 1,
-                          reported);
+    const char *file = model->file->in.shown, *message = cause->message;
+    size_t length = strlen(file);
+    if (strncmp(message, file, length) == 0 && strncmp(message + length, ": ", 2) == 0)
+        message += length + 2; /* the message begins with the file's name already */
+    return ebpo_fail_file(error, cause->status, file, "operand %" PRIu32 ": %s", operand + 1,
+                          message);
 }
 
 static ebpo_status add_solid(ebpo_boolean *b, ebpo_model *model, const ebpo_pose *pose,
@@ -226,14 +231,15 @@ static ebpo_status add_solid(ebpo_boolean *b, ebpo_model *model, const ebpo_pose
     return EBPO_OK;
 }
 
-/* Adds the operand of a region whose model has been made with this status. */
+/* Adds a region as an operand. status: result of making the region's model. */
 static ebpo_status add_region(ebpo_boolean *b, ebpo_status status, ebpo_error *error)
 {
     const ebpo_pose pose = EBPO_POSE_INIT;
     return status == EBPO_OK ? add_solid(b, b->region[b->count].model, &pose, error) : status;
 }
 
-/* Adds the half-spaces, of which the parts around the expression's box count. */
+/* Adds the half-spaces as operands, and intersects the expression with them. The model of a
+ * half-space has its part around the box of the expression. */
 static ebpo_status add_half_spaces(ebpo_boolean *b, const double *planes, uint32_t count,
                                    ebpo_error *error)
 {
@@ -259,9 +265,9 @@ static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
 }
 
 static ebpo_status fill_operands(ebpo_boolean *b, const ebpo_boolean_operand *operands,
-                                 const ebpo_boolean_options *wanted, ebpo_error *error)
+                                 const ebpo_boolean_options *options, ebpo_error *error)
 {
-    uint32_t all = b->given + (wanted->box ? 1 : 0) + wanted->plane_count;
+    uint32_t all = b->given + (options->box ? 1 : 0) + options->plane_count;
     ebpo_status status = EBPO_OK;
     b->solid = ebpo_alloc_zero(all, sizeof *b->solid);
     b->pose = ebpo_alloc_zero(all, sizeof *b->pose);
@@ -270,10 +276,10 @@ static ebpo_status fill_operands(ebpo_boolean *b, const ebpo_boolean_operand *op
         return ebpo_fail_memory(error, all * (sizeof *b->solid + b->threads * sizeof(void *)));
     for (uint32_t i = 0; i < b->given && status == EBPO_OK; i++)
         status = add_solid(b, operands[i].model, &operands[i].pose, error);
-    if (status == EBPO_OK && wanted->box)
-        status = add_region(b, ebpo_region_box(&b->region[b->count], wanted->box, error), error);
+    if (status == EBPO_OK && options->box)
+        status = add_region(b, ebpo_region_box(&b->region[b->count], options->box, error), error);
     if (status == EBPO_OK)
-        status = add_half_spaces(b, wanted->planes, wanted->plane_count, error);
+        status = add_half_spaces(b, options->planes, options->plane_count, error);
     return status == EBPO_OK ? make_contexts(b, error) : status;
 }
 
@@ -283,23 +289,24 @@ ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *operands, uint32_t oper
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_boolean_options wanted = EBPO_BOOLEAN_OPTIONS_INIT;
+    ebpo_boolean_options checked = EBPO_BOOLEAN_OPTIONS_INIT;
     *out = NULL;
-    ebpo_status status = EBPO_TAKE(ebpo_boolean_options, &wanted, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_boolean_options, &checked, options, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t all = (uint64_t)operand_count + (wanted.box ? 1 : 0) + wanted.plane_count;
+    uint64_t all = (uint64_t)operand_count + (checked.box ? 1 : 0) + checked.plane_count;
     if (operand_count == 0 || all > EBPO_BOOLEAN_OPERANDS_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu64 " operands; give 1 to %d",
-                         all, EBPO_BOOLEAN_OPERANDS_MAX);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the expression has %" PRIu64 " operands; give 1 to %d operands", all,
+                         EBPO_BOOLEAN_OPERANDS_MAX);
     ebpo_boolean *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b)
         return ebpo_fail_memory(error, sizeof *b);
     b->given = operand_count;
-    b->threads = ebpo_thread_count(wanted.threads);
-    status = make_expression(b, nodes, node_count, wanted.box != NULL, error);
+    b->threads = ebpo_thread_count(checked.threads);
+    status = make_expression(b, nodes, node_count, checked.box != NULL, error);
     if (status == EBPO_OK)
-        status = fill_operands(b, operands, &wanted, error);
+        status = fill_operands(b, operands, &checked, error);
     if (status == EBPO_OK)
         *out = b;
     else
@@ -323,14 +330,15 @@ void ebpo_boolean_free(ebpo_boolean *b)
 
 /* --- points --- */
 
-/* States of the operands at a point. If the point is on the boundary of an operand, the operand has
- * two sides. */
+/* States of the operands at a point. If the point is on a face of an operand, the operand may have
+ * two states: above and below the plane of the face. */
 typedef struct operand_states {
-    uint64_t known;        /* operands that are in the same state on both sides, a bit for each */
-    uint64_t above, below; /* operands that are in on each side */
-    bool flat;             /* all faces through the point are in one plane */
-    bool on;
-    double plane[3][3];
+    uint64_t known;     /* a bit for each operand that has the same state on both sides */
+    uint64_t above;     /* a bit for each operand that contains the points just above the plane */
+    uint64_t below;     /* a bit for each operand that contains the points just below the plane */
+    bool flat;          /* all faces through the point are in one plane */
+    bool on;            /* the point is on the boundary of an operand */
+    double plane[3][3]; /* three points of the plane, if `on` */
 } operand_states;
 
 static bool same_plane(const double a[3][3], const double b[3][3])
@@ -341,6 +349,7 @@ static bool same_plane(const double a[3][3], const double b[3][3])
     return true;
 }
 
+/* Adds the states of operand i. sides: its winding numbers on both sides of the point. */
 static void add_states(operand_states *o, uint32_t i, ebpo_rule rule, const ebpo_posed_sides *sides)
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),
@@ -362,6 +371,8 @@ static void add_states(operand_states *o, uint32_t i, ebpo_rule rule, const ebpo
     o->on = true;
 }
 
+/* Sets the result. may: possible states that follow from the known states of operands. If all faces
+ * through the point are in one plane, the states on both sides of the plane decide. */
 static void conclude_result(const ebpo_boolean *b, const operand_states *o, unsigned may,
                             ebpo_boolean_result *out)
 {
@@ -374,7 +385,7 @@ static void conclude_result(const ebpo_boolean *b, const operand_states *o, unsi
     out->certain = out->where != EBPO_ON || o->flat;
 }
 
-ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const double w[3],
+ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const double point[3],
                                ebpo_boolean_result *out, ebpo_error *error)
 {
     operand_states o = { .flat = true };
@@ -382,7 +393,7 @@ ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const dou
     for (uint32_t i = 0; i < b->count && may == EBPO_MAY_BOTH; i++) {
         ebpo_posed_sides sides;
         ebpo_error cause = EBPO_ERROR_INIT;
-        if (ebpo_posed_solid_sides(&b->solid[i], ebpo_boolean_context(b, worker, i), w, &sides,
+        if (ebpo_posed_solid_sides(&b->solid[i], ebpo_boolean_context(b, worker, i), point, &sides,
                                    &cause) != EBPO_OK)
             return ebpo_fail_operand(b->solid[i].model, i, &cause, error);
         add_states(&o, i, b->solid[i].model->info->rule, &sides);
@@ -392,6 +403,7 @@ ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const dou
     return EBPO_OK;
 }
 
+/* Context of query_some. */
 typedef struct point_queries {
     const ebpo_boolean *b;
     const double *points;
@@ -401,10 +413,10 @@ typedef struct point_queries {
 static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
-    const point_queries *a = context;
+    const point_queries *q = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = ebpo_boolean_query(a->b, worker, a->points + 3 * i, &a->out[i], error);
+        status = ebpo_boolean_query(q->b, worker, q->points + 3 * i, &q->out[i], error);
     return status;
 }
 
@@ -413,12 +425,12 @@ ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean, const double *points
 {
     EBPO_DEFAULT_FP;
     enum { GRAIN = 256 };
-    point_queries a = { boolean, points, out };
+    point_queries context = { boolean, points, out };
     ebpo_status status = ebpo_check_points(points, count, error);
     if (status != EBPO_OK)
         return status;
     return ebpo_parallel_for(count <= GRAIN ? 1 : boolean->threads, NULL, count, GRAIN, query_some,
-                             &a, NULL, "booleans", error);
+                             &context, NULL, "booleans", error);
 }
 
 ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, const double point[3],

@@ -1,10 +1,12 @@
-/* Finds the cells of the result of a boolean expression: cells of an octree of the world that are
- * entirely inside (in-cells), and undecided cells of the finest level (mixed cells).
+/* Finds the cells of the result of a Boolean expression: cells of an octree of the world that are
+ * entirely inside (in-cells), and cells of the finest level that may have points of both states
+ * (mixed cells).
  *
  * The search goes level by level. The children of all mixed cells are classified on all processor
- * cores, and mixed children continue to the next level. Cells are kept in the order of octcodes, so
- * the result does not depend on the number of threads. The cells' volumes bound the volume of the
- * result. The surface between the selected cells and the other cells is a mesh of squares. */
+ * cores, and mixed children continue to the next level. Cells are kept in the order of octcodes
+ * (the path from the root, three bits for each level), so the result does not depend on the number
+ * of threads. The cells' volumes bound the volume of the result. The surface around the in-cells,
+ * with or without the mixed cells, is a mesh of squares. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -32,7 +34,7 @@ struct ebpo_boolean_cells {
     uint64_t in_count, in_capacity;
     ebpo_octcode *mixed; /* mixed cells of the finest level, in ascending order */
     uint64_t mixed_count, mixed_capacity;
-    uint64_t stages[EBPO_CUBE_STAGES];
+    uint64_t stages[EBPO_CUBE_STAGES]; /* numbers of decisions by each test (world_cell.h) */
 };
 
 enum {
@@ -51,10 +53,11 @@ typedef struct walk {
     const ebpo_boolean *boolean;
     ebpo_boolean_cells *cells;
     ebpo_cells_options options;
-    candidate *candidates; /* [8 * PARENTS] */
-    ebpo_world_cell *parents, *next;
+    candidate *candidates;    /* [8 * PARENTS] cells of `level` */
+    ebpo_world_cell *parents; /* mixed cells of the level above */
+    ebpo_world_cell *next;    /* mixed cells of `level` that have been found */
     uint64_t parent_count, parent_capacity, next_count, next_capacity;
-    int level; /* level of these cells */
+    int level;
 } walk;
 
 static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -72,7 +75,7 @@ static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsig
 
 static ebpo_status keep_in(ebpo_boolean_cells *cells, ebpo_cell cell, ebpo_error *error)
 {
-    int up = cells->world.level - cell.level;
+    int up = cells->world.level - cell.level; /* levels above the finest one */
     if (!ebpo_grow(&cells->in, &cells->in_capacity, cells->in_count + 1, sizeof *cells->in))
         return ebpo_fail_memory(error, (cells->in_count + 1) * sizeof *cells->in);
     cells->in[cells->in_count++] =
@@ -83,11 +86,11 @@ static ebpo_status keep_in(ebpo_boolean_cells *cells, ebpo_cell cell, ebpo_error
 static ebpo_status keep_mixed(walk *w, const ebpo_world_cell *c, ebpo_error *error)
 {
     ebpo_boolean_cells *cells = w->cells;
-    uint64_t most = w->options.most ? w->options.most : UINT64_C(1) << 25;
-    if (w->next_count + cells->mixed_count >= most)
+    uint64_t max_cells = w->options.most ? w->options.most : UINT64_C(1) << 25;
+    if (w->next_count + cells->mixed_count >= max_cells)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "more than %" PRIu64 " cells of level %d are mixed; give a lower level",
-                         most, w->level);
+                         max_cells, w->level);
     if (w->level == cells->world.level) {
         if (!ebpo_grow(&cells->mixed, &cells->mixed_capacity, cells->mixed_count + 1,
                        sizeof *cells->mixed))
@@ -236,10 +239,12 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }
 
-/* --- the mesh: in-cells and out-cells share no cell face, so each square is a side of a mixed cell
- * --- */
+/* --- the mesh ---
+ *
+ * Between an in-cell and an out-cell there is always a mixed cell. So each square is a side of a
+ * mixed cell. */
 
-/* A corner of cells of the finest level: x, y and z, 21 bits each. */
+/* A corner of cells of the finest level: its coordinates in cells, 21 bits each; x is lowest. */
 typedef uint64_t corner;
 
 typedef struct squares {
@@ -280,8 +285,8 @@ static corner corner_at(const uint32_t at[3])
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
 }
 
-/* Adds a square, a side of a cell. from_outside: the square's normal points out of the cell; else
- * into it. */
+/* Adds a side of a cell as a square. from_outside: true: the square's normal points out of the
+ * cell; false: into the cell. */
 static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, bool from_outside,
                               ebpo_error *error)
 {
@@ -300,6 +305,8 @@ static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, 
     return EBPO_OK;
 }
 
+/* Adds the sides of a mixed cell that are on the wanted surface. side: EBPO_BOOLEAN_INNER: sides to
+ * in-cells; EBPO_BOOLEAN_OUTER: sides to out-cells. */
 static ebpo_status add_sides(squares *s, ebpo_octcode code, ebpo_boolean_side side,
                              ebpo_error *error)
 {

@@ -28,7 +28,8 @@ static ebpo_status make_mesh(ebpo_face_list *faces, const ebpo_boolean_mesh_opti
     return status;
 }
 
-/* Units are texts of the user; an operand without a unit is accepted with every unit. */
+/* Fails if two operands have different units. Units are texts that the user chose. An operand
+ * without a unit may be combined with every unit. */
 static ebpo_status check_units(const ebpo_boolean *b, ebpo_error *error)
 {
     const char *unit = "";
@@ -55,21 +56,22 @@ ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean, const ebpo_boolean_mesh_opt
                               ebpo_mesh *out, ebpo_boolean_mesh_report *report, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_boolean_mesh_options wanted = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    ebpo_boolean_mesh_options checked = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
     ebpo_boolean_mesh_report filled = EBPO_BOOLEAN_MESH_REPORT_INIT;
     ebpo_face_list faces;
     memset(out, 0, sizeof *out);
-    ebpo_status status = EBPO_TAKE(ebpo_boolean_mesh_options, &wanted, options, error);
-    if (status == EBPO_OK && wanted.changed_only && (wanted.volume || wanted.attributes))
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "changed_only excludes volume and attributes");
+    ebpo_status status = EBPO_TAKE(ebpo_boolean_mesh_options, &checked, options, error);
+    if (status == EBPO_OK && checked.changed_only && (checked.volume || checked.attributes))
+        status = ebpo_fail(error, EBPO_E_ARGUMENT,
+                           "changed_only cannot be used with volume or attributes");
     if (status == EBPO_OK)
         status = check_units(boolean, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_face_list_make(&faces, boolean, wanted.changed_only, wanted.workspace,
-                                 &wanted.progress, error);
+    status = ebpo_face_list_make(&faces, boolean, checked.changed_only, checked.workspace,
+                                 &checked.progress, error);
     if (status == EBPO_OK)
-        status = make_mesh(&faces, &wanted, out, &filled, error);
+        status = make_mesh(&faces, &checked, out, &filled, error);
     ebpo_face_list_free(&faces);
     if (status != EBPO_OK)
         ebpo_mesh_free(out);

@@ -1,14 +1,17 @@
-/* Computes the distance of a point to the boundary of the result of a boolean expression.
+/* Computes the distance of a point to the boundary of the result of a Boolean expression.
  *
- * The boundary is a part of the operands' faces, so no point of the boundary is nearer than the
- * nearest face. If the result changes just behind that face, the face's distance is the result.
- * Otherwise a search over cells of the world, the nearest first, bounds the distance to the other
- * side. Decided cells end the search. Mixed cells are divided.
+ * A point has a *state*: it is in or out of the result. The boundary is a part of the operands'
+ * faces, so it is not nearer than the nearest face. If a point just behind the nearest face has
+ * another state than the given point, the distance of this face is returned. Otherwise a search
+ * over cells of the world, the nearest first, bounds the distance of the points with the other
+ * state. A cell that is completely in this state gives an upper bound. A cell that is completely in
+ * the state of the given point is dropped. A mixed cell may have points of both states, and is
+ * divided.
  *
- * A first search does not divide cells that are small compared with the tolerance. It finds an
- * upper bound: without this limit, a boundary in front of the nearest decided cell would be divided
- * into too many cells. If the bounds are too wide, a second search divides down to the finest
- * cells. Both searches stop at the maximum number of cells. */
+ * There are two searches. The first one does not divide cells that are small compared with their
+ * distance and the tolerance. So it finds an upper bound soon; if it divided small cells, it could
+ * spend all its cells along a near boundary. If the bounds are too wide, the second search divides
+ * down to the finest cells. Both searches stop at the maximum number of cells. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,21 +33,24 @@ static inline double scaled_length(const double x[3])
     return most * sqrt(a * a + b * b + c * c);
 }
 
+/* The search for the nearest point whose state is not `state`. */
 typedef struct boundary_search {
     const ebpo_boolean *boolean;
     const double *point;
-    unsigned side; /* state of the result at the point: EBPO_MAY_IN or EBPO_MAY_OUT */
+    unsigned state; /* EBPO_MAY_IN or EBPO_MAY_OUT: the search drops cells in this state */
     double tolerance;
-    double grain;   /* cells smaller than this part of their distance are not divided */
-    uint64_t most;  /* maximum number of cells */
-    uint64_t cells; /* number of cells so far */
-    /* Guaranteed bounds of the distance to the other side. Initially hi is the known bound. Both
-     * are INFINITY if there is no other side. */
+    double grain;       /* cells smaller than this fraction of their distance are not divided */
+    uint64_t max_cells; /* maximum number of cells */
+    uint64_t cells;     /* number of cells so far */
+    /* Guaranteed bounds of the distance of the nearest point with the other state. hi begins as an
+     * upper bound that the caller knows, or INFINITY. lo = hi = INFINITY: there is no such point.
+     */
     double lo, hi;
 } boundary_search;
 
+/* A cell that waits for its evaluation. */
 typedef struct waiting {
-    double near; /* no point of the cell is nearer */
+    double distance; /* lower bound of the distance of its points */
     ebpo_world_cell cell;
 } waiting;
 
@@ -53,15 +59,15 @@ typedef struct queue {
     uint64_t count, capacity;
 } queue;
 
-static bool is_nearer(const waiting *a, const waiting *b) { return a->near < b->near; }
+static bool is_nearer(const waiting *a, const waiting *b) { return a->distance < b->distance; }
 
 EBPO_HEAP(heap, waiting, is_nearer)
 
-static ebpo_status push_waiting(queue *q, waiting w, ebpo_error *error)
+static ebpo_status push_waiting(queue *q, waiting cell, ebpo_error *error)
 {
     if (!ebpo_grow(&q->list, &q->capacity, q->count + 1, sizeof *q->list))
         return ebpo_fail_memory(error, (q->count + 1) * sizeof *q->list);
-    heap_add(q->list, q->count++, &w);
+    heap_add(q->list, q->count++, &cell);
     return EBPO_OK;
 }
 
@@ -76,43 +82,47 @@ static double distance_to(const boundary_search *s, const ebpo_world *w, ebpo_ce
     return scaled_length(d);
 }
 
+/* Adds a cell to the queue, unless it is farther away than the upper bound. */
 static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queue *q,
                              const ebpo_world_cell *c, ebpo_error *error)
 {
-    double near = distance_to(s, w, c->cell) * (1 - 0x1p-46);
-    return near < s->hi ? push_waiting(q, (waiting){ near, *c }, error) : EBPO_OK;
+    double distance = distance_to(s, w, c->cell) * (1 - 0x1p-46);
+    return distance < s->hi ? push_waiting(q, (waiting){ distance, *c }, error) : EBPO_OK;
 }
 
-/* Takes the region outside the root cell into account, where everything is out. */
+/* Lowers the upper bound to the distance of the root cell's sides. All points outside the root cell
+ * are out. */
 static void bound_by_root_sides(boundary_search *s, const ebpo_world *w)
 {
-    for (int k = 0; k < 3 && s->side == EBPO_MAY_IN; k++)
+    for (int k = 0; k < 3 && s->state == EBPO_MAY_IN; k++)
         s->hi = fmin(s->hi, fmin(fabs(s->point[k] - w->origin[k]),
                                  fabs(w->origin[k] + w->edge - s->point[k])) *
                                 (1 + 0x1p-46));
 }
 
+/* Returns true if a mixed cell is to be divided. */
 static bool is_divided(const boundary_search *s, const ebpo_world *w, const waiting *at)
 {
     int level = at->cell.cell.level;
-    return level < w->level && !(ebpo_world_edge(w, level) < s->grain * at->near);
+    return level < w->level && !(ebpo_world_edge(w, level) < s->grain * at->distance);
 }
 
-/* Decides the current cell. *unclear: least distance of mixed cells that are not divided. */
+/* Evaluates a cell: drops it, lowers the upper bound, or divides it. *unclear: least distance of
+ * mixed cells that are not divided. */
 static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q, waiting *at,
                                double *unclear, ebpo_error *error)
 {
     unsigned may;
-    uint8_t stages[EBPO_CUBE_STAGES] = { 0 };
+    uint8_t stages[EBPO_CUBE_STAGES] = { 0 }; /* statistics, not used here */
     ebpo_status status = ebpo_world_cell_query(s->boolean, 0, w, &at->cell, &may, stages, error);
-    if (status != EBPO_OK || may == s->side)
+    if (status != EBPO_OK || may == s->state)
         return status;
     if (may != EBPO_MAY_BOTH) {
         s->hi = fmin(s->hi, distance_to(s, w, at->cell.cell) * (1 + 0x1p-46));
         return EBPO_OK;
     }
     if (!is_divided(s, w, at)) {
-        *unclear = fmin(*unclear, at->near);
+        *unclear = fmin(*unclear, at->distance);
         return EBPO_OK;
     }
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
@@ -122,11 +132,14 @@ static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q
     return status;
 }
 
+/* Returns true if lo and s->hi are within the tolerance of each other. */
 static bool is_close(const boundary_search *s, double lo)
 {
     return s->hi < INFINITY && s->hi - lo <= s->tolerance * s->hi;
 }
 
+/* Evaluates cells, the nearest first, until the bounds are within the tolerance, no nearer cell
+ * waits, or the maximum number of cells is reached. Sets s->lo and s->hi. */
 static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *q,
                                 ebpo_error *error)
 {
@@ -136,26 +149,28 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
     q->count = 0;
     ebpo_status status = push_cell(s, w, q, &root, error);
     while (status == EBPO_OK && q->count) {
-        double near = q->list[0].near;
-        if (near >= s->hi || is_close(s, fmin(near, unclear)) || s->cells >= s->most)
+        double nearest = q->list[0].distance;
+        if (nearest >= s->hi || is_close(s, fmin(nearest, unclear)) || s->cells >= s->max_cells)
             break;
         waiting at = heap_take(q->list, q->count--);
         s->cells++;
         status = settle_cell(s, w, q, &at, &unclear, error);
     }
-    s->lo = fmin(fmax(s->lo, fmin(q->count ? q->list[0].near : INFINITY, unclear)), s->hi);
+    s->lo = fmin(fmax(s->lo, fmin(q->count ? q->list[0].distance : INFINITY, unclear)), s->hi);
     return status;
 }
 
 /* Makes the finest world that doubles allow. */
 static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *error)
 {
-    int level = EBPO_BOOLEAN_LEVEL_MAX - 1; /* one level is left for the centres of cells */
+    /* the centres of the finest cells are corners of the next level, which must exist, too */
+    int level = EBPO_BOOLEAN_LEVEL_MAX - 1;
     while (level > 0 && ebpo_world_make(w, b, level, NULL) != EBPO_OK)
         level--;
     return ebpo_world_make(w, b, level, error);
 }
 
+/* Does both searches. In the second one, s->grain is 0. */
 static ebpo_status search_boundary(boundary_search *s, ebpo_error *error)
 {
     ebpo_world w;
@@ -175,59 +190,61 @@ static ebpo_status search_boundary(boundary_search *s, ebpo_error *error)
 
 typedef struct measuring {
     const ebpo_boolean *b;
-    const double *w;
+    const double *point;
     ebpo_boundary_distance *out;
 } measuring;
 
-/* Tries a point near w: if it is on the other side, the boundary is no farther than this point. */
+/* Evaluates a point q. If its state differs from the state of the given point, the boundary is not
+ * farther away than q, and this distance becomes the upper bound. */
 static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *error)
 {
-    ebpo_boolean_result there;
-    const double offset[3] = { q[0] - m->w[0], q[1] - m->w[1], q[2] - m->w[2] };
-    double away = scaled_length(offset) * (1 + 0x1p-46);
-    if (!(away < m->out->hi))
+    ebpo_boolean_result result;
+    const double offset[3] = { q[0] - m->point[0], q[1] - m->point[1], q[2] - m->point[2] };
+    double distance = scaled_length(offset) * (1 + 0x1p-46);
+    if (!(distance < m->out->hi))
         return EBPO_OK;
-    ebpo_status status = ebpo_boolean_query(m->b, 0, q, &there, error);
-    if (status == EBPO_OK && there.where != m->out->inside.where && there.where != EBPO_ON)
-        m->out->hi = away;
+    ebpo_status status = ebpo_boolean_query(m->b, 0, q, &result, error);
+    if (status == EBPO_OK && result.where != m->out->inside.where && result.where != EBPO_ON)
+        m->out->hi = distance;
     return status;
 }
 
-/* Tries points on the line from w through y, the nearest point of an operand, slightly behind y. */
+/* Tries points slightly behind y, the nearest point of an operand, on the line from the given point
+ * through y. y: in the coordinates of the model. */
 static ebpo_status try_behind(const measuring *m, const ebpo_posed_solid *s, const double y[3],
                               ebpo_error *error)
 {
-    static const double part[] = { 1 + 0x1p-42, 1 + 0x1p-30, 1 + 0x1p-18 };
+    static const double factor[] = { 1 + 0x1p-42, 1 + 0x1p-30, 1 + 0x1p-18 };
     double posed[3], q[3];
     ebpo_status status = EBPO_OK;
     ebpo_posing_apply(&s->posing, y, posed);
     for (int i = 0; i < 3 && status == EBPO_OK; i++) {
         for (int k = 0; k < 3; k++)
-            q[k] = m->w[k] + (posed[k] - m->w[k]) * part[i];
+            q[k] = m->point[k] + (posed[k] - m->point[k]) * factor[i];
         status = try_point(m, q, error);
     }
     return status;
 }
 
-/* Sets *lo to a lower bound of the distance of the operand's posed faces. */
+/* Sets *lo to a lower bound of the distance of the operand's posed faces, and tries points behind
+ * the nearest one. */
 static ebpo_status inspect_operand(const measuring *m, uint32_t operand, double *lo,
                                    ebpo_error *error)
 {
     const ebpo_posed_solid *s = &m->b->solid[operand];
-    double p[3], doubt;
+    double p[3], error_bound;
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result nearest;
     *lo = 0;
-    ebpo_unpose(s, m->w, p, &doubt);
+    ebpo_unpose(s, m->point, p, &error_bound);
     if (!(fabs(p[0]) < 0x1p1000 && fabs(p[1]) < 0x1p1000 && fabs(p[2]) < 0x1p1000))
-        return EBPO_OK; /* the point is so far away that its position in the model is not a double
-                         */
+        return EBPO_OK; /* too far away for the query; no bound is known */
     o.unsigned_distance = true;
     ebpo_status status =
         ebpo_distance(ebpo_boolean_context(m->b, 0, operand), p, &o, &nearest, error);
     if (status != EBPO_OK)
         return status;
-    *lo = fmax((nearest.lo - doubt) * s->posing.scale * (1 - 0x1p-46), 0);
+    *lo = fmax((nearest.lo - error_bound) * s->posing.scale * (1 - 0x1p-46), 0);
     return try_behind(m, s, nearest.point, error);
 }
 
@@ -244,22 +261,25 @@ static ebpo_status inspect_operands(const measuring *m, ebpo_error *error)
     return status;
 }
 
-static ebpo_status inspect_cells(const measuring *m, const ebpo_boundary_options *o, unsigned side,
+/* Searches cells for the nearest point whose state is not `state`. hi: known upper bound of its
+ * distance, or INFINITY. s: gets the bounds. */
+static ebpo_status inspect_cells(const measuring *m, const ebpo_boundary_options *o, unsigned state,
                                  double hi, boundary_search *s, ebpo_error *error)
 {
     *s = (boundary_search){ .boolean = m->b,
-                            .point = m->w,
-                            .side = side,
+                            .point = m->point,
+                            .state = state,
                             .tolerance = o->tolerance,
-                            .most = o->cells ? o->cells : 100000,
+                            .max_cells = o->cells ? o->cells : 100000,
                             .hi = hi };
     ebpo_status status = search_boundary(s, error);
     m->out->cells += s->cells;
     return status;
 }
 
-static ebpo_status measure_off(const measuring *m, const ebpo_boundary_options *o,
-                               ebpo_error *error)
+/* Measures the distance for a point that is not on the boundary. */
+static ebpo_status measure_away_from_boundary(const measuring *m, const ebpo_boundary_options *o,
+                                              ebpo_error *error)
 {
     boundary_search s;
     ebpo_boundary_distance *out = m->out;
@@ -268,24 +288,25 @@ static ebpo_status measure_off(const measuring *m, const ebpo_boundary_options *
     bool enough = out->hi < INFINITY && out->hi - out->lo <= o->tolerance * out->hi;
     if (status != EBPO_OK || enough)
         return status;
-    unsigned side = out->inside.where == EBPO_IN ? EBPO_MAY_IN : EBPO_MAY_OUT;
-    status = inspect_cells(m, o, side, out->hi, &s, error);
+    unsigned state = out->inside.where == EBPO_IN ? EBPO_MAY_IN : EBPO_MAY_OUT;
+    status = inspect_cells(m, o, state, out->hi, &s, error);
     out->hi = s.hi;
     out->lo = fmin(fmax(out->lo, s.lo), s.hi);
     return status;
 }
 
-/* Handles a point that may be on the boundary, for example on edges: the boundary is no farther
- * than a point that is in, nor than a point that is out. */
+/* Bounds the distance for a point that may be on the boundary, for example on an edge. The ball up
+ * to the farther one of the nearest inner point and the nearest outer point has points of both
+ * states, so the boundary is not farther away. */
 static ebpo_status measure_unsure(const measuring *m, const ebpo_boundary_options *o,
                                   ebpo_error *error)
 {
-    boundary_search in, out;
-    ebpo_status status = inspect_cells(m, o, EBPO_MAY_OUT, INFINITY, &in, error);
+    boundary_search nearest_in, nearest_out;
+    ebpo_status status = inspect_cells(m, o, EBPO_MAY_OUT, INFINITY, &nearest_in, error);
     if (status == EBPO_OK)
-        status = inspect_cells(m, o, EBPO_MAY_IN, INFINITY, &out, error);
+        status = inspect_cells(m, o, EBPO_MAY_IN, INFINITY, &nearest_out, error);
     if (status == EBPO_OK)
-        m->out->hi = fmax(in.hi, out.hi);
+        m->out->hi = fmax(nearest_in.hi, nearest_out.hi);
     return status;
 }
 
@@ -294,17 +315,18 @@ ebpo_status ebpo_boolean_distance(ebpo_boolean *boolean, const double point[3],
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_boundary_options wanted = EBPO_BOUNDARY_OPTIONS_INIT;
+    ebpo_boundary_options checked = EBPO_BOUNDARY_OPTIONS_INIT;
     measuring m = { boolean, point, out };
     *out = (ebpo_boundary_distance){ 0 };
-    ebpo_status status = EBPO_TAKE(ebpo_boundary_options, &wanted, options, error);
-    if (status == EBPO_OK && !(wanted.tolerance >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "tolerance %g: give 0 or more", wanted.tolerance);
+    ebpo_status status = EBPO_TAKE(ebpo_boundary_options, &checked, options, error);
+    if (status == EBPO_OK && !(checked.tolerance >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "expected a tolerance of 0 or more, got %g",
+                         checked.tolerance);
     if (status == EBPO_OK)
         status = ebpo_boolean_inside(boolean, point, &out->inside, error);
     if (status != EBPO_OK)
         return status;
     if (out->inside.where == EBPO_ON)
-        return out->inside.certain ? EBPO_OK : measure_unsure(&m, &wanted, error);
-    return measure_off(&m, &wanted, error);
+        return out->inside.certain ? EBPO_OK : measure_unsure(&m, &checked, error);
+    return measure_away_from_boundary(&m, &checked, error);
 }

@@ -1,7 +1,8 @@
-/* Cuts the faces of all operands, and gives equal points one number.
+/* Cuts the listed faces of all operands, and gives equal points one number.
  *
- * Threads cut faces separately. Then points are numbered in the order of the faces, so the result
- * does not depend on threads. */
+ * Threads cut faces separately. The pieces of a face are its triangles and points (face_cut.h).
+ * Then points are numbered in the order of the faces, so the result does not depend on the number
+ * of threads. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/cut_mesh.h"
@@ -18,13 +19,13 @@ static const char stage[] = "cut faces";
 
 enum { FACES_AT_ONCE = 1 << 14, GRAIN = 16 };
 
-/* New points have this bit until the number of corners is known. */
+/* This bit marks the number of a point of `set` until the number of corners is known. */
 #define NEW_POINT (UINT32_C(1) << 31)
 
 typedef struct cutting {
     ebpo_cut_mesh *cut;
     const ebpo_face_list *faces;
-    const uint32_t *face;     /* the faces to cut now */
+    const uint32_t *face;     /* the faces that are cut in parallel now */
     ebpo_face_cutter *cutter; /* [threads] */
     ebpo_face_pieces *pieces; /* [FACES_AT_ONCE] */
 } cutting;
@@ -34,6 +35,7 @@ static bool has_partners(const ebpo_face_list *faces, uint32_t face)
     return faces->begin[face + 1] > faces->begin[face];
 }
 
+/* Returns the greatest u for which all coordinates of faces with partners are multiples of 2^u. */
 static int find_unit(const ebpo_face_list *faces)
 {
     int unit = EBPO_UNIT_OF_ZEROS;
@@ -71,8 +73,7 @@ static bool number_points(ebpo_cut_mesh *cut, ebpo_face_pieces *pieces, uint32_t
 {
     for (uint32_t i = 0; i < pieces->points; i++) {
         ebpo_exact_point *p = &pieces->point[i];
-        /* read before ebpo_point_set_add, which may exchange *p for an unused point */
-        bool exact = p->exact;
+        bool exact = p->exact; /* read first, because ebpo_point_set_add may swap the contents */
         if (exact ? !ebpo_corner_id(&cut->faces->corners, p->at, &number[i])
                   : !ebpo_point_set_add(&cut->set, p, &number[i]))
             return false;
@@ -107,16 +108,17 @@ static bool add_pieces(ebpo_cut_mesh *cut, uint32_t face, const ebpo_face_pieces
 static bool merge_pieces(ebpo_cut_mesh *cut, uint32_t face, ebpo_face_pieces *pieces)
 {
     uint32_t *number = ebpo_alloc(pieces->points, sizeof *number);
-    bool fine =
+    bool done =
         number && number_points(cut, pieces, number) && add_pieces(cut, face, pieces, number);
     free(number);
     ebpo_face_pieces_free(pieces);
-    return fine;
+    return done;
 }
 
 /* --- all faces --- */
 
-/* Adds the faces [begin, end). The pieces of the faces that were cut are in c->pieces. */
+/* Adds the triangles of the faces [begin, end). The pieces of the faces that were cut are in
+ * c->pieces; a face without partners is one triangle. */
 static bool merge_faces(cutting *c, uint32_t begin, uint32_t end)
 {
     uint64_t at = 0;

@@ -1,14 +1,15 @@
 /* Finds the triangles that bound the result of the expression.
  *
- * Patches are triangles that are connected by edges of exactly two triangles. Around such an edge
- * there are two sectors, which both triangles separate; so along a patch all operands have the same
- * winding numbers in front, and the same behind. So have the listed faces of a component of whole
- * faces. They are computed at one inner point of the patch, exactly. The patch bounds the result if
- * the expression differs on its two sides. This rule covers coplanar faces, operands that touch,
+ * A patch is a set of triangles that are connected by edges of exactly two triangles. Around such
+ * an edge, the two triangles separate the space into two sectors. So the winding numbers of all
+ * operands are constant in front of a patch, and constant behind it. The same holds for a component
+ * of whole faces (operand_mesh.h), so its listed faces are joined to one patch. The winding numbers
+ * are computed exactly at an inner point of one triangle of the patch. The patch bounds the result
+ * if the expression differs on its two sides. This rule covers coplanar faces, operands that touch,
  * and operands that intersect themselves.
  *
- * The boundary of a set has no boundary, so at each edge the selected triangles have as many
- * directions one way as the other. This is checked before the result is used. */
+ * The boundary of a set is closed. So each edge occurs in the selected triangles equally often in
+ * both directions. This is checked before the result is used. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -27,10 +28,11 @@ static const char base_not_simple[] =
 
 /* --- edges --- */
 
-/* Each edge is listed at its vertex with the lower number: the other vertex << 32 | triangle << 1 |
- * 1 if the triangle has the edge from the higher to the lower number. */
+/* The edges of all triangles. Each edge is listed at its vertex with the lower number. An entry is
+ * (other vertex << 32 | triangle << 1 | direction). The direction is 1 if the triangle has the edge
+ * from the higher to the lower number. */
 typedef struct edge_lists {
-    uint64_t *begin; /* [vertices + 1] */
+    uint64_t *begin; /* [vertices + 1] index in `edge` of the first edge of each vertex */
     uint64_t *edge;
 } edge_lists;
 
@@ -71,9 +73,12 @@ static void free_edges(edge_lists *e)
 
 /* --- patches --- */
 
-/* A disjoint-set forest: the parent of each triangle << 1 | 1 if its orientation in the patch is
- * opposite to the parent's orientation. Roots are the first triangles of the patches. */
+/* Patches are kept in a disjoint-set forest. The entry of a triangle is (parent << 1 | flip). The
+ * flip is 1 if the triangle and its parent have opposite orientations in the patch. Roots are the
+ * first triangles of the patches. */
 
+/* Returns (root << 1 | flip), where the flip is that of the triangle relative to the root. Shortens
+ * the path to the root. */
 static uint32_t find_root(uint32_t *parent, uint32_t triangle)
 {
     uint32_t flips = 0;
@@ -86,7 +91,7 @@ static uint32_t find_root(uint32_t *parent, uint32_t triangle)
     return triangle << 1 | flips;
 }
 
-/* flipped: 1 if the triangles have opposite orientations. */
+/* Joins the patches of two triangles. flipped: 1 if the triangles have opposite orientations. */
 static void join_triangles(uint32_t *parent, uint32_t first, uint32_t second, uint32_t flipped)
 {
     uint32_t a = find_root(parent, first), b = find_root(parent, second);
@@ -97,6 +102,7 @@ static void join_triangles(uint32_t *parent, uint32_t first, uint32_t second, ui
         parent[a >> 1] = (b & ~UINT32_C(1)) | flipped;
 }
 
+/* Joins triangles at edges of exactly two triangles. */
 static void join_patches(const ebpo_cut_mesh *cut, const edge_lists *e, uint32_t *parent)
 {
     for (uint32_t t = 0; t < cut->count; t++)
@@ -113,8 +119,8 @@ static void join_patches(const ebpo_cut_mesh *cut, const edge_lists *e, uint32_t
     }
 }
 
-/* Returns the component of the whole face of a triangle; EBPO_NO_COMPONENT: the face is not whole.
- */
+/* Returns the component of the face from which a triangle was cut, and sets *operand to the face's
+ * operand. EBPO_NO_COMPONENT: the face is not whole. */
 static uint32_t component_of(const ebpo_cut_mesh *cut, uint32_t triangle, uint32_t *operand)
 {
     uint32_t face = cut->face[triangle];
@@ -122,10 +128,10 @@ static uint32_t component_of(const ebpo_cut_mesh *cut, uint32_t triangle, uint32
     return ebpo_face_list_component(cut->faces, *operand, face);
 }
 
-/* Joins the listed faces of each component. */
+/* Joins the listed faces of each component of whole faces to one patch. */
 static ebpo_status join_components(const ebpo_cut_mesh *cut, uint32_t *parent, ebpo_error *error)
 {
-    uint64_t begin[EBPO_BOOLEAN_OPERANDS_MAX], count = 0;
+    uint64_t begin[EBPO_BOOLEAN_OPERANDS_MAX], count = 0; /* first component of each operand */
     for (uint32_t i = 0; i < cut->faces->boolean->count; i++) {
         begin[i] = count;
         count += cut->faces->whole[i].components;
@@ -137,11 +143,11 @@ static ebpo_status join_components(const ebpo_cut_mesh *cut, uint32_t *parent, e
         uint32_t operand, component = component_of(cut, t, &operand);
         if (component == EBPO_NO_COMPONENT)
             continue;
-        uint32_t *of = &first[begin[operand] + component];
-        if (*of)
-            join_triangles(parent, *of - 1, t, 0);
+        uint32_t *entry = &first[begin[operand] + component];
+        if (*entry)
+            join_triangles(parent, *entry - 1, t, 0);
         else
-            *of = t + 1;
+            *entry = t + 1;
     }
     free(first);
     return EBPO_OK;
@@ -151,8 +157,8 @@ static ebpo_status join_components(const ebpo_cut_mesh *cut, uint32_t *parent, e
 
 typedef struct classifying {
     const ebpo_cut_mesh *cut;
-    const uint32_t *triangle; /* a triangle of each patch */
-    int8_t *sign;             /* sign of this triangle */
+    const uint32_t *triangle; /* [patch] the triangle of the patch that is classified */
+    int8_t *sign;             /* [patch] sign of this triangle (ebpo_cut_mesh_classify) */
 } classifying;
 
 /* Computes the mean of the triangle's corners. */
@@ -192,8 +198,9 @@ static void find_changes(const ebpo_cut_mesh *cut, uint32_t triangle,
             cut->cover[low].opposite ? -1 : 1;
 }
 
-/* Fails unless the base is wound as a simple solid on both sides of a triangle: its faces stay as
- * they are, so the mesh with the changes would have other winding numbers than 0 and 1. */
+/* Fails unless the base has the winding numbers of a simple solid, 0 or 1, on both sides of a
+ * triangle. Faces of the base that are not listed stay as they are. So with another winding number,
+ * the changed mesh would have winding numbers other than 0 and 1. */
 static ebpo_status check_base(int32_t front, int32_t behind, ebpo_error *error)
 {
     if ((front == 0 || front == 1) && (behind == 0 || behind == 1))
@@ -201,6 +208,7 @@ static ebpo_status check_base(int32_t front, int32_t behind, ebpo_error *error)
     return ebpo_fail(error, EBPO_E_UNSUPPORTED, "near the other operands, %s", base_not_simple);
 }
 
+/* Computes the sign of a triangle from the states of all operands in front of it and behind it. */
 static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle, unsigned worker,
                                      int8_t *sign, ebpo_error *error)
 {
@@ -211,7 +219,8 @@ static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle
     uint64_t in_front = 0, behind = 0;
     mpq_t middle[3];
     ebpo_status status = EBPO_OK;
-    /* winding numbers at the middle, shifted by an infinitesimal */
+    /* Winding numbers are computed at the middle, shifted by an infinitesimal. `shifted` is 1 if
+     * the shifted point is in front of the triangle, -1 if it is behind. */
     for (int k = 0; k < 3 && shifted == 0; k++)
         shifted = ebpo_normal_sign(k, ebpo_face_list_corner(faces, face, 0),
                                    ebpo_face_list_corner(faces, face, 1),
@@ -221,7 +230,7 @@ static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle
     for (uint32_t i = 0; i < b->count && status == EBPO_OK; i++) {
         ebpo_error cause = EBPO_ERROR_INIT;
         int32_t front = 0;
-        if (!faces->same[i])
+        if (!faces->equal[i])
             continue;
         status = ebpo_exact_winding(&b->solid[i], ebpo_boolean_context(b, worker, i),
                                     (const mpq_t *)middle, &front, &cause);
@@ -231,8 +240,8 @@ static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle
         if (status != EBPO_OK)
             status = ebpo_fail_operand(b->solid[i].model, i, &cause, error);
         ebpo_rule rule = b->solid[i].model->info->rule;
-        in_front |= ebpo_rule_inside(rule, front) ? faces->same[i] : 0;
-        behind |= ebpo_rule_inside(rule, front + change[i]) ? faces->same[i] : 0;
+        in_front |= ebpo_rule_inside(rule, front) ? faces->equal[i] : 0;
+        behind |= ebpo_rule_inside(rule, front + change[i]) ? faces->equal[i] : 0;
     }
     *sign = (int8_t)(ebpo_boolean_holds(b, behind) - ebpo_boolean_holds(b, in_front));
     mpq_clears(middle[0], middle[1], middle[2], NULL);
@@ -251,8 +260,9 @@ static ebpo_status classify_some(void *context, uint64_t begin, uint64_t end, un
 
 /* --- all patches --- */
 
-/* Chooses a triangle of each patch: if possible a whole face, at which queries are fastest. Sets
- * patch[t] to the number of the patch of triangle t. Returns the number of patches. */
+/* Chooses a triangle of each patch: if possible a face without partners, at which queries are
+ * fastest. Sets patch[t] to the number of the patch of triangle t. Returns the number of patches.
+ */
 static uint32_t choose_triangles(const ebpo_cut_mesh *cut, uint32_t *parent, uint32_t *patch,
                                  uint32_t *chosen)
 {
@@ -266,8 +276,8 @@ static uint32_t choose_triangles(const ebpo_cut_mesh *cut, uint32_t *parent, uin
             continue;
         }
         patch[t] = patch[root];
-        uint32_t best = cut->face[chosen[patch[t]]];
-        if (begin[best + 1] > begin[best] && begin[face + 1] == begin[face])
+        uint32_t chosen_face = cut->face[chosen[patch[t]]];
+        if (begin[chosen_face + 1] > begin[chosen_face] && begin[face + 1] == begin[face])
             chosen[patch[t]] = t;
     }
     return count;
@@ -300,10 +310,13 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
     return status;
 }
 
-/* Returns true if the selected triangles have each edge equally often in both directions. An edge
- * of a single whole face has another whole face of its component, which is not listed. If only
- * changes are wanted, they are balanced against all faces of the base, which is closed, or against
- * none: the faces that are not listed stay. */
+/* Returns true if each edge occurs in the selected triangles equally often in both directions.
+ *
+ * An edge that only one triangle has is not tested if its face is whole: the other face of the edge
+ * is a whole face of the same component, which is not listed. If the faces of the base that are not
+ * listed stay in the result (keeps_base), the difference between the selected triangles and all
+ * triangles of the base is tested. The base is closed, so the result is closed if this difference
+ * is. */
 static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)
 {
     for (uint64_t i = 0, next, all = 3 * cut->count, v = 0; i < all; i = next) {
@@ -350,7 +363,7 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
             cut->faces->changed_only
                 ? ebpo_fail(error, EBPO_E_UNSUPPORTED, "operand 1 is cut where %s", base_not_simple)
                 : ebpo_fail(error, EBPO_E_FORMAT,
-                            "the result is not closed; check that the operands are (ebpo "
+                            "the result is not closed; check that the operands are closed (ebpo "
                             "verify)");
     free_edges(&e);
     free(parent);

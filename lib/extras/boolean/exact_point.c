@@ -2,8 +2,9 @@
  * points intersects a plane, so coordinates stay fractions of integers with one denominator.
  *
  * Each point also has its coordinates rounded to the nearest double. Rounding keeps the order, so
- * different rounded coordinates decide comparisons, and equal points have equal rounded
- * coordinates, which serve as the key of the hash table. Turns have a filter in doubles. */
+ * different rounded coordinates decide comparisons. Equal points have equal rounded coordinates,
+ * which are the key of the hash table. A turn (the orientation of three points) is first computed
+ * in doubles with an error bound, and in integers only if its sign is not certain. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/exact_point.h"
@@ -98,6 +99,8 @@ void ebpo_exact_plane_along(ebpo_exact_plane *out, int axis, const ebpo_exact_po
     set_minor(out->n[3], p->x[u], q->x[v], p->x[v], q->x[u]);
 }
 
+/* Computes a number with the sign of the side of the plane on which the point is: the distance from
+ * the plane times a positive factor. */
 static void set_height(mpz_t out, const ebpo_exact_plane *plane, const ebpo_exact_point *p)
 {
     mpz_mul(out, plane->n[3], p->x[3]);
@@ -117,7 +120,7 @@ int ebpo_exact_side(const ebpo_exact_plane *plane, const ebpo_exact_point *p)
 
 /* --- intersections --- */
 
-/* Returns true if the double is the coordinate x / w * 2^unit in lowest terms. */
+/* Returns true if `rounded` is exactly x / w * 2^unit. The fraction x / w is reduced. */
 static bool is_double(const mpz_t x, const mpz_t w, double rounded, int unit)
 {
     mpz_t value, other;
@@ -133,6 +136,7 @@ static bool is_double(const mpz_t x, const mpz_t w, double rounded, int unit)
     return equal;
 }
 
+/* Divides the homogeneous coordinates by their greatest common divisor, and makes x[3] positive. */
 static void reduce_point(ebpo_exact_point *p)
 {
     mpz_t divisor;
@@ -157,8 +161,8 @@ static void round_point(ebpo_exact_point *p, int unit)
     }
 }
 
-void ebpo_exact_meet(ebpo_exact_point *out, const ebpo_exact_plane *plane,
-                     const ebpo_exact_point *p, const ebpo_exact_point *q, int unit)
+void ebpo_exact_intersect(ebpo_exact_point *out, const ebpo_exact_plane *plane,
+                          const ebpo_exact_point *p, const ebpo_exact_point *q, int unit)
 {
     mpz_t above, below;
     mpz_inits(above, below, NULL);
@@ -232,14 +236,15 @@ int ebpo_exact_turn(int axis, const ebpo_exact_point *a, const ebpo_exact_point 
     return sign;
 }
 
-/* Computes x[k] - at * x[3] in units of 2^unit / x[3]. unit: as for `at`, or less. */
-static void set_difference(mpz_t out, const ebpo_exact_point *p, int k, double at, int from,
+/* Computes (coordinate k of p - at) * x[3] in units of 2^unit. p has the unit `point_unit`.
+ * unit <= point_unit, and `at` is a multiple of 2^unit. */
+static void set_difference(mpz_t out, const ebpo_exact_point *p, int k, double at, int point_unit,
                            int unit)
 {
     mpz_t value;
     mpz_init(value);
     ebpo_set_integer(value, at, unit);
-    mpz_mul_2exp(out, p->x[k], (mp_bitcnt_t)(from - unit));
+    mpz_mul_2exp(out, p->x[k], (mp_bitcnt_t)(point_unit - unit));
     mpz_submul(out, value, p->x[3]);
     mpz_clear(value);
 }
@@ -277,7 +282,7 @@ static uint64_t hash_point(const double at[3])
     return ebpo_hash_three(bits);
 }
 
-/* Returns the point's entry of the table, or a free entry. */
+/* Returns the table entry of a point that is equal to p, or a free entry. */
 static uint32_t *find_point(const ebpo_point_set *set, const ebpo_exact_point *p)
 {
     uint64_t i, mask = set->table_size - 1;
@@ -323,7 +328,7 @@ bool ebpo_point_set_add(ebpo_point_set *set, ebpo_exact_point *p, uint32_t *numb
 void ebpo_point_set_empty(ebpo_point_set *set)
 {
     if (set->table_size > 1024 && set->count < set->table_size / 64) {
-        free(set->table); /* a small set must not clear a large table each time */
+        free(set->table); /* clearing a large table each time for a small set would be slow */
         set->table = NULL;
         set->table_size = 0;
     }

@@ -1,5 +1,8 @@
-/* Points and planes without rounding, and sets of points in which equal points have one number. For
- * one thread. GMP ends the program when memory is short. */
+/* Computes points and planes without rounding, and keeps sets of points in which equal points have
+ * one number. Each object is for one thread. If memory is short, GMP ends the program.
+ *
+ * A plane or three points are *seen against an axis* by an observer who looks in the direction of
+ * the negative axis: x, y and z axes are seen with y, z, x to the right and z, x, y upwards. */
 #ifndef EBPO_BOOLEAN_EXACT_POINT_H
 #define EBPO_BOOLEAN_EXACT_POINT_H
 
@@ -8,11 +11,11 @@
 #include <stdint.h>
 
 /* A point in homogeneous integer coordinates: coordinate k is x[k] / x[3] * 2^unit, x[3] > 0. All
- * points of a calculation have the same unit. */
+ * points of a calculation have the same unit, which callers pass to the functions that need it. */
 typedef struct ebpo_exact_point {
     mpz_t x[4];
     double at[3]; /* the coordinates, rounded to the nearest double; never -0 */
-    bool exact;   /* the coordinates are doubles */
+    bool exact;   /* `at` are exactly the coordinates */
 } ebpo_exact_point;
 
 /* A plane: the points with n[0] x[0] + n[1] x[1] + n[2] x[2] + n[3] x[3] = 0. */
@@ -32,18 +35,18 @@ void ebpo_exact_point_set(ebpo_exact_point *out, const double x[3], int unit);
 /* Computes the plane through three points whose x[3] is 1. */
 void ebpo_exact_plane_through(ebpo_exact_plane *out, const ebpo_exact_point corner[3]);
 
-/* Computes the plane through two points that is parallel to an axis. Seen against the axis, its
- * positive side is to the left of the direction from p to q. */
+/* Computes the plane that contains two points and is parallel to an axis. Seen against the axis,
+ * the positive side of the plane is to the left of the direction from p to q. */
 void ebpo_exact_plane_along(ebpo_exact_plane *out, int axis, const ebpo_exact_point *p,
                             const ebpo_exact_point *q);
 
 /* Returns the side of the plane, -1, 0 or 1, on which the point is. */
 int ebpo_exact_side(const ebpo_exact_plane *plane, const ebpo_exact_point *p);
 
-/* Computes the point where the line through p and q, which are not both in the plane, intersects
- * the plane. `out` is neither of them. */
-void ebpo_exact_meet(ebpo_exact_point *out, const ebpo_exact_plane *plane,
-                     const ebpo_exact_point *p, const ebpo_exact_point *q, int unit);
+/* Computes the point where the line through p and q intersects the plane. p and q must not both be
+ * in the plane, and `out` must be neither of them. */
+void ebpo_exact_intersect(ebpo_exact_point *out, const ebpo_exact_plane *plane,
+                          const ebpo_exact_point *p, const ebpo_exact_point *q, int unit);
 
 /* Compares coordinate k of two points: -1, 0 or 1. */
 int ebpo_exact_compare(const ebpo_exact_point *p, const ebpo_exact_point *q, int k);
@@ -51,26 +54,27 @@ int ebpo_exact_compare(const ebpo_exact_point *p, const ebpo_exact_point *q, int
 /* Compares two points by x, then y, then z. */
 int ebpo_exact_order(const ebpo_exact_point *p, const ebpo_exact_point *q);
 
-/* Returns the sign of the turn a, b, c seen against the axis: 1 for counter-clockwise. */
+/* Returns the turn (the orientation) of three points seen against the axis: 1 if a, b, c are
+ * counter-clockwise, -1 if they are clockwise, 0 if they are on a line. */
 int ebpo_exact_turn(int axis, const ebpo_exact_point *a, const ebpo_exact_point *b,
                     const ebpo_exact_point *c);
 
-/* Returns the sign of the difference between coordinate k and its rounded value. */
+/* Returns the sign of coordinate k minus its rounded value p->at[k]. */
 int ebpo_exact_side_of_double(const ebpo_exact_point *p, int k, int unit);
 
 /* Returns the distance between the point and `at`, rounded. */
 double ebpo_exact_distance(const ebpo_exact_point *p, const double at[3], int unit);
 
-/* Different points. A zero struct is an empty set. */
+/* A set of different points, numbered from 0. A zero struct is an empty set. */
 typedef struct ebpo_point_set {
-    ebpo_exact_point *point; /* [count]; those up to `made` are initialized */
+    ebpo_exact_point *point; /* [count]; the first `made` entries are initialized */
     uint64_t count, made, capacity;
     uint32_t *table; /* open addressing: number of a point + 1; 0: free */
     uint64_t table_size;
 } ebpo_point_set;
 
-/* Finds or adds a point, whose contents are exchanged for those of an unused point if it is new.
- * Returns false without memory or with 2^31 points. */
+/* Finds or adds a point. If the point is new, its contents move into the set, and *p gets the
+ * contents of an unused point. Returns false without memory or with 2^31 points. */
 bool ebpo_point_set_add(ebpo_point_set *set, ebpo_exact_point *p, uint32_t *number);
 /* Removes all points; keeps the memory. */
 void ebpo_point_set_empty(ebpo_point_set *set);

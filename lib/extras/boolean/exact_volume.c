@@ -1,12 +1,11 @@
-/* Computes the exact volume of the result of a boolean expression, if no face of an operand
- * intersects a face of another operand.
+/* Computes the exact volume of the result of a Boolean expression, if no face of an operand
+ * intersects a face of another operand, and no operand intersects itself.
  *
- * Then each patch of connected faces is entirely in or out of every other operand. So a whole patch
- * bounds the result, from inside or from outside, or none of its faces does. The signed volumes
- * below the bounding faces add up to the volume. They are summed without rounding: in a long
- * accumulator if products of coordinates are exact in doubles, otherwise in integers (GMP). The sum
- * is rounded once. If faces intersect, the result names a pair of them as the reason why there is
- * no exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
+ * Then each patch of connected faces is entirely in or out of every other operand. So either all
+ * faces of a patch bound the result (or all faces reversed), or no face of the patch does. The
+ * volumes below the bounding faces are summed without rounding (volume_sum.h), and the sum is
+ * rounded once. If faces intersect, the result names a pair of intersecting faces as the reason why
+ * there is no exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,15 +31,17 @@ static const char stage[] = "exact volume";
 
 enum { PATCHES_GRAIN = 16, FACES_GRAIN = 1 << 14 };
 
+/* The measurement of one expression. */
 typedef struct measuring {
     const ebpo_boolean *b;
     ebpo_volume_options options;
     ebpo_exact_volume *out;
-    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* see ebpo_boolean_find_equal */
-    ebpo_volume_sum *sum;                     /* [threads] */
+    uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX]; /* see ebpo_boolean_find_equal */
+    ebpo_volume_sum *sum;                      /* [threads] */
 } measuring;
 
-static bool is_first(const measuring *m, uint32_t i) { return m->same[i] != 0; }
+/* Returns true if the expression uses operand i, and no earlier operand is equal. */
+static bool is_first(const measuring *m, uint32_t i) { return m->equal[i] != 0; }
 
 /* --- operands of the expression --- */
 
@@ -58,6 +59,7 @@ static void bound_by_box(measuring *m)
     m->out->volume = ebpo_value_bounds_of(0, most);
 }
 
+/* Sets the reason why there is no exact volume, and the operands i and k that it concerns. */
 static void note_doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
 {
     m->out->doubt = why;
@@ -82,13 +84,14 @@ static ebpo_status make_collider(const measuring *m, uint32_t i, uint32_t k,
                                  ebpo_collide_options *options, ebpo_collider **out,
                                  ebpo_error *error)
 {
-    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
+    ebpo_collider_options collider_options = EBPO_COLLIDER_OPTIONS_INIT;
     *options = (ebpo_collide_options)EBPO_COLLIDE_OPTIONS_INIT;
-    how.threads = m->b->threads;
+    collider_options.threads = m->b->threads;
     options->pose_a = m->b->pose[i];
     options->pose_b = m->b->pose[k];
     options->progress = m->options.progress;
-    return ebpo_collider_new(m->b->solid[i].model, m->b->solid[k].model, &how, out, error);
+    return ebpo_collider_new(m->b->solid[i].model, m->b->solid[k].model, &collider_options, out,
+                             error);
 }
 
 static void name_faces(ebpo_exact_volume *out, const ebpo_face_pair *pair)
@@ -99,6 +102,7 @@ static void name_faces(ebpo_exact_volume *out, const ebpo_face_pair *pair)
     out->face[1] = pair->face_b;
 }
 
+/* Notes a doubt if faces of operands i and k intersect. */
 static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *error)
 {
     ebpo_collider *collider;
@@ -134,13 +138,15 @@ static ebpo_status check_pairs(measuring *m, ebpo_error *error)
 
 typedef struct operand {
     measuring *m;
-    uint32_t number;
+    uint32_t number; /* index in m->b->solid */
     const ebpo_posed_solid *solid;
-    uint32_t *slots, *patch; /* indexed by the face's number in the file: the face's slot, and the
-                              * first face of its patch */
-    uint32_t *head;          /* first faces of the patches */
+    uint32_t *slots; /* [face in the file] position of the face in the model in memory */
+    uint32_t *patch; /* [face in the file] first face of its patch */
+    uint32_t *head;  /* first faces of the patches */
     uint64_t heads;
-    int8_t *times; /* indexed by a patch's first face: the factor of its faces: -1, 0 or 1 */
+    /* [first face of a patch] 1: the faces of the patch bound the result; -1: the reversed faces
+     * do; 0: neither */
+    int8_t *sign;
 } operand;
 
 static void pose_face(const operand *o, uint64_t face, double t[3][3])
@@ -160,13 +166,14 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
     const operand *o = user;
     for (uint64_t i = 0; i < count && !o->m->out->doubt; i++) {
         if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
-            continue; /* the patch does not bound the result */
+            continue; /* a face without area changes no volume */
         note_doubt(o->m, EBPO_VOLUME_FACES_INTERSECT, o->number, o->number);
         name_faces(o->m->out, &pairs[i]);
     }
     return !o->m->out->doubt;
 }
 
+/* Notes a doubt if faces of the operand intersect each other. */
 static ebpo_status check_self(operand *o, ebpo_error *error)
 {
     ebpo_collider *collider;
@@ -181,8 +188,8 @@ static ebpo_status check_self(operand *o, ebpo_error *error)
 
 /* --- patches that bound the result --- */
 
-/* Computes the operand's winding number in the middle of the face, which no other face intersects.
- */
+/* Computes the operand's winding number at the mean of the corners of a face, shifted by an
+ * infinitesimal (ebpo_exact_winding). No other face contains this point. */
 static ebpo_status own_winding(const operand *o, ebpo_context *context, const double t[3][3],
                                int32_t *winding, ebpo_error *error)
 {
@@ -206,6 +213,8 @@ static ebpo_status own_winding(const operand *o, ebpo_context *context, const do
 static ebpo_status winding_in_front(const operand *o, unsigned worker, const double t[3][3],
                                     int32_t *front, ebpo_error *error)
 {
+    /* sign of the component of the normal along the infinitesimal shift: below 0, the shifted point
+     * is behind the face, where the winding number is greater by 1 */
     int shifted = 0;
     for (int k = 0; k < 3 && shifted == 0; k++)
         shifted = ebpo_normal_sign(k, t[0], t[1], t[2]);
@@ -215,9 +224,9 @@ static ebpo_status winding_in_front(const operand *o, unsigned worker, const dou
     return status;
 }
 
-/* Finds the other operands that contain the face, a bit for each. */
-static ebpo_status find_around(const operand *o, unsigned worker, const double w[3], uint64_t *in,
-                               ebpo_error *error)
+/* Sets in *in a bit for each other operand that contains the point, a corner of a face. */
+static ebpo_status find_around(const operand *o, unsigned worker, const double point[3],
+                               uint64_t *in, ebpo_error *error)
 {
     const measuring *m = o->m;
     ebpo_status status = EBPO_OK;
@@ -227,21 +236,24 @@ static ebpo_status find_around(const operand *o, unsigned worker, const double w
         const ebpo_posed_solid *solid = &m->b->solid[i];
         if (i == o->number || !is_first(m, i))
             continue;
-        status =
-            ebpo_posed_solid_sides(solid, ebpo_boolean_context(m->b, worker, i), w, &sides, error);
+        status = ebpo_posed_solid_sides(solid, ebpo_boolean_context(m->b, worker, i), point, &sides,
+                                        error);
         if (status == EBPO_OK && ebpo_rule_inside(solid->model->info->rule, sides.above))
-            *in |= m->same[i];
+            *in |= m->equal[i];
     }
     return status;
 }
 
+/* Returns 1 if a point with this winding number in the operand is in the result, else 0. around: a
+ * bit for each other operand that contains the point. */
 static int is_in(const operand *o, uint64_t around, int32_t winding)
 {
     bool inside = ebpo_rule_inside(o->solid->model->info->rule, winding);
-    uint64_t in = around | (inside ? o->m->same[o->number] : 0);
+    uint64_t in = around | (inside ? o->m->equal[o->number] : 0);
     return ebpo_boolean_holds(o->m->b, in);
 }
 
+/* Computes the signs of patches. */
 static ebpo_status query_patches(void *user, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -255,7 +267,7 @@ static ebpo_status query_patches(void *user, uint64_t begin, uint64_t end, unsig
         status = winding_in_front(o, worker, (const double(*)[3])t, &front, error);
         if (status == EBPO_OK)
             status = find_around(o, worker, t[0], &around, error);
-        o->times[o->head[i]] = (int8_t)(is_in(o, around, front + 1) - is_in(o, around, front));
+        o->sign[o->head[i]] = (int8_t)(is_in(o, around, front + 1) - is_in(o, around, front));
     }
     return status;
 }
@@ -267,15 +279,16 @@ static ebpo_status add_faces(void *user, uint64_t begin, uint64_t end, unsigned 
     (void)error;
     for (uint64_t f = begin; f < end; f++) {
         double t[3][3];
-        int times = o->times[o->patch[f]];
-        if (times == 0)
+        int sign = o->sign[o->patch[f]];
+        if (sign == 0)
             continue;
         pose_face(o, f, t);
-        ebpo_volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, times);
+        ebpo_volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, sign);
     }
     return EBPO_OK;
 }
 
+/* Lists the first faces of patches. A face without area is a patch that is not listed. */
 static ebpo_status find_heads(operand *o, uint64_t faces, ebpo_error *error)
 {
     uint64_t capacity = 0;
@@ -286,8 +299,8 @@ static ebpo_status find_heads(operand *o, uint64_t faces, ebpo_error *error)
             return ebpo_fail_memory(error, (o->heads + 1) * sizeof *o->head);
         o->head[o->heads++] = f;
     }
-    o->times = ebpo_alloc_zero(faces, sizeof *o->times);
-    return o->times ? EBPO_OK : ebpo_fail_memory(error, faces);
+    o->sign = ebpo_alloc_zero(faces, sizeof *o->sign);
+    return o->sign ? EBPO_OK : ebpo_fail_memory(error, faces);
 }
 
 static ebpo_status add_patches(operand *o, ebpo_error *error)
@@ -307,7 +320,7 @@ static ebpo_status add_patches(operand *o, ebpo_error *error)
                               whole->face_count, FACES_GRAIN, add_faces, o, progress, stage, error);
     o->m->out->patches += o->heads;
     for (uint64_t i = 0; i < o->heads && status == EBPO_OK; i++)
-        o->m->out->bounding += o->times[o->head[i]] != 0;
+        o->m->out->bounding += o->sign[o->head[i]] != 0;
     return status;
 }
 
@@ -323,7 +336,7 @@ static ebpo_status add_operand(measuring *m, uint32_t number, ebpo_error *error)
     free(o.slots);
     free(o.patch);
     free(o.head);
-    free(o.times);
+    free(o.sign);
     return status;
 }
 
@@ -371,7 +384,7 @@ ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean, const ebpo_volume_o
         status = EBPO_CHECK_SIZED(ebpo_exact_volume, out, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_boolean_find_equal(m.b, m.same);
+    ebpo_boolean_find_equal(m.b, m.equal);
     bound_by_box(&m);
     if (found.volume.hi > 0) {
         check_models(&m);

@@ -1,13 +1,14 @@
 /* Cuts one face along its intersections with other faces.
  *
- * Two faces in different planes intersect in a segment or a point on the common line of the planes.
- * Each face has an interval on this line; the exact ends of both intervals are compared. In one
- * plane, the edges of the other face are clipped to the face. All segments and the edges of the
- * face are divided where they intersect, and the face is triangulated with the parts as edges.
+ * If two faces are in different planes, they intersect in a segment or a point on the common line
+ * of the planes. Each face has an interval on this line; the exact ends of both intervals are
+ * compared. If two faces are in one plane, the edges of the other face are clipped to the face. All
+ * segments and the edges of the face are divided where they intersect, and the face is triangulated
+ * so that the undivided parts are edges.
  *
- * Both faces of a pair get the same points, so the triangles on both sides of a cut, and on both
- * sides of a common edge of two faces, have equal vertices. If several faces cover a triangle in
- * one plane, only the first of them keeps it and notes the others. */
+ * Both faces of a pair get the same points. So the triangles on both sides of a cut, and on both
+ * sides of a common edge of two faces, have equal vertices. If several faces in one plane contain a
+ * triangle, only the first of these faces keeps the triangle, and notes the other faces. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/face_cut.h"
@@ -31,7 +32,7 @@ void ebpo_face_cutter_init(ebpo_face_cutter *cutter, const ebpo_face_list *faces
         for (int k = 0; k < 2; k++)
             ebpo_exact_point_init(&cutter->end[i][k]);
     }
-    ebpo_exact_point_init(&cutter->meeting);
+    ebpo_exact_point_init(&cutter->copy);
 }
 
 void ebpo_face_cutter_free(ebpo_face_cutter *cutter)
@@ -45,7 +46,7 @@ void ebpo_face_cutter_free(ebpo_face_cutter *cutter)
         for (int k = 0; k < 2; k++)
             ebpo_exact_point_clear(&cutter->end[i][k]);
     }
-    ebpo_exact_point_clear(&cutter->meeting);
+    ebpo_exact_point_clear(&cutter->copy);
     free(cutter->coplanar);
     free(cutter->kept);
     free(cutter->cover);
@@ -75,10 +76,11 @@ static void copy_point(ebpo_exact_point *out, const ebpo_exact_point *p)
 /* Adds a copy of a point to the arrangement. */
 static bool add_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint32_t *number)
 {
-    copy_point(&c->meeting, p);
-    return ebpo_point_set_add(&c->arrangement.set, &c->meeting, number);
+    copy_point(&c->copy, p);
+    return ebpo_point_set_add(&c->arrangement.set, &c->copy, number);
 }
 
+/* Sets the corners of the face that is cut (which: 0) or of the other face (which: 1). */
 static void set_corners(ebpo_face_cutter *c, int which, uint32_t face)
 {
     for (int i = 0; i < 3; i++)
@@ -88,8 +90,9 @@ static void set_corners(ebpo_face_cutter *c, int which, uint32_t face)
 
 /* --- faces in different planes --- */
 
-/* Computes the ends of the part of a face in the other face's plane, in order. `side`: sides of its
- * corners, not all 0. Returns false if there is no such part. */
+/* Computes the ends, in order, of the part of a face that is in the other face's plane. which: 0
+ * for the face that is cut, 1 for the other face. side: the sides of the other face's plane on
+ * which the corners are, not all 0. Returns false if no point of the face is in that plane. */
 static bool find_ends(ebpo_face_cutter *c, int which, const int side[3])
 {
     ebpo_exact_point *end = c->end[which], *corner = c->corner[which];
@@ -99,8 +102,8 @@ static bool find_ends(ebpo_face_cutter *c, int which, const int side[3])
             copy_point(&end[n++], &corner[i]);
     for (int i = 0; i < 3 && n < 2; i++)
         if (side[i] * side[next_index(i)] < 0)
-            ebpo_exact_meet(&end[n++], &c->plane[!which], &corner[i], &corner[next_index(i)],
-                            c->unit);
+            ebpo_exact_intersect(&end[n++], &c->plane[!which], &corner[i], &corner[next_index(i)],
+                                 c->unit);
     if (n == 1)
         copy_point(&end[1], &end[0]);
     else if (n == 2 && ebpo_exact_order(&end[0], &end[1]) > 0)
@@ -108,12 +111,15 @@ static bool find_ends(ebpo_face_cutter *c, int which, const int side[3])
     return n > 0;
 }
 
+/* Adds the segment in which two faces in different planes intersect, if they do. side, other_side:
+ * the sides of the other plane on which the corners of each face are. */
 static bool cut_through(ebpo_face_cutter *c, const int side[3], const int other_side[3])
 {
     uint32_t from, to;
     ebpo_exact_plane_through(&c->plane[1], c->corner[1]);
     if (!find_ends(c, 0, side) || !find_ends(c, 1, other_side))
         return true;
+    /* the intersection of both intervals: from the later first end to the earlier last end */
     const ebpo_exact_point *first = &c->end[ebpo_exact_order(&c->end[0][0], &c->end[1][0]) < 0][0];
     const ebpo_exact_point *last = &c->end[ebpo_exact_order(&c->end[0][1], &c->end[1][1]) > 0][1];
     if (ebpo_exact_order(first, last) > 0)
@@ -124,7 +130,8 @@ static bool cut_through(ebpo_face_cutter *c, const int side[3], const int other_
 
 /* --- faces in one plane --- */
 
-/* Adds a point of an edge, and notes the first and last such point in the order along the edge. */
+/* Adds a point of an edge. range: the first and the last added point in the order along the edge.
+ * *count: number of added points. */
 static bool note_edge_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint32_t range[2],
                             int *count)
 {
@@ -140,11 +147,11 @@ static bool note_edge_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint
     return true;
 }
 
-/* Adds the part of the edge from p to q in the face. */
+/* Adds the part of the edge from p to q, of another face in the plane, that is in the face. */
 static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo_exact_point *q)
 {
-    int of_p[3], of_q[3], count = 0;
-    bool fine = true, p_in = true, q_in = true;
+    int of_p[3], of_q[3], count = 0; /* of_p, of_q: 1 if the point is inside edge i, -1 outside */
+    bool added = true, p_in = true, q_in = true;
     uint32_t range[2] = { 0, 0 };
     for (int i = 0; i < 3; i++) {
         const ebpo_exact_point *a = &c->corner[0][i], *b = &c->corner[0][next_index(i)];
@@ -156,24 +163,25 @@ static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo
             return true;
     }
     if (p_in)
-        fine = note_edge_point(c, p, range, &count);
+        added = note_edge_point(c, p, range, &count);
     if (q_in)
-        fine = fine && note_edge_point(c, q, range, &count);
-    for (int i = 0; i < 3 && fine; i++) {
+        added = added && note_edge_point(c, q, range, &count);
+    for (int i = 0; i < 3 && added; i++) {
         const ebpo_exact_point *a = &c->corner[0][i], *b = &c->corner[0][next_index(i)];
         int of_a = ebpo_exact_turn(c->axis, p, q, a), of_b = ebpo_exact_turn(c->axis, p, q, b);
         bool before = ebpo_exact_order(p, a) < 0, after = ebpo_exact_order(a, q) < 0;
         if (of_a == 0 && before == after)
-            fine = note_edge_point(c, a, range, &count);
+            added = note_edge_point(c, a, range, &count);
         if (of_a * of_b < 0 && of_p[i] * of_q[i] < 0) {
             ebpo_exact_plane_along(&c->arrangement.line, c->axis, a, b);
-            ebpo_exact_meet(&c->end[0][0], &c->arrangement.line, p, q, c->unit);
-            fine = fine && note_edge_point(c, &c->end[0][0], range, &count);
+            ebpo_exact_intersect(&c->end[0][0], &c->arrangement.line, p, q, c->unit);
+            added = added && note_edge_point(c, &c->end[0][0], range, &count);
         }
     }
-    return fine && (count == 0 || ebpo_arrangement_2d_add(&c->arrangement, range[0], range[1]));
+    return added && (count == 0 || ebpo_arrangement_2d_add(&c->arrangement, range[0], range[1]));
 }
 
+/* Adds the parts of the edges of another face in the plane that are in the face. */
 static bool cut_in_plane(ebpo_face_cutter *c, uint32_t other)
 {
     if (!ebpo_grow(&c->coplanar, &c->coplanar_capacity, c->coplanar_count + 1, sizeof *c->coplanar))
@@ -257,7 +265,7 @@ static bool triangulate_face(ebpo_face_cutter *c)
 
 /* --- covers --- */
 
-/* Box of the rounded coordinates that are seen. */
+/* A box of a triangle's rounded coordinates on the two axes that are seen. */
 typedef struct ebpo_triangle_box {
     double low[2], high[2];
     uint32_t triangle;
@@ -296,8 +304,8 @@ static bool bound_triangles(ebpo_face_cutter *c)
     return true;
 }
 
-/* Returns true if the other face, whose orientation is given, contains the triangle. A triangle
- * does not cross edges of the other face, so it is in that face if its corners are. */
+/* Returns true if the other face contains the triangle. The triangle does not cross edges of the
+ * other face, so it is in that face if its corners are. orientation: that of the other face. */
 static bool is_covered(const ebpo_face_cutter *c, uint32_t triangle, int orientation)
 {
     const uint32_t *corner = c->triangulation.triangle[triangle].corner;
@@ -311,7 +319,7 @@ static bool is_covered(const ebpo_face_cutter *c, uint32_t triangle, int orienta
     return true;
 }
 
-/* Returns the first box whose least coordinate is at least `low`. */
+/* Returns the index of the first box whose lower end on the first axis is at least `low`. */
 static uint64_t find_box(const ebpo_face_cutter *c, double low)
 {
     uint64_t begin = 0, end = c->triangulation.count;
@@ -325,14 +333,14 @@ static uint64_t find_box(const ebpo_face_cutter *c, double low)
     return begin;
 }
 
-/* Notes the triangles in another face of the plane. */
+/* Notes the triangles that another face of the plane covers. */
 static bool note_covers(ebpo_face_cutter *c, uint32_t other)
 {
     set_corners(c, 1, other);
-    const ebpo_exact_point *q = c->corner[1], *const of[3] = { &q[0], &q[1], &q[2] };
+    const ebpo_exact_point *q = c->corner[1], *const corners[3] = { &q[0], &q[1], &q[2] };
     int orientation = ebpo_exact_turn(c->axis, &q[0], &q[1], &q[2]);
     ebpo_triangle_box face;
-    bound_points(c->axis, of, &face);
+    bound_points(c->axis, corners, &face);
     for (uint64_t i = find_box(c, face.low[0]);
          i < c->triangulation.count && c->box[i].low[0] <= face.high[0]; i++) {
         const ebpo_triangle_box *box = &c->box[i];
@@ -356,6 +364,7 @@ static int order_covers(const void *a, const void *b)
     return (x->face > y->face) - (x->face < y->face);
 }
 
+/* Finds the covers of all triangles, and numbers the triangles that are kept. */
 static bool find_covers(ebpo_face_cutter *c)
 {
     uint32_t count = 0, covers = 0;
@@ -415,11 +424,11 @@ bool ebpo_face_cut(ebpo_face_cutter *cutter, uint32_t face, ebpo_face_pieces *ou
 {
     const ebpo_face_list *faces = cutter->faces;
     *out = (ebpo_face_pieces){ 0 };
-    bool fine = begin_face(cutter, face);
-    for (uint64_t i = faces->begin[face]; i < faces->begin[face + 1] && fine; i++)
-        fine = cut_by_face(cutter, faces->partner[i]);
-    fine = fine && triangulate_face(cutter) && find_covers(cutter) && copy_pieces(cutter, out);
-    if (!fine)
+    bool added = begin_face(cutter, face);
+    for (uint64_t i = faces->begin[face]; i < faces->begin[face + 1] && added; i++)
+        added = cut_by_face(cutter, faces->partner[i]);
+    added = added && triangulate_face(cutter) && find_covers(cutter) && copy_pieces(cutter, out);
+    if (!added)
         ebpo_face_pieces_free(out);
-    return fine;
+    return added;
 }

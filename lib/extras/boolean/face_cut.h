@@ -6,19 +6,19 @@
 #include "extras/boolean/plane_arrangement.h"
 #include "extras/boolean/plane_triangulation.h"
 
-/* Another face in the same plane that covers a triangle. */
+/* States that a triangle is covered: another face in the same plane contains the triangle. */
 typedef struct ebpo_cover {
     uint32_t triangle;
-    uint32_t face;
-    bool opposite; /* the normals are opposite */
+    uint32_t face; /* the other face, listed (face_list.h) */
+    bool opposite; /* the normals of both faces are opposite */
 } ebpo_cover;
 
-/* The triangles of a face, oriented as the face. Triangles that a face with a lower number covers
- * are omitted. */
+/* The triangles of a face, oriented as the face. A triangle that is covered by a face with a lower
+ * index is omitted. */
 typedef struct ebpo_face_pieces {
     ebpo_exact_point *point;
     uint32_t points;
-    uint32_t (*triangle)[3]; /* corners as numbers of points */
+    uint32_t (*triangle)[3]; /* corners as indices of points */
     uint32_t triangles;
     ebpo_cover *cover; /* sorted by triangle */
     uint32_t covers;
@@ -26,22 +26,23 @@ typedef struct ebpo_face_pieces {
 
 void ebpo_face_pieces_free(ebpo_face_pieces *pieces);
 
-/* Scratch memory. */
+/* Scratch memory for cutting one face after the other. */
 typedef struct ebpo_face_cutter {
     const ebpo_face_list *faces;
-    int unit;
-    uint32_t face;
-    int axis;        /* the face is seen against this axis */
-    int orientation; /* 1: it is counter-clockwise */
+    int unit;        /* coordinates are multiples of 2^unit */
+    uint32_t face;   /* the face that is cut */
+    int axis;        /* the face is seen against this axis (exact_point.h) */
+    int orientation; /* the face is seen counter-clockwise: 1, clockwise: -1 */
     ebpo_arrangement_2d arrangement;
     ebpo_triangulation triangulation;
-    ebpo_exact_point corner[2][3]; /* of the face, and of the other face */
-    ebpo_exact_plane plane[2];     /* of both */
-    ebpo_exact_point end[2][2],
-        meeting;        /* ends of the segments where each is in the other's plane */
-    uint32_t *coplanar; /* other faces in the plane of the face */
+    ebpo_exact_point corner[2][3]; /* corners of the face, and of the other face of a pair */
+    ebpo_exact_plane plane[2];     /* planes of both faces */
+    ebpo_exact_point end[2][2];    /* ends of the part of each face in the plane of the other */
+    ebpo_exact_point copy;         /* used by add_point */
+    uint32_t *coplanar;            /* other faces in the plane of the face */
     uint64_t coplanar_count, coplanar_capacity;
-    uint32_t *kept; /* triangles of the triangulation that are not omitted, as their numbers + 1 */
+    uint32_t *kept; /* for each triangle of the triangulation: 0: omitted; else its index in the
+                     * result + 1 */
     uint64_t kept_capacity;
     ebpo_cover *cover;
     uint64_t covers, cover_capacity;
@@ -49,7 +50,7 @@ typedef struct ebpo_face_cutter {
     uint64_t box_capacity;
 } ebpo_face_cutter;
 
-/* unit: all coordinates of the faces with partners are multiples of 2^unit. */
+/* Begins. unit: all coordinates of the faces with partners are multiples of 2^unit. */
 void ebpo_face_cutter_init(ebpo_face_cutter *cutter, const ebpo_face_list *faces, int unit);
 void ebpo_face_cutter_free(ebpo_face_cutter *cutter);
 

@@ -4,9 +4,9 @@
  * is read once to find which of its faces to list. So the size of the list depends on the cut, not
  * on the size of the models.
  *
- * The partners of a face are the faces that it is paired with. Faces without area have no partners:
- * they bound nothing. The points of their edges are corners of faces with an area; the pairs of
- * these faces with the faces that they touch are found. */
+ * The partners of a face are the faces with which it is paired. Faces without area bound nothing,
+ * so they have no partners. The points of their edges are corners of faces with an area, and the
+ * pairs of these faces are found. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/face_list.h"
@@ -28,8 +28,8 @@
 
 typedef struct pair_search {
     ebpo_face_list *faces;
-    uint8_t operand[2];
-    bool full;
+    uint8_t operand[2]; /* the operands of the two faces of each pair */
+    bool full;          /* there was not enough memory for a pair */
 } pair_search;
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
@@ -45,6 +45,7 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return !s->full;
 }
 
+/* Adds the pairs of intersecting faces of operands i and k; i == k: self-intersections. */
 static ebpo_status search_operands(ebpo_face_list *faces, uint32_t i, uint32_t k,
                                    const ebpo_progress *progress, ebpo_error *error)
 {
@@ -52,16 +53,16 @@ static ebpo_status search_operands(ebpo_face_list *faces, uint32_t i, uint32_t k
     const double *x = b->solid[i].box, *y = b->solid[k].box;
     pair_search s = { .faces = faces, .operand = { (uint8_t)i, (uint8_t)k } };
     ebpo_collider *collider;
-    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
+    ebpo_collider_options collider_options = EBPO_COLLIDER_OPTIONS_INIT;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     if (ebpo_box_gap(x, x + 3, y, y + 3) > 0)
         return EBPO_OK;
-    how.threads = b->threads;
+    collider_options.threads = b->threads;
     options.pose_a = b->pose[i];
     options.pose_b = b->pose[k];
     options.progress = *progress;
-    ebpo_status status =
-        ebpo_collider_new(b->solid[i].model, b->solid[k].model, &how, &collider, error);
+    ebpo_status status = ebpo_collider_new(b->solid[i].model, b->solid[k].model, &collider_options,
+                                           &collider, error);
     if (status != EBPO_OK)
         return status;
     status = i == k ? ebpo_collide_self_posed(collider, &options, take_pairs, &s, error)
@@ -77,39 +78,41 @@ static ebpo_status find_pairs(ebpo_face_list *faces, const ebpo_progress *progre
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint32_t k = i; k < count && status == EBPO_OK; k++)
-            if (faces->same[i] && faces->same[k] && !(i == k && ebpo_face_list_is_base(faces, i)))
+            if (faces->equal[i] && faces->equal[k] && !(i == k && ebpo_face_list_is_base(faces, i)))
                 status = search_operands(faces, i, k, progress, error);
     return status;
 }
 
 /* --- listing --- */
 
-/* Numbers a corner, and notes its signs of zero. */
+/* Gives a corner a number, and notes which of its coordinates are -0. */
 static bool number_corner(ebpo_face_list *faces, const double x[3], uint32_t *number)
 {
     uint64_t known = faces->corners.count;
     if (!ebpo_corner_id(&faces->corners, x, number) ||
-        !ebpo_grow(&faces->minus, &faces->minus_capacity, faces->corners.count,
-                   sizeof *faces->minus))
+        !ebpo_grow(&faces->negative_zeros, &faces->negative_zeros_capacity, faces->corners.count,
+                   sizeof *faces->negative_zeros))
         return false;
     if (*number < known)
         return true;
-    faces->minus[*number] = 0;
+    faces->negative_zeros[*number] = 0;
     for (int k = 0; k < 3; k++)
-        faces->minus[*number] |= (uint8_t)((x[k] == 0 && signbit(x[k]) ? 1u : 0u) << k);
+        faces->negative_zeros[*number] |= (uint8_t)((x[k] == 0 && signbit(x[k]) ? 1u : 0u) << k);
     return true;
 }
 
+/* Adds face f of an operand's file to the list. p: its corners. Returns false without memory or
+ * with 2^31 - 1 faces. */
 static bool list_face(ebpo_face_list *faces, const double p[3][3], uint64_t f)
 {
     if (!ebpo_grow(&faces->face, &faces->face_capacity, (uint64_t)faces->count + 1,
                    sizeof *faces->face) ||
-        !ebpo_grow(&faces->number, &faces->number_capacity, (uint64_t)faces->count + 1,
-                   sizeof *faces->number) ||
+        !ebpo_grow(&faces->file_face, &faces->file_face_capacity, (uint64_t)faces->count + 1,
+                   sizeof *faces->file_face) ||
         faces->count >= INT32_MAX)
         return false;
     uint32_t *corner = faces->face[faces->count];
-    faces->number[faces->count++] = (uint32_t)f;
+    faces->file_face[faces->count++] = (uint32_t)f;
     for (int i = 0; i < 3; i++)
         if (!number_corner(faces, p[i], &corner[i]))
             return false;
@@ -147,10 +150,11 @@ static ebpo_status list_faces(ebpo_face_list *faces, uint32_t operand, const ebp
         paired ? ebpo_whole_faces_find(whole, mesh, paired, b->threads, progress, &cause)
                : ebpo_fail_memory(&cause, mesh->face_count / 8);
     free(paired);
-    bool fine = true;
+    bool listed_all = true;
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
-        fine = fine && (!ebpo_has_bit(whole->listed, f) || list_mesh_face(faces, mesh, f));
-    if (!fine)
+        listed_all =
+            listed_all && (!ebpo_has_bit(whole->listed, f) || list_mesh_face(faces, mesh, f));
+    if (!listed_all)
         status = ebpo_fail_memory(&cause, (uint64_t)faces->count * sizeof *faces->face);
     return status == EBPO_OK ? EBPO_OK
                              : ebpo_fail_operand(b->solid[operand].model, operand, &cause, error);
@@ -163,16 +167,16 @@ static ebpo_status list_base(ebpo_face_list *faces, ebpo_error *error)
     ebpo_base_face *near;
     uint64_t count;
     ebpo_error cause = EBPO_ERROR_INIT;
-    faces->keeps_base = ebpo_boolean_holds(b, faces->same[0]);
+    faces->keeps_base = ebpo_boolean_holds(b, faces->equal[0]);
     ebpo_status status = ebpo_base_faces_find(b, &near, &count, &cause);
     if (status == EBPO_OK) {
         faces->base_source = ebpo_alloc(count, sizeof *faces->base_source);
-        bool fine = faces->base_source != NULL;
-        for (uint64_t i = 0; i < count && fine; i++) {
+        bool listed_all = faces->base_source != NULL;
+        for (uint64_t i = 0; i < count && listed_all; i++) {
             faces->base_source[i] = near[i].source;
-            fine = list_face(faces, (const double(*)[3])near[i].corner, near[i].number);
+            listed_all = list_face(faces, (const double(*)[3])near[i].corner, near[i].number);
         }
-        if (!fine)
+        if (!listed_all)
             status = ebpo_fail_memory(&cause, count * sizeof *near);
     }
     free(near);
@@ -187,7 +191,7 @@ static ebpo_status read_operands(ebpo_face_list *faces, const ebpo_progress *pro
     for (uint32_t i = 0; i < b->count && status == EBPO_OK; i++) {
         ebpo_mesh mesh;
         faces->first[i] = faces->count;
-        if (!faces->same[i])
+        if (!faces->equal[i])
             continue;
         if (!ebpo_progress_stage(progress, "read faces", error))
             return EBPO_E_CANCELLED;
@@ -216,13 +220,14 @@ uint32_t ebpo_face_list_operand(const ebpo_face_list *faces, uint32_t face)
 
 /* --- partners --- */
 
-/* Returns the place in the list of face `number` of an operand. All faces in pairs are listed. */
-static uint32_t find_listed(const ebpo_face_list *faces, uint32_t operand, uint32_t number)
+/* Returns the index in the list of face `file_face` of an operand. The face must be listed; all
+ * faces in pairs are. */
+static uint32_t find_listed(const ebpo_face_list *faces, uint32_t operand, uint32_t file_face)
 {
     uint32_t low = faces->first[operand], high = faces->first[operand + 1];
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
-        if (faces->number[middle] <= number)
+        if (faces->file_face[middle] <= file_face)
             low = middle;
         else
             high = middle;
@@ -236,8 +241,9 @@ static int order_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Replaces the faces of pairs by their places in the list. Drops pairs of faces without area. */
-static void find_places(ebpo_face_list *faces)
+/* Replaces the faces of pairs by their indices in the list. Drops pairs with a face without area.
+ */
+static void replace_by_listed(ebpo_face_list *faces)
 {
     uint64_t kept = 0;
     for (uint64_t i = 0; i < faces->pairs; i++) {
@@ -251,10 +257,10 @@ static void find_places(ebpo_face_list *faces)
     faces->pairs = kept;
 }
 
-/* Lists the partners of each face: both faces of a pair list each other. */
+/* Lists the partners of each face: each face of a pair is a partner of the other face. */
 static ebpo_status list_partners(ebpo_face_list *faces, ebpo_error *error)
 {
-    find_places(faces);
+    replace_by_listed(faces);
     faces->begin = ebpo_alloc_zero((uint64_t)faces->count + 2, sizeof *faces->begin);
     faces->partner = ebpo_alloc(2 * faces->pairs, sizeof *faces->partner);
     if (!faces->begin || !faces->partner)
@@ -282,10 +288,11 @@ ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b, bool
                                 ebpo_error *error)
 {
     *out = (ebpo_face_list){ .boolean = b, .workspace = workspace, .changed_only = changed_only };
-    ebpo_boolean_find_equal(b, out->same);
-    if (changed_only && !out->same[0])
+    ebpo_boolean_find_equal(b, out->equal);
+    if (changed_only && !out->equal[0])
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the expression does not use operand 1, of which the changes are wanted");
+                         "the changes of operand 1 are wanted, but the expression does not use "
+                         "this operand");
     for (uint32_t i = 0; i < b->count; i++)
         if (b->solid[i].model->info->face_count > INT32_MAX)
             return ebpo_fail(error, EBPO_E_LIMIT,
@@ -302,9 +309,9 @@ void ebpo_face_list_free(ebpo_face_list *faces)
     for (uint32_t i = 0; i < faces->boolean->count; i++)
         ebpo_whole_faces_free(&faces->whole[i]);
     free(faces->base_source);
-    free(faces->minus);
+    free(faces->negative_zeros);
     free(faces->face);
-    free(faces->number);
+    free(faces->file_face);
     free(faces->pair);
     free(faces->begin);
     free(faces->partner);

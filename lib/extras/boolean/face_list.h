@@ -1,6 +1,6 @@
-/* The faces of the operands that are cut, and the faces beside them, with one number for equal
- * corners. The other faces stay in the files: components of whole faces (operand_mesh.h) represent
- * them. */
+/* Lists the faces of the operands that are cut, and the faces beside them, with one number for
+ * equal corners. The other faces are not listed. They stay in the files, and one listed face of
+ * each component of whole faces (operand_mesh.h) represents them. */
 #ifndef EBPO_BOOLEAN_FACE_LIST_H
 #define EBPO_BOOLEAN_FACE_LIST_H
 
@@ -19,36 +19,37 @@ typedef struct ebpo_face_list {
     const ebpo_boolean *boolean;
     ebpo_workspace *workspace; /* NULL: malloc */
     ebpo_corner_ids corners;
-    uint64_t given_corners; /* number of corners of faces; cuts add the corners after them */
-    uint8_t *minus;         /* for each given corner: a bit for each coordinate that is -0 */
-    uint64_t minus_capacity;
+    uint64_t given_corners;  /* number of corners of faces; cuts add more corners after these */
+    uint8_t *negative_zeros; /* for each given corner: a bit for each coordinate that is -0 */
+    uint64_t negative_zeros_capacity;
     uint32_t (*face)[3]; /* corners of each face; EBPO_NO_CORNER first: the face has no area */
-    uint32_t *number;    /* the face's index in its operand's file */
+    uint32_t *file_face; /* index of each face in the file of its operand */
     uint32_t count;
-    uint64_t face_capacity, number_capacity;
+    uint64_t face_capacity, file_face_capacity;
     uint32_t first[EBPO_BOOLEAN_OPERANDS_MAX + 1]; /* first face of each operand */
     /* [operand] a bit for each operand that is equal to this one, itself included; 0: the operand
      * is not listed (ebpo_boolean_find_equal) */
-    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX];
-    ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX];
-    /* Only changes are wanted. Then operand 0 is the *base*: all its faces near other operands are
-     * listed, and none is whole. The other faces of the base are in the result if `keeps_base`. */
+    uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX];
+    ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand] */
+    /* changed_only: only the changes of operand 0, the *base*, are wanted. All faces of the base
+     * near other operands are listed, and no face of the base is whole. keeps_base: the faces of
+     * the base that are not listed are in the result. */
     bool changed_only, keeps_base;
-    uint32_t *base_source; /* for each listed face of the base: its index for callers */
-    /* First all intersecting pairs, then only the pairs of faces with an area. The partners of face
-     * i are partner[begin[i]] to partner[begin[i + 1] - 1], in ascending order. */
-    ebpo_operand_pair *pair;
-    uint64_t pairs, pair_capacity;
+    uint32_t *base_source;   /* for each listed face of the base: its source index */
+    ebpo_operand_pair *pair; /* intersecting pairs; freed when the partners are listed */
+    /* The partners of face i, which intersect it and have an area, are partner[begin[i]] to
+     * partner[begin[i + 1] - 1], in ascending order. */
     uint64_t *begin;
     uint32_t *partner;
+    uint64_t pairs, pair_capacity;
 } ebpo_face_list;
 
 #define EBPO_NO_CORNER UINT32_MAX
 
-/* Makes the list (of changes, if `changed_only`): finds the pairs of intersecting faces of
- * different operands, and the pairs of faces of one operand that intersect in more than a common
- * corner or edge; then reads one operand after the other. Intersections of the base with itself are
- * not searched. Must be freed, also after a failure. */
+/* Makes the list. First finds the pairs of intersecting faces of different operands, and the pairs
+ * of faces of one operand that intersect in more than a common corner or edge. Then reads one
+ * operand after the other. If `changed_only`, self-intersections of the base are not searched. Must
+ * be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b,
                                               bool changed_only, ebpo_workspace *workspace,
                                               const ebpo_progress *progress, ebpo_error *error);
@@ -63,7 +64,7 @@ static inline uint32_t ebpo_face_list_component(const ebpo_face_list *faces, uin
                                                 uint32_t face)
 {
     const uint32_t *component = faces->whole[operand].component;
-    return component ? component[faces->number[face]] : EBPO_NO_COMPONENT;
+    return component ? component[faces->file_face[face]] : EBPO_NO_COMPONENT;
 }
 
 /* Returns true if the operand is the base of the wanted changes. */

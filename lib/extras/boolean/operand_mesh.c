@@ -38,6 +38,7 @@ static ebpo_status pose_some(void *context, uint64_t begin, uint64_t end, unsign
     return EBPO_OK;
 }
 
+/* Replaces the coordinates of the mesh by posed coordinates, which are doubles. */
 static ebpo_status pose_mesh(ebpo_mesh *mesh, const ebpo_posing *posing, unsigned threads,
                              ebpo_error *error)
 {
@@ -59,12 +60,12 @@ ebpo_status ebpo_operand_mesh_read(ebpo_mesh *out, const ebpo_boolean *b, uint32
                                    bool attributes, ebpo_workspace *workspace, ebpo_error *error)
 {
     const ebpo_posed_solid *solid = &b->solid[operand];
-    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_error cause = EBPO_ERROR_INIT;
-    how.threads = b->threads;
-    how.workspace = workspace;
-    how.attributes = attributes;
-    ebpo_status status = ebpo_file_read_mesh(solid->model->file, &how, out, &cause);
+    options.threads = b->threads;
+    options.workspace = workspace;
+    options.attributes = attributes;
+    ebpo_status status = ebpo_file_read_mesh(solid->model->file, &options, out, &cause);
     if (status == EBPO_OK && !ebpo_moves_nothing(&solid->posing))
         status = pose_mesh(out, &solid->posing, b->threads, &cause);
     if (status == EBPO_OK)

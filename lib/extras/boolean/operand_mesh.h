@@ -1,41 +1,45 @@
-/* Reads operands: their posed meshes, and the parts of their surfaces that no face intersects. */
+/* Reads the posed meshes of operands, and finds the connected parts of a mesh that no face
+ * intersects. */
 #ifndef EBPO_BOOLEAN_OPERAND_MESH_H
 #define EBPO_BOOLEAN_OPERAND_MESH_H
 
 #include "extras/boolean/boolean.h"
 
-/* Reads the mesh of an operand at its pose, into the workspace (NULL: malloc), and if `attributes`
- * is true its attributes, which are not moved. Coordinates become
- * doubles; a pose that moves nothing leaves them as they are, with their signs of zero. Freed by
- * ebpo_mesh_free. */
+/* Reads the mesh of an operand at its pose, into the workspace (NULL: malloc). If `attributes` is
+ * true, reads also the attributes, which are not posed. Coordinates become doubles. If the pose
+ * moves nothing, coordinates stay as they are, with their type and the signs of zero. The caller
+ * frees the mesh (ebpo_mesh_free). */
 EBPO_MUST_USE ebpo_status ebpo_operand_mesh_read(ebpo_mesh *out, const ebpo_boolean *b,
                                                  uint32_t operand, bool attributes,
                                                  ebpo_workspace *workspace, ebpo_error *error);
 
-/* Returns true if the pose leaves all coordinates as they are, apart from the sign of zero. */
+/* Returns true if applying the pose changes no coordinate, except perhaps -0 to 0. */
 bool ebpo_moves_nothing(const ebpo_posing *posing);
 
-/* The faces of a posed mesh. *Whole* faces have an area, and are in no pair of intersecting faces.
- * They are connected to *components* by edges (pairs of equal positions) of exactly two faces with
- * an area, both of them whole: along a component all winding numbers in front are constant, and so
- * are those behind. */
+/* The faces of a posed mesh. A *whole* face has an area, and is in no pair of intersecting faces. A
+ * *component* is a set of whole faces that are connected by edges (pairs of positions). An edge
+ * connects if exactly two faces with an area have it, and both are whole. In front of all faces of
+ * a component the winding numbers are equal, and behind all its faces, too. */
 typedef struct ebpo_whole_faces {
     ebpo_workspace *workspace;
-    /* [faces] number of the component; EBPO_NO_COMPONENT: not whole. NULL: no face is. */
+    /* [faces] number of the component; EBPO_NO_COMPONENT: the face is not whole. NULL: no face is
+     * whole. */
     uint32_t *component;
-    uint32_t components;
-    bool repeats; /* several vertices have one position */
-    /* A bit for each face that must be listed: the faces that are not whole; whole faces of which
-     * two corners belong to faces in pairs; whole faces of edges of more than two faces; and the
-     * first face of each component that has no such face. */
+    uint32_t components; /* number of components */
+    bool repeats;        /* several vertices have one position */
+    /* A bit for each face that the list of faces (face_list.h) must have:
+     * - each face that is not whole,
+     * - each whole face with two or more corners that are corners of faces in pairs,
+     * - each whole face with an edge of more than two faces,
+     * - the first face of each component that has no face of the former kinds. */
     uint64_t *listed;
 } ebpo_whole_faces;
 
 #define EBPO_NO_COMPONENT UINT32_MAX
 
 /* Finds the components. paired: a bit for each face that is in a pair. Fails with EBPO_E_FORMAT if
- * an edge of whole faces does not have both directions equally often. Must be freed, also after a
- * failure. */
+ * the mesh is not closed: an edge of whole faces does not occur equally often in both directions.
+ * Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_whole_faces_find(ebpo_whole_faces *out, const ebpo_mesh *mesh,
                                                 const uint64_t *paired, unsigned threads,
                                                 const ebpo_progress *progress, ebpo_error *error);

@@ -18,17 +18,17 @@
 void ebpo_arrangement_2d_init(ebpo_arrangement_2d *a)
 {
     *a = (ebpo_arrangement_2d){ 0 };
-    ebpo_exact_point_init(&a->meeting);
+    ebpo_exact_point_init(&a->crossing);
     ebpo_exact_plane_init(&a->line);
 }
 
 void ebpo_arrangement_2d_free(ebpo_arrangement_2d *a)
 {
-    ebpo_exact_point_clear(&a->meeting);
+    ebpo_exact_point_clear(&a->crossing);
     ebpo_exact_plane_clear(&a->line);
     ebpo_point_set_free(&a->set);
     free(a->segment);
-    free(a->on);
+    free(a->recorded);
     free(a->edge);
 }
 
@@ -36,7 +36,7 @@ void ebpo_arrangement_2d_begin(ebpo_arrangement_2d *a, int axis, int unit)
 {
     a->axis = axis;
     a->unit = unit;
-    a->segments = a->on_count = a->edges = 0;
+    a->segments = a->recorded_count = a->edges = 0;
     ebpo_point_set_empty(&a->set);
 }
 
@@ -76,9 +76,9 @@ static int turn_of(const ebpo_arrangement_2d *a, uint32_t p, uint32_t q, uint32_
 
 static bool record_point(ebpo_arrangement_2d *a, uint64_t segment, uint32_t point)
 {
-    if (!ebpo_grow(&a->on, &a->on_capacity, a->on_count + 1, sizeof *a->on))
+    if (!ebpo_grow(&a->recorded, &a->recorded_capacity, a->recorded_count + 1, sizeof *a->recorded))
         return false;
-    a->on[a->on_count++] = (ebpo_point_on_segment){ (uint32_t)segment, point };
+    a->recorded[a->recorded_count++] = (ebpo_point_on_segment){ (uint32_t)segment, point };
     return true;
 }
 
@@ -93,22 +93,25 @@ static bool record_if_inside(ebpo_arrangement_2d *a, uint64_t segment, uint32_t 
     return first != ebpo_exact_order(&point[p], &point[s->to]) || record_point(a, segment, p);
 }
 
+/* Adds the point where two segments cross to the set, and records it for both segments. */
 static bool cross_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
 {
     const ebpo_plane_segment *s = &a->segment[i], *t = &a->segment[j];
     const ebpo_exact_point *point = a->set.point;
     uint32_t number;
     ebpo_exact_plane_along(&a->line, a->axis, &point[t->from], &point[t->to]);
-    ebpo_exact_meet(&a->meeting, &a->line, &point[s->from], &point[s->to], a->unit);
-    return ebpo_point_set_add(&a->set, &a->meeting, &number) && record_point(a, i, number) &&
+    ebpo_exact_intersect(&a->crossing, &a->line, &point[s->from], &point[s->to], a->unit);
+    return ebpo_point_set_add(&a->set, &a->crossing, &number) && record_point(a, i, number) &&
            record_point(a, j, number);
 }
 
+/* Records the points of segment i on segment j, and of segment j on segment i. */
 static bool compare_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
 {
     const ebpo_plane_segment s = a->segment[i], t = a->segment[j];
     if ((s.from == t.from && s.to == t.to) || (s.from == t.to && s.to == t.from))
         return true;
+    /* sides of s on which the ends of t are; 0: an end is on the line of s */
     int from_t = turn_of(a, s.from, s.to, t.from), to_t = turn_of(a, s.from, s.to, t.to);
     if (from_t * to_t > 0)
         return true;
@@ -163,10 +166,10 @@ bool ebpo_arrangement_2d_divide(ebpo_arrangement_2d *a)
     for (uint64_t i = 0; i < a->segments; i++)
         if (!record_point(a, i, a->segment[i].from) || !record_point(a, i, a->segment[i].to))
             return false;
-    ebpo_sort_with(a->on, a->on_count, sizeof *a->on, order_recorded, a);
-    for (uint64_t i = 0; i + 1 < a->on_count; i++)
-        if (a->on[i].segment == a->on[i + 1].segment &&
-            !add_edge(a, a->on[i].point, a->on[i + 1].point))
+    ebpo_sort_with(a->recorded, a->recorded_count, sizeof *a->recorded, order_recorded, a);
+    for (uint64_t i = 0; i + 1 < a->recorded_count; i++)
+        if (a->recorded[i].segment == a->recorded[i + 1].segment &&
+            !add_edge(a, a->recorded[i].point, a->recorded[i + 1].point))
             return false;
     return true;
 }

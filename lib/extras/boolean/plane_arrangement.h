@@ -1,20 +1,23 @@
-/* Divides segments in one plane at the points where they intersect. Exact; for one thread. */
+/* Divides segments in one plane at the points where they intersect. Results are exact. An
+ * arrangement is for one thread. */
 #ifndef EBPO_BOOLEAN_PLANE_ARRANGEMENT_H
 #define EBPO_BOOLEAN_PLANE_ARRANGEMENT_H
 
 #include "extras/boolean/exact_point.h"
 
-/* A segment between two points of the set; equal numbers: a single point. */
+/* A segment between two points of the set, given by their indices. Equal indices: a single point.
+ */
 typedef struct ebpo_plane_segment {
     uint32_t from, to;
-    double low[2], high[2]; /* box of the rounded coordinates */
+    double low[2], high[2]; /* box of the rounded coordinates on the two axes of the projection */
 } ebpo_plane_segment;
 
-/* A point in the interior of a segment; and an undivided part of a segment. */
+/* A point of the set that is on a segment: an end, or a point in the interior. */
 typedef struct ebpo_point_on_segment {
     uint32_t segment, point;
 } ebpo_point_on_segment;
 
+/* A part of a segment that no other segment divides, between two points of the set. */
 typedef struct ebpo_plane_edge {
     uint32_t from, to;
 } ebpo_plane_edge;
@@ -26,12 +29,12 @@ typedef struct ebpo_arrangement_2d {
     ebpo_point_set set;
     ebpo_plane_segment *segment;
     uint64_t segments, segment_capacity;
-    ebpo_point_on_segment *on;
-    uint64_t on_count, on_capacity;
-    ebpo_plane_edge *edge; /* the result; parts that several segments share are listed repeatedly */
+    ebpo_point_on_segment *recorded; /* points on segments that have been found */
+    uint64_t recorded_count, recorded_capacity;
+    ebpo_plane_edge *edge; /* the result; an edge of several segments is listed several times */
     uint64_t edges, edge_capacity;
-    ebpo_exact_point meeting;
-    ebpo_exact_plane line;
+    ebpo_exact_point crossing; /* scratch memory */
+    ebpo_exact_plane line;     /* scratch memory: a plane through a segment, along the axis */
 } ebpo_arrangement_2d;
 
 void ebpo_arrangement_2d_init(ebpo_arrangement_2d *a);
@@ -43,8 +46,9 @@ void ebpo_arrangement_2d_begin(ebpo_arrangement_2d *a, int axis, int unit);
 /* Adds a segment, or with equal ends a point. Returns false without memory. */
 bool ebpo_arrangement_2d_add(ebpo_arrangement_2d *a, uint32_t from, uint32_t to);
 
-/* Computes the edges: no point of the set is inside an edge, and different edges have at most ends
- * in common. Adds the points where segments cross to the set. Returns false without memory. */
+/* Computes the edges. No point of the set is in the interior of an edge, and different edges have
+ * at most ends in common. Adds the points where segments cross to the set. Returns false without
+ * memory. */
 bool ebpo_arrangement_2d_divide(ebpo_arrangement_2d *a);
 
 #endif

@@ -1,11 +1,13 @@
 /* Triangulates points of a plane.
  *
- * Points are added in the order of their coordinates: each point is outside the hull of the points
- * before, and is joined to all edges of the hull that it sees. Then edges are flipped where that
- * improves the shape; these decisions are approximate, but an edge is only flipped in a strictly
- * convex quadrangle, by exact turns, so every triangle always has an area. Segments become edges by
- * flipping the edges that they cross (Sloan, "A fast algorithm for generating constrained Delaunay
- * triangulations", 1993). Invariant: triangles are counter-clockwise and cover the hull once. */
+ * Points are added in the order of their coordinates. So each point is outside the convex hull of
+ * the earlier points, and is joined to all edges of the hull that it sees. Then edges are flipped
+ * (replaced by the other diagonal of their two triangles) if this improves the shape. The test of
+ * the shape is approximate. But an edge is flipped only if its two triangles form a strictly convex
+ * quadrangle, which is tested exactly, so every triangle always has an area. A segment becomes an
+ * edge by flipping the edges that it crosses (Sloan, "A fast algorithm for generating constrained
+ * Delaunay triangulations", 1993). Invariant: triangles are counter-clockwise and cover the hull
+ * once. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/plane_triangulation.h"
@@ -20,6 +22,7 @@ static inline int next_index(int i) { return i == 2 ? 0 : i + 1; }
 
 static inline int last_index(int i) { return i == 0 ? 2 : i - 1; }
 
+/* Returns the turn of three points: 1 if they are counter-clockwise (ebpo_exact_turn). */
 static int turn_of(const ebpo_triangulation *t, uint32_t a, uint32_t b, uint32_t c)
 {
     return ebpo_exact_turn(t->axis, &t->point[a], &t->point[b], &t->point[c]);
@@ -60,6 +63,7 @@ static void add_triangle(ebpo_triangulation *t, uint32_t a, uint32_t b, uint32_t
     t->any[a] = t->any[b] = t->any[c] = number;
 }
 
+/* Returns the edge of the triangle that begins at the corner. */
 static int edge_from(const ebpo_triangulation *t, uint32_t triangle, uint32_t corner)
 {
     const uint32_t *c = t->triangle[triangle].corner;
@@ -74,6 +78,7 @@ static void connect_edge(ebpo_triangulation *t, uint32_t triangle, int i, uint32
     t->triangle[other].across[edge_from(t, other, from)] = triangle;
 }
 
+/* Makes an edge of the hull. inside: the triangle that has this edge. */
 static void join_hull(ebpo_triangulation *t, uint32_t from, uint32_t to, uint32_t inside)
 {
     t->next[from] = to;
@@ -81,7 +86,8 @@ static void join_hull(ebpo_triangulation *t, uint32_t from, uint32_t to, uint32_
     t->inside[from] = inside;
 }
 
-/* Makes the first triangles: points 0 to n - 1 in order are on a line, point n is not. */
+/* Makes the first triangles. The first n points in order are on a line, and the next point is not.
+ */
 static void begin_hull(ebpo_triangulation *t, uint32_t n)
 {
     const uint32_t *p = t->order;
@@ -96,8 +102,7 @@ static void begin_hull(ebpo_triangulation *t, uint32_t n)
             join_hull(t, p[i], p[i + 1], number);
         else
             join_hull(t, p[i + 1], p[i], number);
-        if (i >
-            0) /* the triangle before has the edge between p[i] and p[n] in the other direction */
+        if (i > 0) /* the previous triangle has the edge between p[i] and p[n] reversed */
             connect_edge(t, number, left ? 2 : 1, number - 1, left ? p[i] : p[n]);
     }
     uint32_t most = (uint32_t)t->count - 1;
@@ -110,7 +115,7 @@ static void begin_hull(ebpo_triangulation *t, uint32_t n)
     }
 }
 
-/* Adds a point that comes after all others in the order; `newest` is the last of those. */
+/* Adds the point p, which follows all earlier points in the order. newest: the last of these. */
 static void enlarge_hull(ebpo_triangulation *t, uint32_t newest, uint32_t p)
 {
     uint32_t begin = newest, end = newest;
@@ -132,8 +137,8 @@ static void enlarge_hull(ebpo_triangulation *t, uint32_t newest, uint32_t p)
 
 /* --- flips --- */
 
-/* Replaces the edge between two triangles, from a to b in the first, by the other diagonal of their
- * quadrangle a, q, b, p. The triangles become (a, q, p) and (b, p, q). */
+/* Flips edge i of the triangle `first`. The edge runs from a to b; p and q are the third corners of
+ * `first` and of the triangle across. The two triangles become (a, q, p) and (b, p, q). */
 static void flip_edge(ebpo_triangulation *t, uint32_t first, int i)
 {
     uint32_t second = t->triangle[first].across[i];
@@ -153,7 +158,7 @@ static void flip_edge(ebpo_triangulation *t, uint32_t first, int i)
     t->any[b] = t->any[p] = second;
 }
 
-/* Returns true if the quadrangle of edge i is strictly convex. */
+/* Returns true if the two triangles of edge i form a strictly convex quadrangle. */
 static bool is_convex(const ebpo_triangulation *t, uint32_t triangle, int i)
 {
     const ebpo_plane_triangle *x = &t->triangle[triangle], *y = &t->triangle[x->across[i]];
@@ -173,6 +178,7 @@ static bool push_edge(ebpo_triangulation *t, uint64_t edge)
 
 /* --- shape --- */
 
+/* Computes the approximate position of a point, with coordinates from -1 to 1. */
 static void frame_position(const ebpo_triangulation *t, uint32_t point, double out[2])
 {
     const double *at = t->point[point].at;
@@ -194,7 +200,8 @@ static void make_frame(ebpo_triangulation *t)
     t->size = most > 0 ? most : 1;
 }
 
-/* Returns true if the other diagonal of the quadrangle gives better triangles, approximately. */
+/* Returns true if a flip of edge i approximately improves the shape: the fourth corner is inside
+ * the circle through the triangle's corners. */
 static bool is_better_flipped(const ebpo_triangulation *t, uint32_t triangle, int i)
 {
     const ebpo_plane_triangle *x = &t->triangle[triangle], *y = &t->triangle[x->across[i]];
@@ -218,7 +225,8 @@ static bool is_better_flipped(const ebpo_triangulation *t, uint32_t triangle, in
     return sum > 0x1p-30 * size;
 }
 
-enum { FLIPS_MAX = 64 }; /* for each point; roundings could make edges flip for ever */
+/* Maximum number of flips for each point. Because of rounding, edges could flip for ever. */
+enum { FLIPS_MAX = 64 };
 
 static bool improve_shape(ebpo_triangulation *t)
 {
@@ -266,8 +274,8 @@ bool ebpo_triangulate_points(ebpo_triangulation *t, int axis, const ebpo_exact_p
 
 /* --- segments --- */
 
-/* Finds the triangle around `from` that the segment enters, and the edge through which it leaves.
- * Returns false if the segment is an edge already. */
+/* Finds the triangle with the corner `from` that the segment enters, and the edge through which the
+ * segment leaves it. Returns false if the segment is an edge already. */
 static bool find_entry(const ebpo_triangulation *t, uint32_t from, uint32_t to, uint32_t *triangle,
                        int *edge)
 {
@@ -290,7 +298,7 @@ static bool find_entry(const ebpo_triangulation *t, uint32_t from, uint32_t to, 
     return false;
 }
 
-/* Queues the edges that the segment crosses, as pairs of points. */
+/* Queues the edges that the segment crosses, as point << 32 | point. */
 static bool queue_crossed(ebpo_triangulation *t, uint32_t from, uint32_t to)
 {
     uint32_t triangle;

@@ -1,8 +1,8 @@
 /* Makes models of boxes and half-spaces.
  *
- * A result is cut by intersecting it with these models, so the cut is exact and capped like every
- * other one. The face of a half-space in its plane is one triangle, because four rounded points
- * would not be in one plane. */
+ * A result is cut by intersecting it with these models, so this cut is exact and closed by caps
+ * like every other cut. The part of a half-space's plane is one triangle, because four rounded
+ * points would not be in one plane. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/region_model.h"
@@ -25,26 +25,26 @@
 static ebpo_status build_tree(ebpo_mesh *mesh, ebpo_tree *tree, ebpo_error *error)
 {
     ebpo_mesh_report report;
-    ebpo_build_options how = EBPO_BUILD_OPTIONS_INIT;
-    how.threads = 1;
-    how.require_solid = true;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.threads = 1;
+    options.require_solid = true;
     ebpo_status status = ebpo_mesh_check(mesh, 1, (ebpo_progress){ NULL, NULL }, &report, error);
-    return status == EBPO_OK ? ebpo_build(mesh, &report, NULL, &how, tree, error) : status;
+    return status == EBPO_OK ? ebpo_build(mesh, &report, NULL, &options, tree, error) : status;
 }
 
 static ebpo_status open_tree(ebpo_region_model *out, const ebpo_tree *tree, ebpo_error *error)
 {
-    ebpo_write_options writing = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_write_options write_options = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_workspace *workspace;
-    writing.threads = how.threads = 1;
+    write_options.threads = model_options.threads = 1;
     ebpo_status status = ebpo_workspace_new(NULL, &workspace, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_tree_store(tree, ebpo_workspace_folder(workspace), "ebpo-region", &writing,
+    status = ebpo_tree_store(tree, ebpo_workspace_folder(workspace), "ebpo-region", &write_options,
                              &out->file, error);
     if (status == EBPO_OK)
-        status = ebpo_model_new(out->file, &how, &out->model, error);
+        status = ebpo_model_new(out->file, &model_options, &out->model, error);
     ebpo_workspace_free(workspace);
     return status;
 }
@@ -99,15 +99,14 @@ ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6], ebpo_er
 
 /* --- half-spaces --- */
 
-/* A half-space; its normal is scaled by a power of two. The part that must be right is in a ball.
- */
+/* A half-space: normal . x <= offset. Its model must be right in a ball around the box. */
 typedef struct half_space {
-    double normal[3], offset;
-    double length; /* of the normal */
-    double centre[3], radius;
+    double normal[3], offset; /* as given, but scaled by a power of two */
+    double length;            /* length of the normal */
+    double centre[3], radius; /* the ball */
 } half_space;
 
-/* Makes a ball around the box; an empty box has a ball around the origin. */
+/* Makes a ball around the box. If the box is empty, the ball is around the origin. */
 static void set_ball(half_space *h, const double box[6])
 {
     double most = 1;
@@ -122,8 +121,8 @@ static void set_ball(half_space *h, const double box[6])
     h->radius = h->radius > 0 ? h->radius : most;
 }
 
-/* Reads the plane, and moves it towards the ball until at most two radii are between it and the
- * centre. Returns false if it is not a plane. */
+/* Sets the normal and the offset. If the plane is more than two radii away from the centre of the
+ * ball, moves it to this distance. Returns false if a number is not finite or the normal is 0. */
 static bool set_plane(half_space *h, const double plane[4])
 {
     int power;
@@ -141,7 +140,7 @@ static bool set_plane(half_space *h, const double plane[4])
     return true;
 }
 
-/* Rounds to the nearest double. */
+/* Rounds to the nearest double; mpq_get_d rounds towards zero. */
 static double round_fraction(const mpq_t x)
 {
     double nearest = mpq_get_d(x); /* rounded towards zero */
@@ -160,7 +159,7 @@ static double round_fraction(const mpq_t x)
     return beyond ? other : nearest;
 }
 
-/* Moves a point along an axis into the plane. */
+/* Moves a point along an axis to the double that is nearest to the plane. */
 static void move_into_plane(const half_space *h, int axis, double point[3])
 {
     mpq_t sum, factor, x;
@@ -180,12 +179,13 @@ static void move_into_plane(const half_space *h, int axis, double point[3])
     mpq_clears(sum, factor, x, NULL);
 }
 
-/* Makes the corners. The face in the plane is a triangle around the projection q of the ball's
- * centre, with three corners at distance 8 radii; its inscribed circle has 4 radii. The fourth
- * corner is 12 radii behind. The part of the half-space in the ball is at most 3 radii behind the
- * plane and at most one radius away from the axis through q, where the tetrahedron has an inscribed
- * circle of 3 radii. Before they are moved into the plane, corners are rounded to a grid of 1/8 of
- * the radius or less, so that they have few digits. */
+/* Makes the corners of the tetrahedron, in radii of the ball. The face in the plane is a triangle
+ * around q, the projection of the ball's centre. Its corners are at a distance of 8 radii from q,
+ * so its inscribed circle has 4 radii. The fourth corner is 12 radii behind q. The part of the
+ * half-space in the ball is at most 3 radii behind the plane. There the inscribed circle of the
+ * tetrahedron has 3 radii or more, and the ball is within one radius of the line through q, so the
+ * tetrahedron contains this part. Corners are rounded to a grid of 1/8 of the radius or less before
+ * they are moved into the plane, so that they have few digits. */
 static void make_corners(const half_space *h, double corner[4][3])
 {
     double unit[3], side[2][3], q[3], grid = fmax(ldexp(1, ilogb(h->radius) - 3), 0x1p-1074);
@@ -197,8 +197,8 @@ static void make_corners(const half_space *h, double corner[4][3])
         unit[k] = h->normal[k] / h->length;
         q[k] = h->centre[k] + height * unit[k];
     }
-    /* two directions across: the axis after `axis` without its part along the normal, and the cross
-     * product */
+    /* two directions in the plane: the axis after `axis` without its component along the normal,
+     * and the cross product of the normal and this direction */
     double along = unit[(axis + 1) % 3], across = sqrt(1 - along * along);
     for (int k = 0; k < 3; k++)
         side[0][k] = ((k == (axis + 1) % 3) - along * unit[k]) / across;

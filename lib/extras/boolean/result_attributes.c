@@ -1,8 +1,8 @@
-/* Carries attributes of operands over.
+/* Carries attributes of operands over to the mesh of the result.
  *
  * Arrays of two operands with equal names and types become one array. A vertex on the cut of two
- * operands gets the values of the first operand that has the array. Values at new vertices are
- * interpolated on their face. Normals are turned with the operand, and reversed with the face. */
+ * operands gets the values of the first operand that has the array. Values at a new vertex are
+ * interpolated on its face. Normals are rotated with the operand, and reversed with the face. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/result_attributes.h"
@@ -21,7 +21,7 @@
 
 /* --- arrays --- */
 
-/* Returns the number of the column at which the words begin in a list of names; -1: none. */
+/* Returns the index of the column at which the words begin in a list of names; -1: not found. */
 static int find_names(const char *names, const char *words)
 {
     size_t n = strlen(words);
@@ -40,8 +40,9 @@ static bool same_layout(const ebpo_attribute *a, const ebpo_attribute *b)
            strcmp(a->element, b->element) == 0 && strcmp(a->names, b->names) == 0;
 }
 
-/* Returns true if a column of the array has the name of another column of its element, or if it is
- * a colour and the faces of the result have their own. */
+/* Returns true if the mesh of the result cannot get the array: a column of the same element has the
+ * name of one of its columns, or the array has colours and the faces of the result have colours by
+ * operand. */
 static bool is_taken(const ebpo_carrying *c, const ebpo_attribute *like)
 {
     const ebpo_attributes *all = c->mesh->attributes;
@@ -93,17 +94,17 @@ static ebpo_status add_array(ebpo_carrying *c, const ebpo_attribute *like, uint6
     if (!item->of_faces && !item->filled)
         return ebpo_fail_memory(error, rows / 8);
     if (!ebpo_attribute_is_float(a->type))
-        item->normal = -1;
+        item->normal = -1; /* integers named nx ny nz are copied, not rotated */
     return EBPO_OK;
 }
 
-/* Adds the arrays of an operand that no operand before has. */
+/* Adds the arrays of an operand that no earlier operand has. */
 static ebpo_status add_arrays(ebpo_carrying *c, const ebpo_file *file, uint64_t vertices,
                               uint64_t faces, ebpo_error *error)
 {
     ebpo_attributes *all = c->mesh->attributes, *from;
-    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
-    ebpo_status status = ebpo_attributes_read_head(file, &how, &from, error);
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = ebpo_attributes_read_head(file, &options, &from, error);
     for (uint64_t i = 0; status == EBPO_OK && from && i < from->count; i++) {
         const ebpo_attribute *a = &from->array[i];
         if (find_carried(c, a))
@@ -152,9 +153,10 @@ void ebpo_carrying_operand(ebpo_carrying *c, const ebpo_posed_solid *solid, cons
 
 /* --- values --- */
 
-/* Stores a number; integers are rounded to the nearest one that the type has. */
+/* Stores a number. If the type is an integer, the nearest integer in its range is stored. */
 static void store_number(uint8_t *at, ebpo_attribute_type type, double x)
 {
+    /* [type] ranges of the integer types, in the order of ebpo_attribute_type */
     static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
         INT8_MAX, UINT8_MAX, INT16_MAX, UINT16_MAX, INT32_MAX, UINT32_MAX
     };
@@ -180,7 +182,8 @@ static double number_at(const ebpo_attribute *a, uint64_t row, uint32_t column)
                                  a->type);
 }
 
-/* Turns and reverses the normal of a row. */
+/* Rotates the normal of a row with the operand, and reverses it if sign is -1. An interpolated
+ * normal gets the length 1. */
 static void turn_normal(const ebpo_carrying *c, const ebpo_carried *item, uint64_t row,
                         bool interpolated, int sign)
 {

@@ -1,12 +1,14 @@
 /* Writes the triangles that bound the result into a mesh.
  *
- * Each operand is read again. Its faces are visited in order. Faces near other operands are in a
- * list (face_list.h) and have been cut into triangles (the cut mesh); the triangles that bound the
- * result are added. A face that is not listed is added whole if the listed faces of its connected
- * component bound the result. Vertices are numbered by first use. A corner of a listed face has the
- * number of its vertex in the cut mesh, so whole faces and triangles share vertices. Faces have
- * their source indices if the operand's file has them, and their indices in the file if not, as in
- * all queries. */
+ * Each operand is read again, and its faces are visited in order. Faces near other operands are in
+ * a list (face_list.h) and have been cut into triangles (cut_mesh.h); those triangles that bound
+ * the result are added. A face that is not listed is added whole if the listed faces of its
+ * component bound the result.
+ *
+ * Vertices are numbered in the order of their first use. A corner of a listed face gets the number
+ * of its vertex in the cut mesh, so whole faces and triangles share vertices. If requested, each
+ * face of the result gets the index of its original face: the source index, or, if the operand's
+ * file has no source indices, the index in the file. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/result_mesh.h"
@@ -31,42 +33,44 @@
 typedef struct output {
     const ebpo_cut_mesh *cut;
     const int8_t *sign; /* for each triangle: 1: added; -1: added, reversed; 0: not in the result */
-    int8_t *of_component[EBPO_BOOLEAN_OPERANDS_MAX]; /* signs of whole faces */
-    bool doubles;
-    uint32_t *number;        /* for each vertex of the cut mesh: its number, or NO_NUMBER */
+    int8_t *component_sign[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand][component] the same sign */
+    bool doubles;            /* coordinates of the result are doubles, else floats */
+    uint32_t *number;        /* [vertex of the cut mesh] its number in the result, or NO_NUMBER */
     ebpo_corner_ids rounded; /* rounded positions of the vertices that have a number */
-    uint32_t *of_rounded;    /* for each rounded position: the number of its vertices */
+    uint32_t *of_rounded;    /* [rounded position] number of its vertex in the result */
     uint64_t of_rounded_capacity;
     ebpo_boolean_mesh_report *report;
     ebpo_mesh *mesh;
-    uint64_t removed; /* of changes: index of the attribute */
-    uint8_t *operand; /* attributes of faces, or NULL */
-    uint8_t *operand_face;
-    uint8_t *colour; /* of each face, by its operand, or NULL */
+    uint64_t removed; /* index of the attribute "removed"; only for changes */
+    /* Arrays with an entry for each face of the result; NULL: not requested. */
+    uint8_t *operand;      /* index of the operand */
+    uint8_t *operand_face; /* uint32: index of the original face */
+    uint8_t *colour;       /* three bytes: colour of the operand */
     ebpo_carrying carrying;
     bool measures; /* `volume` is requested */
     ebpo_volume_sum volume;
 } output;
 
-/* The operand that is read. */
+/* The operand that is being read. */
 typedef struct operand_output {
     output *o;
     uint32_t operand;
-    ebpo_mesh mesh; /* posed */
-    ebpo_maps maps;
-    bool repeats;
+    ebpo_mesh mesh;       /* the operand's mesh, posed */
+    ebpo_maps maps;       /* source indices of the faces */
+    bool repeats;         /* several vertices have one position */
     ebpo_positions first; /* for each vertex: the first one at its position; only if `repeats` */
-    uint64_t *near;       /* for each vertex: a bit, 1 if it is a corner of a listed face */
-    uint32_t *number;     /* for each vertex: its number, or NO_NUMBER */
+    uint64_t *near;       /* a bit for each vertex that is a corner of a listed face */
+    uint32_t *number;     /* [vertex] its number in the result, or NO_NUMBER */
 } operand_output;
 
 /* --- vertices --- */
 
-/* Rounds coordinate k to the nearest float, ties to even. `p`: the exact point, or NULL if the
- * double is exact. */
+/* Rounds coordinate k to the nearest float, ties to even. at: the double that is nearest to the
+ * coordinate. p: the exact point, or NULL if `at` is exact. */
 static double round_to_float(double at, const ebpo_exact_point *p, int k, int unit)
 {
     float nearest = (float)at, other = nextafterf(nearest, at > nearest ? INFINITY : -INFINITY);
+    /* If `at` is in the middle between two floats, the exact coordinate decides. */
     bool tie = at != nearest && at - nearest == (double)other - at;
     int side = tie && p ? ebpo_exact_side_of_double(p, k, unit) : 0;
     if (side != 0)
@@ -86,8 +90,8 @@ static uint32_t add_vertex(output *o, const double at[3])
     return (uint32_t)v;
 }
 
-/* Gets the double nearest to each coordinate of a vertex of the cut mesh, and the exact point, or
- * NULL if the doubles are exact. */
+/* Sets `at` to the doubles nearest to the coordinates of a vertex of the cut mesh. Returns the
+ * exact point; NULL: the doubles are exact. */
 static const ebpo_exact_point *get_cut_vertex(const output *o, uint32_t v, double at[3])
 {
     const ebpo_face_list *faces = o->cut->faces;
@@ -95,11 +99,12 @@ static const ebpo_exact_point *get_cut_vertex(const output *o, uint32_t v, doubl
     const ebpo_exact_point *p = v < corners ? NULL : &o->cut->set.point[v - corners];
     memcpy(at, p ? p->at : faces->corners.at[v], 3 * sizeof *at);
     for (int k = 0; k < 3 && v < faces->given_corners; k++)
-        at[k] = faces->minus[v] >> k & 1 ? -0.0 : at[k]; /* exact coordinates have no -0 */
+        at[k] = faces->negative_zeros[v] >> k & 1 ? -0.0 : at[k]; /* exact coordinates have no -0 */
     return p;
 }
 
-/* Numbers a vertex of the cut mesh. Returns false without memory. */
+/* Gives a vertex of the cut mesh a number in the result, and adds it to the mesh unless a vertex
+ * with the same rounded position exists. Returns false without memory. */
 static bool number_cut_vertex(output *o, uint32_t v)
 {
     double at[3], out[3], moved;
@@ -124,9 +129,10 @@ static bool number_cut_vertex(output *o, uint32_t v)
     return true;
 }
 
+/* Updates the greatest displacement, for a vertex whose coordinates become floats. */
 static void note_displacement(output *o, const double at[3])
 {
-    double moved[3], most = 0;
+    double moved[3], most = 0; /* most: the length is at most twice this */
     for (int k = 0; k < 3; k++) {
         moved[k] = fabs((double)(float)at[k] - at[k]);
         most = moved[k] > most ? moved[k] : most;
@@ -136,7 +142,8 @@ static void note_displacement(output *o, const double at[3])
             fmax(o->report->displacement, hypot(hypot(moved[0], moved[1]), moved[2]));
 }
 
-/* Gives a vertex the attributes of a vertex of the operand. sign: of its face. */
+/* Gives the vertex `number` of the result the attributes of vertex v of the operand. sign: sign of
+ * the face. */
 static void carry_vertex(operand_output *r, uint32_t number, uint32_t v, int sign)
 {
     static const double weight[3] = { 1, 0, 0 };
@@ -144,7 +151,8 @@ static void carry_vertex(operand_output *r, uint32_t number, uint32_t v, int sig
     ebpo_carry_vertex(&r->o->carrying, number, corner, weight, sign);
 }
 
-/* Numbers a vertex of the operand. sign: of its face. Returns false without memory. */
+/* Gives a vertex of the operand a number in the result, and its attributes. sign: sign of the face.
+ * Returns false without memory. */
 static bool number_vertex(operand_output *r, uint32_t v, int sign)
 {
     output *o = r->o;
@@ -166,10 +174,10 @@ static bool number_vertex(operand_output *r, uint32_t v, int sign)
 
 /* --- faces --- */
 
-/* A face of the operand. */
+/* The face of the operand from which a face of the result comes. */
 typedef struct origin {
-    uint64_t face;   /* in the file */
-    uint32_t number; /* in the source */
+    uint64_t face;   /* index in the file */
+    uint32_t source; /* source index, or the index in the file if the file has no source indices */
 } origin;
 
 static origin origin_of(const operand_output *r, uint64_t face)
@@ -185,8 +193,9 @@ static void add_colour(output *o, uint64_t at, uint32_t operand)
     memcpy(o->colour + 3 * at, colours[operand % (sizeof colours / sizeof *colours)], 3);
 }
 
-/* Adds a face, with the numbers of its corners. If rounding made two corners equal, the face is
- * omitted: its two other edges are then one edge in both directions. */
+/* Adds a face. corner: numbers of its corners in the result. If rounding made two corners equal,
+ * the face is omitted. The result stays closed, because two edges of the face are then one edge in
+ * both directions. */
 static void add_face(operand_output *r, origin from, const uint32_t corner[3], int sign)
 {
     output *o = r->o;
@@ -204,7 +213,7 @@ static void add_face(operand_output *r, origin from, const uint32_t corner[3], i
     if (!o->operand)
         return;
     o->operand[at] = (uint8_t)r->operand;
-    memcpy(o->operand_face + sizeof from.number * at, &from.number, sizeof from.number);
+    memcpy(o->operand_face + sizeof from.source * at, &from.source, sizeof from.source);
 }
 
 static void get_corners(const operand_output *r, uint64_t face, uint32_t out[3])
@@ -216,6 +225,7 @@ static void get_corners(const operand_output *r, uint64_t face, uint32_t out[3])
     }
 }
 
+/* Adds a face of the operand that is not cut. Returns false without memory. */
 static bool add_whole_face(operand_output *r, uint64_t face, int sign)
 {
     uint32_t corner[3];
@@ -261,7 +271,7 @@ static void measure_triangle(output *o, uint64_t t)
         mpq_clear(exact[i / 3][i % 3]);
 }
 
-/* Gives a vertex of a triangle the attributes of its face there. */
+/* Gives vertex v of a triangle the attributes that the face has at the position of v. */
 static void carry_point(operand_output *r, uint64_t face, uint32_t v, int sign)
 {
     output *o = r->o;
@@ -279,7 +289,7 @@ static void carry_point(operand_output *r, uint64_t face, uint32_t v, int sign)
     ebpo_carry_vertex(&o->carrying, o->number[v], corner, weight, sign);
 }
 
-/* Adds a triangle of a face, if it bounds the result. */
+/* Adds triangle t of a face, if it bounds the result. Returns false without memory. */
 static bool add_triangle(operand_output *r, origin from, uint64_t t)
 {
     output *o = r->o;
@@ -302,12 +312,13 @@ static bool add_triangle(operand_output *r, origin from, uint64_t t)
 
 /* --- one operand --- */
 
+/* Marks the corners of listed faces. */
 static void mark_near(operand_output *r)
 {
     const ebpo_face_list *faces = r->o->cut->faces;
     for (uint32_t i = faces->first[r->operand]; i < faces->first[r->operand + 1]; i++) {
         uint32_t corner[3];
-        get_corners(r, faces->number[i], corner);
+        get_corners(r, faces->file_face[i], corner);
         for (int k = 0; k < 3; k++)
             ebpo_set_bit(r->near, corner[k]);
     }
@@ -342,7 +353,7 @@ static bool add_faces(operand_output *r)
                     return false;
             listed++;
         } else {
-            int sign = o->of_component[r->operand][whole->component[f]];
+            int sign = o->component_sign[r->operand][whole->component[f]];
             if (sign && !add_whole_face(r, f, sign))
                 return false;
         }
@@ -352,7 +363,8 @@ static bool add_faces(operand_output *r)
 
 /* --- changes of the base --- */
 
-/* Adds a range of removed faces of the base. Returns false without memory. */
+/* Adds a range of removed faces of the base to the attribute "removed". A range that follows the
+ * last range extends it. Returns false without memory. */
 static bool add_removed(output *o, uint64_t first, uint64_t count)
 {
     uint32_t row[2] = { (uint32_t)first, (uint32_t)count }, last[2];
@@ -375,14 +387,15 @@ static bool add_removed(output *o, uint64_t first, uint64_t count)
     return true;
 }
 
-/* Adds the triangles of the changed faces of the base, and the ranges of removed faces. A face that
- * is one triangle and bounds the result is not changed. */
+/* Adds the triangles of the changed faces of the base, and the ranges of removed faces. A listed
+ * face is not changed if it is one triangle that bounds the result. */
 static bool add_changes(operand_output *r)
 {
     output *o = r->o;
     const ebpo_cut_mesh *cut = o->cut;
     const ebpo_face_list *faces = cut->faces;
-    uint64_t t = first_triangle(r), after = 0; /* the face after the last removed or kept one */
+    uint64_t t = first_triangle(r),
+             after = 0; /* after: the file's face after the last listed one */
     for (uint32_t f = faces->first[0]; f < faces->first[1]; f++) {
         uint64_t end = t;
         while (end < cut->count && cut->face[end] == f)
@@ -391,15 +404,15 @@ static bool add_changes(operand_output *r)
             end == t ? faces->keeps_base
                      : end - t == 1 && o->sign[t] > 0 &&
                            memcmp(cut->triangle[t], faces->face[f], sizeof cut->triangle[t]) == 0;
-        uint64_t number = faces->number[f];
-        if (!faces->keeps_base && !add_removed(o, after, number - after))
+        uint64_t file_face = faces->file_face[f];
+        if (!faces->keeps_base && !add_removed(o, after, file_face - after))
             return false;
-        if (!kept && !add_removed(o, number, 1))
+        if (!kept && !add_removed(o, file_face, 1))
             return false;
         for (; t < end; t++)
-            if (!kept && !add_triangle(r, (origin){ number, faces->base_source[f] }, t))
+            if (!kept && !add_triangle(r, (origin){ file_face, faces->base_source[f] }, t))
                 return false;
-        after = number + 1;
+        after = file_face + 1;
     }
     uint64_t all = faces->boolean->solid[0].model->info->face_count;
     return faces->keeps_base || add_removed(o, after, all - after);
@@ -408,11 +421,11 @@ static bool add_changes(operand_output *r)
 static ebpo_status read_maps(operand_output *r, ebpo_error *error)
 {
     const ebpo_model *model = r->o->cut->faces->boolean->solid[r->operand].model;
-    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_error cause = EBPO_ERROR_INIT;
-    how.workspace = r->mesh.workspace;
-    how.threads = r->o->cut->faces->boolean->threads;
-    ebpo_status status = ebpo_file_read_maps(model->file, &how, &r->maps, &cause);
+    options.workspace = r->mesh.workspace;
+    options.threads = r->o->cut->faces->boolean->threads;
+    ebpo_status status = ebpo_file_read_maps(model->file, &options, &r->maps, &cause);
     return status == EBPO_OK || status == EBPO_E_ABSENT
                ? EBPO_OK
                : ebpo_fail_operand(model, r->operand, &cause, error);
@@ -455,45 +468,45 @@ static ebpo_status add_operand(output *o, uint32_t operand, ebpo_error *error)
 
 /* --- sizes --- */
 
-/* Copies the signs of listed faces to their components. */
+/* Sets the sign of each component to the sign of a listed face of the component. */
 static ebpo_status find_components(output *o, ebpo_error *error)
 {
     const ebpo_face_list *faces = o->cut->faces;
     for (uint32_t i = 0; i < faces->boolean->count; i++) {
-        o->of_component[i] = ebpo_alloc_zero(faces->whole[i].components, 1);
-        if (!o->of_component[i])
+        o->component_sign[i] = ebpo_alloc_zero(faces->whole[i].components, 1);
+        if (!o->component_sign[i])
             return ebpo_fail_memory(error, faces->whole[i].components);
     }
     for (uint64_t t = 0; t < o->cut->count; t++) {
         uint32_t face = o->cut->face[t], operand = ebpo_face_list_operand(faces, face),
                  component = ebpo_face_list_component(faces, operand, face);
         if (component != EBPO_NO_COMPONENT)
-            o->of_component[operand][component] = o->sign[t];
+            o->component_sign[operand][component] = o->sign[t];
     }
     return EBPO_OK;
 }
 
-/* Returns the number of faces of the result that are not listed. same[operand] is 0 if the operand
- * is not listed (ebpo_boolean_find_equal). */
+/* Returns the number of faces of an operand that are in the result and are not listed. Faces of an
+ * operand that is equal to an earlier one count there: its entry of `equal` is 0. */
 static uint64_t count_whole(const output *o, uint32_t operand)
 {
     const ebpo_face_list *faces = o->cut->faces;
     const ebpo_whole_faces *whole = &faces->whole[operand];
     uint64_t count = 0;
-    if (!faces->same[operand] || ebpo_face_list_is_base(faces, operand))
+    if (!faces->equal[operand] || ebpo_face_list_is_base(faces, operand))
         return 0;
     EBPO_FOR_ITEMS(faces->workspace, f, 0, faces->boolean->solid[operand].model->info->face_count)
         count +=
-            !ebpo_has_bit(whole->listed, f) && o->of_component[operand][whole->component[f]] != 0;
+            !ebpo_has_bit(whole->listed, f) && o->component_sign[operand][whole->component[f]] != 0;
     return count;
 }
 
-/* Returns true if an operand has coordinates beyond the range of floats. The result is in all
- * half-spaces and in another operand. */
+/* Returns true if the result may have coordinates beyond the range of floats: an operand has.
+ * Half-spaces are not tested, because the result is also in the box of the other operands. */
 static bool exceeds_floats(const ebpo_face_list *faces)
 {
     for (uint32_t i = 0; i < faces->boolean->first_plane; i++)
-        for (int k = 0; k < 6 && faces->same[i]; k++)
+        for (int k = 0; k < 6 && faces->equal[i]; k++)
             if (fabs(faces->boolean->solid[i].box[k]) > FLT_MAX)
                 return true;
     return false;
@@ -503,7 +516,7 @@ static bool exceeds_floats(const ebpo_face_list *faces)
 static bool has_doubles(const ebpo_face_list *faces)
 {
     for (uint32_t i = 0; i < faces->boolean->given; i++)
-        if (faces->same[i] && faces->boolean->solid[i].model->info->double_coordinates)
+        if (faces->equal[i] && faces->boolean->solid[i].model->info->double_coordinates)
             return true;
     return false;
 }
@@ -527,7 +540,7 @@ static ebpo_status add_own_attributes(output *o, const ebpo_boolean_mesh_options
                                       uint64_t count, ebpo_error *error)
 {
     ebpo_mesh *mesh = o->mesh;
-    bool changed_only = o->cut->faces->changed_only, fine = true;
+    bool changed_only = o->cut->faces->changed_only, made = true;
     ebpo_status status = options->origins || options->colours || changed_only
                              ? ebpo_mesh_need_attributes(mesh, error)
                              : EBPO_OK;
@@ -535,18 +548,18 @@ static ebpo_status add_own_attributes(output *o, const ebpo_boolean_mesh_options
         return status;
     if (changed_only) {
         o->removed = mesh->attributes->count;
-        fine = add_array(mesh, "removed", "first count", EBPO_ATTRIBUTE_UINT32, 0) != NULL;
+        made = add_array(mesh, "removed", "first count", EBPO_ATTRIBUTE_UINT32, 0) != NULL;
     }
     if (options->origins) {
         o->operand = add_array(mesh, "face", "operand", EBPO_ATTRIBUTE_UINT8, count);
         o->operand_face = add_array(mesh, "face", "operand_face", EBPO_ATTRIBUTE_UINT32, count);
-        fine = fine && o->operand && o->operand_face;
+        made = made && o->operand && o->operand_face;
     }
     if (options->colours) {
         o->colour = add_array(mesh, "face", "red green blue", EBPO_ATTRIBUTE_UINT8, count);
-        fine = fine && o->colour;
+        made = made && o->colour;
     }
-    return fine ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 8 * count, error);
+    return made ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 8 * count, error);
 }
 
 /* Allocates the arrays of the mesh, also for an empty result, so that they have the right types. */
@@ -588,7 +601,7 @@ static ebpo_status add_operands(output *o, const ebpo_progress *progress, ebpo_e
     for (uint32_t i = 0; i < faces->boolean->count && status == EBPO_OK; i++) {
         if (!ebpo_progress_step(progress, "join the result", i, faces->boolean->count, error))
             return EBPO_E_CANCELLED;
-        if (faces->same[i])
+        if (faces->equal[i])
             status = add_operand(o, i, error);
     }
     return status;
@@ -623,7 +636,7 @@ ebpo_status ebpo_result_mesh_make(const ebpo_cut_mesh *cut, const int8_t *sign,
         report->volume = ebpo_volume_sum_interval(&o.volume);
     ebpo_volume_sum_end(&o.volume);
     for (uint32_t i = 0; i < EBPO_BOOLEAN_OPERANDS_MAX; i++)
-        free(o.of_component[i]);
+        free(o.component_sign[i]);
     free(o.number);
     free(o.of_rounded);
     ebpo_corner_ids_free(&o.rounded);

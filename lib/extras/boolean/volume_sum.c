@@ -1,5 +1,5 @@
-/* Sums volumes below faces without rounding: in a long accumulator if products of coordinates are
- * exact in doubles, otherwise in integers (GMP). */
+/* Sums volumes below faces without rounding: in a long accumulator (mesh/sum.h) if products of
+ * coordinates are exact in doubles, else in integers (GMP). */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/volume_sum.h"
@@ -9,20 +9,21 @@
 #include "geometry/expansion.h"
 #include "geometry/integer_vectors.h"
 
-/* Exponent of the unit for products of three doubles: it represents all 53 bits of each double,
- * also of the least one, 2^-1074. */
+/* Exponent of the unit of volumes. Every double is a multiple of 2^-1074, so a product of three
+ * doubles is a multiple of the unit. The additional bits reduce the rounding of rational corners.
+ */
 enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
 
 void ebpo_volume_sum_begin(ebpo_volume_sum *s)
 {
     s->by_doubles = (ebpo_sum){ 0 };
-    mpz_init(s->other);
+    mpz_init(s->by_integers);
 }
 
-void ebpo_volume_sum_end(ebpo_volume_sum *s) { mpz_clear(s->other); }
+void ebpo_volume_sum_end(ebpo_volume_sum *s) { mpz_clear(s->by_integers); }
 
-/* Returns true if products of three of these numbers and their rounding errors are doubles: the
- * lowest bit of a product is at least 2^(-3 (250 + 52)). */
+/* Returns true if each product of three of these coordinates is a sum of doubles: the lowest bit of
+ * a product is at least 2^(-3 (250 + 52)). */
 static bool has_exact_products(const double t[3][3])
 {
     bool by_doubles = true;
@@ -33,7 +34,7 @@ static bool has_exact_products(const double t[3][3])
     return by_doubles;
 }
 
-/* Adds the product x y z, exactly. */
+/* Adds the product x y z exactly, as a sum of doubles. */
 static void add_product(ebpo_sum *s, double x, double y, double z)
 {
     double product[2], all[4];
@@ -43,16 +44,16 @@ static void add_product(ebpo_sum *s, double x, double y, double z)
         ebpo_sum_add(s, all[i]);
 }
 
-static void add_by_doubles(ebpo_sum *s, const double t[3][3], int times)
+static void add_by_doubles(ebpo_sum *s, const double t[3][3], int sign)
 {
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        add_product(s, times * t[0][k], t[1][u], t[2][v]);
-        add_product(s, -times * t[0][k], t[1][v], t[2][u]);
+        add_product(s, sign * t[0][k], t[1][u], t[2][v]);
+        add_product(s, -sign * t[0][k], t[1][v], t[2][u]);
     }
 }
 
-static void add_other(mpz_t sum, const double t[3][3], int times)
+static void add_by_integers(mpz_t sum, const double t[3][3], int sign)
 {
     ebpo_vectorz corner[3], cross;
     mpz_t volume;
@@ -65,7 +66,7 @@ static void add_other(mpz_t sum, const double t[3][3], int times)
     }
     ebpo_vectorz_cross(&cross, &corner[1], &corner[2]);
     ebpo_vectorz_dot(volume, &corner[0], &cross);
-    mpz_mul_si(volume, volume, times);
+    mpz_mul_si(volume, volume, sign);
     mpz_add(sum, sum, volume);
     for (int i = 0; i < 3; i++)
         ebpo_vectorz_clear(&corner[i]);
@@ -73,18 +74,18 @@ static void add_other(mpz_t sum, const double t[3][3], int times)
     mpz_clear(volume);
 }
 
-void ebpo_volume_sum_add(ebpo_volume_sum *s, const double t[3][3], int times)
+void ebpo_volume_sum_add(ebpo_volume_sum *s, const double t[3][3], int sign)
 {
     if (has_exact_products(t))
-        add_by_doubles(&s->by_doubles, t, times);
+        add_by_doubles(&s->by_doubles, t, sign);
     else
-        add_other(s->other, t, times);
+        add_by_integers(s->by_integers, t, sign);
 }
 
 void ebpo_volume_sum_merge(ebpo_volume_sum *s, const ebpo_volume_sum *more)
 {
     ebpo_sum_merge(&s->by_doubles, &more->by_doubles);
-    mpz_add(s->other, s->other, more->other);
+    mpz_add(s->by_integers, s->by_integers, more->by_integers);
 }
 
 /* Converts the accumulator to an integer in units of 2^-1074. */
@@ -102,12 +103,12 @@ static void to_integer(mpz_t out, const ebpo_sum *sum)
     }
 }
 
-/* Computes six times the volume in units of 2^EBPO_VOLUME_UNIT. */
-static void add_parts(mpz_t out, const ebpo_volume_sum *s)
+/* Computes six sign the volume in units of 2^EBPO_VOLUME_UNIT. */
+static void join_sums(mpz_t out, const ebpo_volume_sum *s)
 {
     to_integer(out, &s->by_doubles);
     mpz_mul_2exp(out, out, -1074 - EBPO_VOLUME_UNIT);
-    mpz_add(out, out, s->other);
+    mpz_add(out, out, s->by_integers);
 }
 
 double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent)
@@ -115,7 +116,7 @@ double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *
     mpz_t all, six;
     mpz_init(all);
     mpz_init_set_ui(six, 6);
-    add_parts(all, s);
+    join_sums(all, s);
     double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
     int bits = mpz_sgn(all) ? (int)mpz_sizeinbase(all, 2) : -EBPO_VOLUME_UNIT;
     *scaled = ebpo_round_quotient(all, six, -bits);
@@ -126,7 +127,7 @@ double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *
 
 /* --- faces with rational corners --- */
 
-void ebpo_volume_sum_add_rational(ebpo_volume_sum *s, mpq_t (*t)[3], int times)
+void ebpo_volume_sum_add_rational(ebpo_volume_sum *s, mpq_t (*t)[3], int sign)
 {
     mpq_t sum, term;
     mpz_t below;
@@ -141,11 +142,11 @@ void ebpo_volume_sum_add_rational(ebpo_volume_sum *s, mpq_t (*t)[3], int times)
         else
             mpq_sub(sum, sum, term);
     }
-    if (times < 0)
+    if (sign < 0)
         mpq_neg(sum, sum);
     mpq_mul_2exp(sum, sum, -EBPO_VOLUME_UNIT);
     mpz_fdiv_q(below, mpq_numref(sum), mpq_denref(sum));
-    mpz_add(s->other, s->other, below);
+    mpz_add(s->by_integers, s->by_integers, below);
     s->rounded += mpz_divisible_p(mpq_numref(sum), mpq_denref(sum)) ? 0 : 1;
     mpz_clear(below);
     mpq_clears(sum, term, NULL);
@@ -157,11 +158,11 @@ ebpo_value_bounds ebpo_volume_sum_interval(const ebpo_volume_sum *s)
     mpz_t all, six;
     mpz_init(all);
     mpz_init_set_ui(six, 6);
-    add_parts(all, s);
+    join_sums(all, s);
     out.lo = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
     mpz_add_ui(all, all, s->rounded);
     out.hi = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
-    if (out.lo != out.hi) { /* both are rounded to nearest */
+    if (out.lo != out.hi) { /* both were rounded to nearest, perhaps inwards */
         out.kind = EBPO_VALUE_INTERVAL;
         out.lo = nextafter(out.lo, -INFINITY);
         out.hi = nextafter(out.hi, INFINITY);

@@ -1,9 +1,10 @@
-/* Finds the connected components of an operand's whole faces. A whole face has an area, and
- * intersects no other face except as a neighbour.
+/* Finds the connected components of an operand's whole faces. A whole face has an area, and is in
+ * no pair of intersecting faces; neighbours with a common corner or edge are no such pair.
  *
- * Corners are compared by their positions. Each edge of a face is listed at its lesser corner. Runs
- * of consecutive corners are processed one after the other, so the lists need little memory. Faces
- * with a common edge are joined in a disjoint-set forest; the root of a set is its first face. */
+ * Vertices at one position are one corner. Each edge of a face is listed at its corner with the
+ * lower number. Edges are listed for one run (range) of consecutive corners after the other, so the
+ * lists need little memory. Faces with a common edge are joined in a disjoint-set forest; the root
+ * of a set is its first face. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -20,21 +21,22 @@
 
 static const char stage[] = "join faces";
 
-/* Number of edges that are listed at once: EDGES, or FEW_EDGES with a limit of memory. */
+/* FACE_GRAIN: number of faces in one task of a thread. Number of edges that are listed at once:
+ * EDGES, or FEW_EDGES if arrays are in a workspace, which limits the memory. */
 enum { FACE_GRAIN = 1 << 16, EDGES = 1 << 23, FEW_EDGES = 1 << 20 };
 
-/* Bits for faces and corners. */
 typedef struct joining {
     ebpo_whole_faces *out;
     const ebpo_mesh *mesh;
-    const uint64_t *paired;
-    ebpo_positions first; /* if vertices have equal positions */
-    uint64_t *flat;       /* a bit for each face without area */
-    uint64_t *touched;    /* a bit for each corner of a face that is in a pair */
-    uint32_t *degree;     /* for each corner: number of edges that are listed at it */
-    uint64_t *begin;      /* for each corner of a run, and the next one: the start of its list */
+    const uint64_t *paired; /* a bit for each face that is in a pair */
+    ebpo_positions first;   /* the first vertex at each position; only if out->repeats */
+    uint64_t *flat;         /* a bit for each face without area */
+    uint64_t *touched;      /* a bit for each corner of a face that is in a pair */
+    uint32_t *degree;       /* for each corner: number of edges that are listed at it */
+    uint64_t *begin; /* for each corner of a run, and the next corner: the start of its list */
     uint64_t begin_capacity;
-    /* other corner << 32 | face << 1 | 1 if the face has the edge from the greater corner */
+    /* lists of edges: (other corner << 32 | face << 1 | direction); the direction is 1 if the face
+     * has the edge from the corner with the higher number */
     uint64_t *edge;
 } joining;
 
@@ -62,7 +64,8 @@ static ebpo_status test_areas(void *context, uint64_t begin, uint64_t end, unsig
         for (int i = 0; i < 3; i++)
             ebpo_mesh_position(j->mesh, j->mesh->faces[3 * f + (unsigned)i], p[i]);
         if (ebpo_zero_area(p[0], p[1], p[2]))
-            ebpo_set_bit(j->flat, f); /* pieces are multiples of 64 faces */
+            ebpo_set_bit(j->flat,
+                         f); /* threads set bits in different words: FACE_GRAIN % 64 is 0 */
     }
     return EBPO_OK;
 }
@@ -91,6 +94,7 @@ static void mark_corners(joining *j)
     }
 }
 
+/* Lists the faces that are not whole, and the faces with two or more marked corners. */
 static void list_touched(joining *j)
 {
     EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count) {
@@ -111,14 +115,15 @@ static void list_touched(joining *j)
 
 static uint32_t face_of(uint64_t edge) { return (uint32_t)edge >> 1; }
 
-/* Joins the faces of an edge if there are two faces and both are whole. Returns false if the edge
- * is not closed. */
+/* Joins the faces of an edge if the edge has exactly two faces and both are whole. list: the
+ * entries of the edge. Returns false if the edge does not occur equally often in both directions.
+ */
 static bool join_edge(joining *j, const uint64_t *list, uint64_t count)
 {
     int64_t balance = 0;
     for (uint64_t i = 0; i < count; i++) {
         if (ebpo_has_bit(j->paired, face_of(list[i])))
-            return true; /* the edge is tested with the cut faces */
+            return true; /* ebpo_cut_mesh_classify tests the edges of cut faces */
         balance += list[i] & 1 ? -1 : 1;
     }
     if (count == 2)
@@ -128,6 +133,8 @@ static bool join_edge(joining *j, const uint64_t *list, uint64_t count)
     return balance == 0;
 }
 
+/* Joins faces at the edges that are listed at one corner. Returns false if an edge is not closed.
+ */
 static bool join_list(joining *j, uint64_t *list, uint64_t count)
 {
     bool closed = true;
@@ -157,8 +164,8 @@ static void list_edges(joining *j, uint64_t first, uint64_t end)
     }
 }
 
-/* Processes as many corners from `first` on as have lists that fit in memory. Sets *end to the next
- * corner. */
+/* Joins faces at a run of corners. The run begins at `first`, and has as many corners as have
+ * together at most `capacity` edges. Sets *end to the corner after the run. */
 static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t capacity,
                             ebpo_error *error)
 {
@@ -169,7 +176,7 @@ static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t 
         return ebpo_fail_memory(error, (last - first + 2) * sizeof *j->begin);
     uint64_t at = 0;
     EBPO_FOR_ITEMS(j->mesh->workspace, n, first, last) {
-        j->begin[n - first + 1] = at; /* moves to the end of the list while the list is filled */
+        j->begin[n - first + 1] = at; /* list_edges moves this to the end of the list */
         at += j->degree[n];
     }
     j->begin[0] = 0;
@@ -208,7 +215,7 @@ static void number_components(joining *j)
 {
     uint32_t *parent = j->out->component, count = 0;
     EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count)
-        parent[f] = parent[parent[f]]; /* the root: parents come first */
+        parent[f] = parent[parent[f]]; /* the root, because parents come before their children */
     EBPO_FOR_ITEMS(j->mesh->workspace, g, 0, j->mesh->face_count) {
         if (!is_whole(j, g))
             parent[g] = EBPO_NO_COMPONENT;
@@ -218,23 +225,24 @@ static void number_components(joining *j)
     j->out->components = count;
 }
 
-/* Adds a face of each component without a listed face to the list. */
+/* Lists the first face of each component that has no listed face. The first pass marks the
+ * components that have a listed face, the second pass lists faces of the other components. */
 static ebpo_status list_components(joining *j, ebpo_error *error)
 {
     const uint32_t *component = j->out->component;
-    uint64_t *has = ebpo_alloc_zero(words_for(j->out->components), sizeof *has);
-    if (!has)
-        return ebpo_fail_memory(error, words_for(j->out->components) * sizeof *has);
+    uint64_t *has_listed = ebpo_alloc_zero(words_for(j->out->components), sizeof *has_listed);
+    if (!has_listed)
+        return ebpo_fail_memory(error, words_for(j->out->components) * sizeof *has_listed);
     for (int pass = 0; pass < 2; pass++)
         EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count) {
-            if (component[f] == EBPO_NO_COMPONENT || ebpo_has_bit(has, component[f]))
+            if (component[f] == EBPO_NO_COMPONENT || ebpo_has_bit(has_listed, component[f]))
                 continue;
             if (pass)
                 ebpo_set_bit(j->out->listed, f);
             if (ebpo_has_bit(j->out->listed, f))
-                ebpo_set_bit(has, component[f]);
+                ebpo_set_bit(has_listed, component[f]);
         }
-    free(has);
+    free(has_listed);
     return EBPO_OK;
 }
 

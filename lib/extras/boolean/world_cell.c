@@ -1,5 +1,5 @@
-/* Cells of an octree of the world. Decides if the result of a boolean expression is the same in a
- * whole cell.
+/* Evaluates a Boolean expression in cells of an octree of the world: decides if a cell is entirely
+ * inside or entirely outside the result.
  *
  * For each operand, the ball around the cell is transformed into the model's coordinates. The
  * model's box, then the white and black nodes of its tree, then the nearest face decide if the cell
@@ -16,19 +16,20 @@
 #include "query/query_node.h"
 
 enum {
-    SEEN_FACES = 4, /* in addition to EBPO_MAY_IN and EBPO_MAY_OUT: there may be faces */
-    NODES_MAX = 64  /* maximum number of nodes that are visited to find a black node and a white
-                     * one, after a node that may have faces */
+    SEEN_FACES = 4, /* a bit beside EBPO_MAY_IN and EBPO_MAY_OUT: there may be faces */
+    NODES_MAX = 64  /* maximum number of nodes that are visited after the first node that may have
+                     * faces; then only a black and a white node can decide */
 };
 
+/* A ball in the coordinates of a model. A black node is inside the solid, a white node outside. */
 typedef struct ball {
     const ebpo_model *model;
-    ebpo_box box;
-    const double *p;
-    double square; /* squared radius */
-    unsigned seen; /* possible contents of the ball */
-    unsigned sure; /* bits of EBPO_MAY_IN and EBPO_MAY_OUT that are certain */
-    unsigned nodes;
+    ebpo_box box;    /* the model's root cell */
+    const double *p; /* centre */
+    double square;   /* squared radius */
+    unsigned seen;   /* bits of what the ball may contain: inner points, outer points, faces */
+    unsigned sure;   /* bits of what the ball certainly contains: inner points, outer points */
+    unsigned nodes;  /* number of nodes visited after the first node that may have faces */
 } ball;
 
 /* Returns the squared distance of the cell from the ball's centre, with a relative error of 2^-50
@@ -44,6 +45,7 @@ static double square_to(const ball *b, ebpo_cell cell)
     return sum;
 }
 
+/* Adds what the node and its descendants contain to b->seen and b->sure. */
 static void inspect_node(ball *b, const ebpo_node *node)
 {
     bool enough = b->sure == EBPO_MAY_BOTH || (b->seen & SEEN_FACES && ++b->nodes > NODES_MAX);
@@ -65,16 +67,13 @@ static void inspect_node(ball *b, const ebpo_node *node)
     }
 }
 
-/* Decides the ball by nodes. Returns EBPO_MAY_IN or EBPO_MAY_OUT if no face is in the ball,
- * EBPO_MAY_BOTH if a face is, 0 if that is unknown. A test of the faces would give the same result,
- * so the result does not depend on what is in memory. */
+/* Decides by the nodes of the tree if the ball is inside or outside. Returns EBPO_MAY_IN or
+ * EBPO_MAY_OUT if no face is in the ball, EBPO_MAY_BOTH if a face is in the ball, and 0 if this is
+ * unknown. A test of the faces would give the same result, so the result does not depend on which
+ * nodes are in memory. */
 static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], double radius)
 {
-    ball b = { .model = model,
-               .box = ebpo_model_box(model),
-               .p = p,
-
-               .square = radius * radius };
+    ball b = { .model = model, .box = ebpo_model_box(model), .p = p, .square = radius * radius };
     double low[3], high[3];
     ebpo_node root = ebpo_model_root(model);
     ebpo_cell_bounds(&b.box, root.cell, low, high);
@@ -91,7 +90,8 @@ static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], doub
     return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
 }
 
-/* Decides the ball by the faces. */
+/* Decides the same by the distance of the nearest face. *may: EBPO_MAY_BOTH if a face may be in the
+ * ball. */
 static ebpo_status inspect_faces(ebpo_context *context, const double p[3], double radius,
                                  unsigned *may, ebpo_error *error)
 {
@@ -110,10 +110,10 @@ static ebpo_status inspect_faces(ebpo_context *context, const double p[3], doubl
     return status;
 }
 
-/* Decides an axis-parallel cube, given by its centre and half its edge, for posed coordinates.
- * *may: EBPO_MAY_IN when the whole closed cube is inside the solid, EBPO_MAY_OUT when it is
- * outside, EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. *stage:
- * the stage that has decided. */
+/* Decides if a cube of the world is inside or outside a posed solid. The cube is parallel to the
+ * axes; half: half its edge. *may: EBPO_MAY_IN if the whole closed cube is inside, EBPO_MAY_OUT if
+ * it is outside, EBPO_MAY_BOTH if a face may be in the ball around the cube. *stage: the test that
+ * has decided (EBPO_CUBE_...). */
 static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
                                  const double centre[3], double half, unsigned *may,
                                  unsigned *stage, ebpo_error *error)
@@ -134,10 +134,11 @@ static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *contex
     return inspect_faces(context, p, radius, may, error);
 }
 
-/* If the edge is beyond 2^+- this exponent, volumes of cells leave the range of doubles. */
+/* The edge of the root cell is from 2^-MAX_POWER to 2^MAX_POWER. Otherwise, volumes of cells could
+ * leave the range of doubles. */
 enum { MAX_POWER = 300 };
 
-static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
+static ebpo_status fail_location(const double box[6], int level, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the result is around (%g, %g, %g), up to %g long: corners of cells of "
@@ -164,8 +165,9 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
     if (box[0] > box[3])
         return EBPO_OK;
     double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
-    frexp(1.07 * most, &power); /* factor 16 / 15 with its rounding: the origin is on a grid of 1 /
-                                 * 16 of the edge */
+    /* The origin is on a grid of 1/16 of the edge, so 15/16 of the edge must be at least `most`.
+     * 1.07 is a little more than 16/15. */
+    frexp(1.07 * most, &power);
     if (most == 0 || power < -MAX_POWER || power > MAX_POWER)
         return fail_range(most, error);
     out->edge = ldexp(1, power);
@@ -173,7 +175,7 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
     for (int k = 0; k < 3; k++) {
         out->origin[k] = floor(box[k] / grid) * grid;
         if (!(fabs(out->origin[k]) + out->edge <= 0x1p53 * finest))
-            return fail_place(box, level, error);
+            return fail_location(box, level, error);
     }
     return EBPO_OK;
 }

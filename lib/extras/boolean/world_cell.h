@@ -1,4 +1,5 @@
-/* Cells of an octree of the world; decides if a cube is inside or outside a solid at a pose. */
+/* Evaluates a Boolean expression in cells of an octree of the world: decides if a cell is entirely
+ * inside or entirely outside the result. */
 #ifndef EBPO_BOOLEAN_WORLD_CELL_H
 #define EBPO_BOOLEAN_WORLD_CELL_H
 
@@ -6,13 +7,15 @@
 #include "extras/collide/posed_solid.h"
 #include "geometry/cells.h"
 
-/* Stages of the decision. */
+/* The tests that can decide if a cell is in or out of an operand: the box of the model, the nodes
+ * of its tree, or its faces. */
 enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_STAGES };
 
-/* The root of the octree: corners and centres of cells down to `level` are exact. */
+/* The root cell of the octree, a cube around the result. */
 typedef struct ebpo_world {
-    double origin[3], edge; /* edge: a power of two; 0: the world is empty */
-    int level;
+    double origin[3]; /* lower corner */
+    double edge;      /* a power of two; 0: the result is empty */
+    int level;        /* the finest level: down to it, corners and centres of cells are exact */
 } ebpo_world;
 
 /* Makes a world around the result. Fails with EBPO_E_LIMIT if corners would not be doubles. */
@@ -29,6 +32,7 @@ static inline double ebpo_world_edge(const ebpo_world *w, int level)
     return w->edge * ebpo_half_power(level);
 }
 
+/* Returns the coordinate, on an axis, of the lower side of the cells with index k on a level. */
 static inline double ebpo_world_cell_face(const ebpo_world *w, int axis, int level, uint32_t k)
 {
     return w->origin[axis] + (double)k * ebpo_world_edge(w, level);
@@ -39,8 +43,9 @@ static inline ebpo_world_cell ebpo_world_child(const ebpo_world_cell *c, unsigne
     return (ebpo_world_cell){ ebpo_cell_child(c->cell, octant), c->known, c->in };
 }
 
-/* Queries the operands whose state in the cell is not known yet, until the expression is decided.
- * *may: possible states of the result. Counts the deciding stages in stages[EBPO_CUBE_STAGES]. */
+/* Queries the operands whose state in the cell is not known yet, until the state of the result is
+ * certain. *may: possible states of the result. Counts the deciding tests in
+ * stages[EBPO_CUBE_STAGES]. */
 EBPO_MUST_USE ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker,
                                                 const ebpo_world *w, ebpo_world_cell *c,
                                                 unsigned *may, uint8_t *stages, ebpo_error *error);
