@@ -14,7 +14,7 @@ static const arg_option help_option = {
     "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL
 };
 
-/* Prints a usage error; the value is ARGS_WRONG. */
+/* Prints a usage error. The value of the expression is ARGS_WRONG. */
 #define refuse_args(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
 
 /* --- values --- */
@@ -50,6 +50,7 @@ static void join_words(const char *const *words, char *out, size_t capacity)
         used += (size_t)snprintf(out + used, capacity - used, "%s%s", i ? ", " : "", words[i]);
 }
 
+/* Sets *out to the index of the word text[length] in o->words. */
 static arg_result find_word(const arg_spec *spec, const arg_option *o, const char *text,
                             size_t length, int *out)
 {
@@ -58,9 +59,9 @@ static arg_result find_word(const arg_spec *spec, const arg_option *o, const cha
             *out = i;
             return ARGS_RUN;
         }
-    const char *now = renamed_word(o->name, text, length);
-    if (now)
-        return refuse_args(spec, "--%s: '%.*s' is now '%s'", o->name, (int)length, text, now);
+    const char *current = renamed_word(o->name, text, length);
+    if (current)
+        return refuse_args(spec, "--%s: '%.*s' is now '%s'", o->name, (int)length, text, current);
     char all[200];
     join_words(o->words, all, sizeof all);
     return refuse_args(spec, "--%s: '%.*s' is not one of: %s", o->name, (int)length, text, all);
@@ -131,32 +132,34 @@ static const arg_option *find_letter(const arg_spec *spec, char letter)
     return letter == 'h' ? &help_option : NULL;
 }
 
-/* Returns an option that shares a beginning of at least three letters, for "did you mean". */
+/* Returns the name of the option that shares the longest beginning with `name`, at least three
+ * letters, for "did you mean"; NULL: there is none. */
 static const char *find_similar(const arg_spec *spec, const char *name)
 {
     const char *best = NULL;
     size_t best_length = 2;
     for (const arg_option *o = spec->options; o->name; o++) {
-        size_t same = 0;
-        while (name[same] && name[same] == o->name[same])
-            same++;
-        if (same > best_length) {
+        size_t length = 0; /* number of equal letters */
+        while (name[length] && name[length] == o->name[length])
+            length++;
+        if (length > best_length) {
             best = o->name;
-            best_length = same;
+            best_length = length;
         }
     }
     return best;
 }
 
+/* Refuses an unknown option. shown: the argument. name: the option's name or letters in it. */
 static arg_result fail_unknown(const arg_spec *spec, const char *shown, const char *name)
 {
     size_t length = strcspn(name, "=");
-    const char *now = renamed_option(spec->command, name, length);
-    if (now)
-        return refuse_args(spec, "--%.*s is now %s", (int)length, name, now);
-    const char *near = find_similar(spec, name);
-    if (near)
-        return refuse_args(spec, "unknown option '%s'; did you mean '--%s'?", shown, near);
+    const char *current = renamed_option(spec->command, name, length);
+    if (current)
+        return refuse_args(spec, "--%.*s is now %s", (int)length, name, current);
+    const char *similar = find_similar(spec, name);
+    if (similar)
+        return refuse_args(spec, "unknown option '%s'; did you mean '--%s'?", shown, similar);
     return refuse_args(spec, "unknown option '%s'", shown);
 }
 
@@ -167,10 +170,12 @@ typedef struct parser {
     int argc, at; /* at: index of the next argument */
     char **argv;
     void *values;
-    const char *output; /* given as an option in place of an operand, or NULL */
+    const char *output; /* operand that was given as the option --output, or NULL */
     size_t output_at;   /* index of that operand */
 } parser;
 
+/* Takes an option and its value. joined: the value in the same argument ("--name=VALUE"); NULL: the
+ * value, if the option has one, is the next argument. */
 static arg_result take_option(parser *p, const arg_option *o, const char *joined)
 {
     if (o == &help_option) {
@@ -211,9 +216,9 @@ static arg_result take_letters(parser *p)
         const arg_option *o = find_letter(p->spec, *c);
         if (!o)
             return fail_unknown(p->spec, shown, c);
-        bool rest = o->kind != ARG_FLAG && c[1];
-        arg_result result = take_option(p, o, rest ? c + 1 : NULL);
-        if (result != ARGS_RUN || rest)
+        bool has_joined = o->kind != ARG_FLAG && c[1];
+        arg_result result = take_option(p, o, has_joined ? c + 1 : NULL);
+        if (result != ARGS_RUN || has_joined)
             return result;
     }
     return ARGS_RUN;
@@ -236,7 +241,8 @@ static bool is_among(const char *words, const char *word)
     return false;
 }
 
-/* Refuses a name with the ending of another format, which would mislead users of the file. */
+/* Refuses an output name that ends like the files of another format, because the name would mislead
+ * users of the file. */
 static arg_result check_ending(const arg_spec *spec, const char *path)
 {
     static const char known[] = "ply obj stl off glb gltf vtk vtkhdf xdmf png jpg jpeg gif svg pdf "
@@ -259,7 +265,7 @@ static arg_result check_operand(const arg_spec *spec, const char *text, int i)
     return i == 1 ? check_ending(spec, text) : ARGS_RUN;
 }
 
-/* Adds the operand that --output gives. */
+/* Adds the operand that was given as --output. */
 static arg_result add_output(const parser *p, const char **operands, int *count)
 {
     int at = (int)p->output_at;

@@ -20,26 +20,28 @@ typedef enum arg_kind {
     ARG_OPERAND /* the operand OUT, given as the option --output; `offset` is the operand's index */
 } arg_kind;
 
+/* An option of a command. */
 typedef struct arg_option {
     const char *name; /* "max-level", without dashes; NULL ends the table */
-    char letter;      /* short form, or 0 */
+    char letter;      /* short form; 0: none */
     arg_kind kind;
-    size_t offset;     /* offset of the field in the values struct */
+    size_t offset;     /* offset, in the values struct of the command, of the field that is set */
     const char *value; /* "N", for --help; NULL for flags */
     const char *help;
-    double low, high;
-    const char *const *words; /* NULL-terminated */
+    double low, high;         /* range of ARG_INT and ARG_REAL */
+    const char *const *words; /* values of ARG_WORD and ARG_SET, NULL-terminated */
     const char *page; /* name of the page of `ebpo help` that describes the option; NULL: --help
                        * describes it */
 } arg_option;
 
-/* Texts in the order of the command line, NULL at the end. */
+/* The values of a repeated option, in the order of the command line, NULL at the end. */
 enum { ARG_LIST_MAX = 32 };
 typedef struct arg_list {
     const char *item[ARG_LIST_MAX + 1];
     int count;
 } arg_list;
 
+/* The operands and options of a command. */
 typedef struct arg_spec {
     const char *command;  /* "convert" */
     const char *operands; /* "IN.ply OUT.ebpo.h5" */
@@ -47,32 +49,38 @@ typedef struct arg_spec {
     const char *summary;  /* one line */
     const char *text;     /* further text for --help, or NULL */
     const arg_option *options;
-    /* Meaning of "-", one letter for each operand:
-     *   i  standard input, by way of a file (standard_files.h)
-     *   o  standard output, by way of a file
+    /* Meaning of the operand "-", one letter for each operand:
+     *   i  a temporary file with the bytes of standard input (standard_files.h)
+     *   o  a temporary file that is copied to standard output
      *   p  the command interprets "-"
      * A blank, the end of the text or NULL: "-" is refused. */
     const char *dash;
-    /* File name endings of the second operand's formats, such as "h5 hdf5"; known endings of other
-     * formats are refused. */
+    /* Endings of the second operand's file name, such as "h5 hdf5"; known endings of other formats
+     * are refused. NULL: any ending. */
     const char *writes;
 } arg_spec;
 
-/* Returns the letter of an operand in `dash`, or a blank. */
+/* Returns the letter of an operand in spec->dash, or a blank. */
 char args_dash(const arg_spec *spec, int operand);
 
-typedef enum arg_result { ARGS_RUN, ARGS_HELPED, ARGS_WRONG } arg_result;
+typedef enum arg_result {
+    ARGS_RUN,    /* the command is to run */
+    ARGS_HELPED, /* --help was printed */
+    ARGS_WRONG   /* an error was printed */
+} arg_result;
 
 enum { ARGS_OPERANDS_MAX = 12 };
 
-/* Parses argv[1 ..] into `values` (set to defaults before) and `operands` (unused ones NULL).
- * Options may be anywhere; "--" ends them. Prints --help on stdout, errors on stderr. */
+/* Parses argv[1 ..]. Options may be anywhere; "--" ends them. Prints --help on stdout, errors on
+ * stderr. values: struct of the command, which has its default values. operands: get the operands;
+ * unused entries are NULL. */
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
                       const char *operands[ARGS_OPERANDS_MAX]);
 
+/* Prints the text of --help. */
 void args_help(const arg_spec *spec);
 
-/* Prints the options of the command that have this page. */
+/* Prints the options of the command that this page of `ebpo help` describes. */
 void args_help_page(const arg_spec *spec, const char *page);
 
 /* Reads `count` finite numbers separated by commas. Returns false for any other text. */

@@ -7,11 +7,14 @@
 
 enum { DEPTH_MAX = 64 }; /* nested parentheses */
 
+/* A recursive-descent parser. Each function read_... parses a part of the expression at `at`, sets
+ * *number to the index of its node, and returns false after an error. */
 typedef struct parser {
-    const char *name, *text, *at;
-    uint32_t operands;
+    const char *name; /* name of the command */
+    const char *text, *at;
+    uint32_t operands; /* number of models that exist */
     boolean_nodes *out;
-    int depth;
+    int depth; /* number of open parentheses and complements */
 } parser;
 
 static bool fail_here(const parser *p, const char *what)
@@ -55,7 +58,7 @@ static bool read_atom(parser *p, uint32_t *number)
     } else if (*p->at >= 'A' && *p->at <= 'Z') {
         uint32_t operand = (uint32_t)(*p->at - 'A');
         if (operand >= p->operands)
-            return fail_here(p, "no such model");
+            return fail_here(p, "there is no such model");
         p->at++;
         if (!add_node(p, EBPO_BOOLEAN_OPERAND, operand, 0, number))
             return false;
@@ -142,7 +145,7 @@ bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operan
 
 bool boolean_read_plane(const char *name, const char *text, double plane[4])
 {
-    int axis = text[0] - 'x';
+    int axis = text[0] - 'x'; /* for "x=V"; for four numbers not used */
     for (int k = 0; k < 4; k++)
         plane[k] = k == axis;
     if (axis >= 0 && axis < 3 && text[1] == '=' ? args_read_reals(text + 2, 1, plane + 3)

@@ -5,11 +5,15 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
+/* Adds an operand whose model is set later. Returns false, after an error message, if the letters A
+ * to Z do not suffice. */
 static bool add_operand(boolean_operands *o, const char *name, const char *shown,
                         const ebpo_pose *pose)
 {
     if (o->count == BOOLEAN_OPERANDS) {
-        command_usage(name, "there are more than %d models; A to Z name them", BOOLEAN_OPERANDS);
+        command_usage(name,
+                      "more than %d models were given, but the letters A to Z name only %d models",
+                      BOOLEAN_OPERANDS, BOOLEAN_OPERANDS);
         return false;
     }
     o->shown[o->count] = shown;
@@ -17,6 +21,7 @@ static bool add_operand(boolean_operands *o, const char *name, const char *shown
     return true;
 }
 
+/* Adds all instances of a scene. Returns an exit code. */
 static int list_instances(boolean_operands *o, const char *name, boolean_input *in)
 {
     ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
@@ -40,7 +45,7 @@ static int list_instances(boolean_operands *o, const char *name, boolean_input *
 
 int boolean_operands_list(boolean_operands *o, const char *name, const char **paths)
 {
-    const ebpo_pose still = EBPO_POSE_INIT;
+    const ebpo_pose no_motion = EBPO_POSE_INIT;
     memset(o, 0, sizeof *o);
     for (; *paths; paths++) {
         boolean_input *in = &o->input[o->inputs++];
@@ -49,7 +54,7 @@ int boolean_operands_list(boolean_operands *o, const char *name, const char **pa
             int code = list_instances(o, name, in);
             if (code != EXIT_OK)
                 return code;
-        } else if (!add_operand(o, name, *paths, &still)) {
+        } else if (!add_operand(o, name, *paths, &no_motion)) {
             return EXIT_USAGE;
         }
         in->count = o->count - in->first;

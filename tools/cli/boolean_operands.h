@@ -7,31 +7,32 @@
 
 #include "cli/query_args.h"
 
-/* One for each letter. */
+/* Maximum number of operands: one for each letter. */
 enum { BOOLEAN_OPERANDS = 26 };
 
-/* A file of the command line. */
+/* A file of the command line: a model or a scene. */
 typedef struct boolean_input {
     const char *path;
-    ebpo_scene *scene; /* NULL: a model */
-    query_session session;
-    uint32_t first, count; /* its operands */
+    ebpo_scene *scene;     /* NULL: the file is a model */
+    query_session session; /* the open model, if the file is a model */
+    uint32_t first, count; /* first operand of the file, and number of its operands */
 } boolean_input;
 
 typedef struct boolean_operands {
     boolean_input input[BOOLEAN_OPERANDS];
-    uint32_t inputs;
+    uint32_t inputs; /* number of files */
     ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
-    uint32_t count;
+    uint32_t count;                      /* number of operands */
 } boolean_operands;
 
-/* Lists the operands in the order of the paths (ends with NULL): a model, or all instances of a
- * scene (NAME.json) at their poses, at the first time of the scene. Models are not opened. Returns
- * an exit code; errors have been reported on stderr. Call boolean_operands_close in any case. */
+/* Lists the operands in the order of the paths, which end with NULL. A path is a model, or a scene
+ * (NAME.json), which stands for all its instances at their poses at the scene's first time. Models
+ * are not opened. Returns an exit code; errors have been reported on stderr. Call
+ * boolean_operands_close in any case. */
 int boolean_operands_list(boolean_operands *o, const char *name, const char **paths);
 
-/* Opens the models. model_options: of each model. */
+/* Opens the models. model_options: options for each model. Returns an exit code. */
 int boolean_operands_open(boolean_operands *o, const char *name,
                           const ebpo_model_options *model_options, const remote_values *remote);
 void boolean_operands_close(boolean_operands *o);

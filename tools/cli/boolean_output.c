@@ -7,24 +7,25 @@
 
 #include "cli/words.h"
 
+/* Converts the mesh to an .ebpo.h5 file. */
 static ebpo_status convert_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
                                 ebpo_error *error)
 {
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
-    ebpo_prepare_options preparing = EBPO_PREPARE_OPTIONS_INIT;
-    ebpo_build_options building = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_write_options writing = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_prepare_options prepare_options = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_build_options build_options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_write_options write_options = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
-    preparing.threads = building.threads = writing.threads = o->threads;
-    preparing.progress = building.progress = writing.progress = progress;
-    building.require_solid = true;
-    building.unit = o->unit;
-    ebpo_status status = ebpo_mesh_prepare(mesh, &preparing, &prepared, error);
+    prepare_options.threads = build_options.threads = write_options.threads = o->threads;
+    prepare_options.progress = build_options.progress = write_options.progress = progress;
+    build_options.require_solid = true;
+    build_options.unit = o->unit;
+    ebpo_status status = ebpo_mesh_prepare(mesh, &prepare_options, &prepared, error);
     if (status == EBPO_OK)
-        status = ebpo_build(mesh, &prepared.report, NULL, &building, &tree, error);
+        status = ebpo_build(mesh, &prepared.report, NULL, &build_options, &tree, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_tree_write(&tree, o->path, &writing, error);
+    status = ebpo_tree_write(&tree, o->path, &write_options, error);
     ebpo_tree_free(&tree);
     return status;
 }
@@ -36,40 +37,40 @@ ebpo_status boolean_write_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_pr
                                            : convert_mesh(o, mesh, progress, error);
 }
 
-/* Counts the intersecting faces of the mesh. Empties the mesh. */
+/* Counts the pairs of intersecting faces of the mesh. The mesh is changed by the check. */
 static ebpo_status count_crossings(boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
                                    ebpo_error *error)
 {
     ebpo_mesh_report report;
-    ebpo_self_intersections_options how = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
+    ebpo_self_intersections_options options = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
     ebpo_self_intersections_summary sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT;
-    how.threads = o->threads;
-    how.progress = progress;
+    options.threads = o->threads;
+    options.progress = progress;
     if (mesh->face_count == 0)
         return EBPO_OK;
     ebpo_status status = ebpo_mesh_check(mesh, o->threads, progress, &report, error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_self_intersections(mesh, &report, &how, NULL, NULL, &sum, error);
+        status = ebpo_mesh_self_intersections(mesh, &report, &options, NULL, NULL, &sum, error);
     for (int i = 0; i < 4; i++)
         o->crossing_pairs += sum.pairs[i];
     return status;
 }
 
-/* Writes the mesh, and then counts the intersecting faces of what was written. */
+/* Writes the mesh, and then counts the intersecting faces of the written mesh. */
 static ebpo_status write_and_count(boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
                                    ebpo_error *error)
 {
     ebpo_file *file = NULL;
-    ebpo_read_options reading = EBPO_READ_OPTIONS_INIT;
+    ebpo_read_options read_options = EBPO_READ_OPTIONS_INIT;
     ebpo_status status = boolean_write_mesh(o, mesh, progress, error);
     if (status != EBPO_OK || !o->crossings)
         return status;
-    if (!words_end_with(o->path, ".ply")) { /* the mesh has become the model */
-        reading.threads = o->threads;
-        reading.workspace = o->workspace;
+    if (!words_end_with(o->path, ".ply")) { /* the conversion has used up the mesh: read it back */
+        read_options.threads = o->threads;
+        read_options.workspace = o->workspace;
         status = ebpo_open(o->path, &file, error);
         if (status == EBPO_OK)
-            status = ebpo_file_read_mesh(file, &reading, mesh, error);
+            status = ebpo_file_read_mesh(file, &read_options, mesh, error);
         ebpo_close(file);
     }
     return status == EBPO_OK ? count_crossings(o, mesh, progress, error) : status;
@@ -100,7 +101,7 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     if (mesh.face_count == 0 && !words_end_with(o->path, ".ply")) {
         error->status = status = EBPO_E_ABSENT;
         snprintf(error->message, sizeof error->message,
-                 "%s: the result is empty, and an .ebpo.h5 file cannot be; write a .ply file",
+                 "%s: the result is empty, but an .ebpo.h5 file cannot be empty; write a .ply file",
                  o->path);
     } else {
         status = write_and_count(o, &mesh, progress, error);
@@ -116,12 +117,12 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
 
 void boolean_print_result(const boolean_output *o)
 {
-    char faces[40], cut[40], fresh[40], real[32];
+    char faces[40], cut[40], added[40], real[32];
     words_plural(faces, sizeof faces, o->faces, "face", "faces");
     words_plural(cut, sizeof cut, o->report.faces_cut, "face", "faces");
-    words_plural(fresh, sizeof fresh, o->report.new_vertices, "new vertex", "new vertices");
+    words_plural(added, sizeof added, o->report.new_vertices, "new vertex", "new vertices");
     printf("%s: %s, %s; %s cut, %s, displaced at most %s", o->path, faces,
-           o->changed_only ? "the changes" : "closed", cut, fresh,
+           o->changed_only ? "the changes" : "closed", cut, added,
            words_real(o->report.displacement, real));
     if (o->changed_only)
         printf("; removed faces of A: %" PRIu64, o->report.removed_faces);

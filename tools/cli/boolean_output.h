@@ -14,24 +14,26 @@ typedef struct boolean_output {
     bool doubles;              /* write double coordinates */
     bool changed_only;         /* write only the changes of the first operand */
     bool colours;              /* colour faces by their operand */
-    bool volume, crossings;    /* compute these facts of the exact result */
-    ebpo_workspace *workspace; /* of the exact result; NULL: no limit of memory */
-    uint64_t vertices, faces;  /* of the exact result that was written */
+    bool volume;               /* compute the volume of the exact result */
+    bool crossings;            /* count the intersecting faces of the written mesh */
+    ebpo_workspace *workspace; /* limits the memory for the exact result; NULL: no limit */
+    /* results of boolean_write_result */
+    uint64_t vertices, faces; /* numbers of vertices and faces that were written */
     ebpo_boolean_mesh_report report;
-    uint64_t temporary;      /* largest size of the temporary files */
-    uint64_t crossing_pairs; /* with `crossings`: pairs of faces that intersect, by rounding */
+    uint64_t temporary;      /* greatest size of the temporary files, in bytes */
+    uint64_t crossing_pairs; /* with `crossings`: pairs of faces that rounding made intersect */
 } boolean_output;
 
-/* Writes a mesh to OUT.ply or OUT.ebpo.h5. */
+/* Writes a mesh to o->path: OUT.ply or OUT.ebpo.h5. */
 EBPO_MUST_USE ebpo_status boolean_write_mesh(const boolean_output *o, ebpo_mesh *mesh,
                                              ebpo_progress progress, ebpo_error *error);
 
-/* Computes and writes the exact result. An empty result is an empty PLY file; as .ebpo.h5 file it
- * is EBPO_E_ABSENT. */
+/* Computes and writes the exact result. An empty result becomes an empty PLY file; if the output is
+ * an .ebpo.h5 file, the function fails with EBPO_E_ABSENT. */
 EBPO_MUST_USE ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b,
                                                ebpo_progress progress, ebpo_error *error);
 
-/* Report what was written. */
+/* Print facts about the written mesh: on standard output, or as members of a JSON object. */
 void boolean_print_result(const boolean_output *o);
 void boolean_result_to_json(const boolean_output *o, json *j);
 

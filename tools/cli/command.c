@@ -131,7 +131,7 @@ bool command_requires_hdf5(const char *name, const char *path)
     ebpo_error error = EBPO_ERROR_INIT;
     if (is_hdf5 != 0)
         return is_hdf5 > 0;
-    /* not HDF5: opening fails, and the message of the library names the kind of file */
+    /* opening a file that is not HDF5 fails, and the library's message names the kind of file */
     bool success = ebpo_open(path, &file, &error) == EBPO_OK;
     if (!success)
         fprintf(stderr, "ebpo %s: %s\n", name, error.message);
@@ -148,6 +148,7 @@ bool command_has_level(const char *name, const ebpo_info *info, int64_t level)
     return false;
 }
 
+/* Reports the first error of standard output. number: errno; 0: not known. Returns false. */
 static bool not_written(const char *name, int number)
 {
     static bool reported;

@@ -5,13 +5,14 @@
 #include <ebpo/ebpo.h>
 #include <pthread.h>
 
+/* Exit codes. In all functions, `name` is the name of the command, for messages. */
 enum {
     EXIT_OK = 0,
-    EXIT_FAILED = 1,
-    EXIT_USAGE = 2,
-    EXIT_NOT_SOLID = 3,
-    EXIT_DIFFERS = 4,
-    EXIT_EMPTY = 5
+    EXIT_FAILED = 1,    /* error in data, input or output */
+    EXIT_USAGE = 2,     /* error in the command line */
+    EXIT_NOT_SOLID = 3, /* the mesh is not a solid, but must be one */
+    EXIT_DIFFERS = 4,   /* a comparison found differences */
+    EXIT_EMPTY = 5      /* the result is empty */
 };
 
 /* Prints "ebpo convert: message" and returns the exit code of the status. */
@@ -27,35 +28,37 @@ int command_no_memory(const char *name);
 unsigned command_cores(void);
 
 /* Starts a thread as pthread_create does, with a stack of COMMAND_STACK bytes instead of the
- * default of RLIMIT_STACK or the C library. All threads of the command start here. */
+ * default of RLIMIT_STACK or of the C library. All commands start their threads by this function.
+ */
 enum { COMMAND_STACK = 4 << 20 };
 int command_thread(pthread_t *thread, void *(*body)(void *), void *argument);
 
 /* Returns true if both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);
 
-/* Returns true if writing `out` would overwrite `in`, and reports it on stderr (exit with
- * EXIT_USAGE). */
+/* Returns true if writing the file `out` would overwrite the file `in`. This error is reported on
+ * stderr; exit with EXIT_USAGE. */
 bool command_overwrites(const char *name, const char *in, const char *out);
 
 /* Returns 1 if the file begins with the signature of HDF5, 0 if it begins with other bytes, -1 if
- * it cannot be read (reported on stderr). Returns 1, too, for a URL and for a file that does not
- * exist, because opening these reports an error. */
+ * it cannot be read (reported on stderr). Returns 1 also for a URL and for a file that does not
+ * exist: the caller then opens the file, and reports the error. */
 int command_is_hdf5(const char *name, const char *path);
 
-/* Returns false, with a report on stderr (exit with EXIT_FAILED), when the file cannot be read or
- * is not HDF5. */
+/* Returns false if the file cannot be read or is not HDF5. This error is reported on stderr; exit
+ * with EXIT_FAILED. */
 bool command_requires_hdf5(const char *name, const char *path);
 
-/* Returns false, with a report on stderr (exit with EXIT_USAGE), when the file has no such level.
- * level: negative if no level was given. */
+/* Returns false if the file has no such level. This error is reported on stderr; exit with
+ * EXIT_USAGE. level: negative if no level was given. */
 bool command_has_level(const char *name, const ebpo_info *info, int64_t level);
 
-/* Flushes standard output, which detects a full disk. Returns false after an error, reported on
- * stderr once (exit with EXIT_FAILED). `name` NULL: no command. */
+/* Flushes standard output, which detects a full disk. Returns false after an error. The first such
+ * error is reported on stderr; exit with EXIT_FAILED. name: may be NULL. */
 bool command_flush(const char *name);
 
-/* Reports once why standard output could not be written. Returns false. */
+/* Reports, from errno, why standard output could not be written, unless an earlier call did.
+ * Returns false. */
 bool command_not_written(const char *name);
 
 /* Writes bytes to standard output, bypassing the buffer of stdio. Returns false after an error, as

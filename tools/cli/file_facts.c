@@ -10,7 +10,8 @@
 #include "cli/tables.h"
 #include "cli/words.h"
 
-/* Returns true if the volume is negative but too small for a double: it is then stored as -0. */
+/* Returns true if the volume is negative but too small for a double. Such a volume is stored as -0.
+ */
 static bool has_negative_volume(const ebpo_mesh_report *r)
 {
     double box = (r->max[0] - r->min[0]) * (r->max[1] - r->min[1]) * (r->max[2] - r->min[2]);
@@ -83,6 +84,7 @@ static void print_model(FILE *out, const ebpo_info *info)
         char text[FINDINGS_VOLUME], extent[40];
         ebpo_solid_volume solid = facts_solid(info, NULL);
         findings_extent(extent, sizeof extent, solid.integral, 3, &info->report);
+        /* the volume is printed as a number, not as an interval or a range of doubles */
         bool printed =
             findings_volume_known(&solid) && (isnormal(solid.integral) || extent[0] == '0');
         fprintf(out, "\n  solid     %s%s, by winding number, rule %s",
@@ -156,7 +158,8 @@ static uint64_t level_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
     return sum;
 }
 
-/* Returns the bytes of other data in the file: 0 unless another program wrote it. */
+/* Returns the number of bytes in the file that belong to no known part: 0 unless another program
+ * has written the file. */
 static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
@@ -237,6 +240,7 @@ void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stor
         table_beyond(out);
 }
 
+/* Writes the type of an array's elements, such as "u32". */
 static const char *element_word(char word[8], const ebpo_array_facts *a)
 {
     snprintf(word, 8, "%c%u", a->is_signed ? 'i' : 'u', 8 * a->element_bytes % 1000);

@@ -7,6 +7,7 @@
 
 #include "cli/words.h"
 
+/* Begins a new line with its indentation. */
 static void begin_line(json *j)
 {
     fputc('\n', j->out);
@@ -64,6 +65,7 @@ static void begin_value(json *j, const char *key)
     }
 }
 
+/* Begins an object or an array. open, close: its brackets. */
 static void open_level(json *j, const char *key, char open, char close)
 {
     begin_value(j, key);

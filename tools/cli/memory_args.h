@@ -1,4 +1,4 @@
-/* Options --memory and --temp-dir of commands that build or verify. */
+/* Options --memory and --temp-dir of commands that build or verify files. */
 #ifndef EBPO_TOOLS_MEMORY_ARGS_H
 #define EBPO_TOOLS_MEMORY_ARGS_H
 
@@ -7,10 +7,10 @@
 #include "cli/args.h"
 
 typedef struct memory_values {
-    const char *memory, *temp_dir;
+    const char *memory, *temp_dir; /* NULL: not given */
 } memory_values;
 
-/* Returns false for invalid values, after a usage message. */
+/* Returns false for invalid values, after an error message. */
 bool memory_check(const char *command, const memory_values *v);
 
 /* Creates the workspace of these values, which must be valid. */

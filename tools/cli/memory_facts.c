@@ -13,8 +13,8 @@ static void print_parts(FILE *out, const ebpo_model_plan *p)
             words_bytes(subtree, sizeof subtree, p->subtree_bytes));
     if (p->subtrees_held < p->subtrees)
         fprintf(out,
-                "          %" PRIu64 " of these at a time; up to %s for chunks, %s for the "
-                "skeletons of others\n",
+                "          %" PRIu64 " of these in memory at a time; up to %s for chunks, %s for "
+                "skeletons (bounds of subtrees that are not in memory)\n",
                 p->subtrees_held, words_bytes(chunks, sizeof chunks, p->chunks),
                 words_bytes(skeletons, sizeof skeletons, p->skeletons));
 }

@@ -1,4 +1,4 @@
-/* Estimates memory use for a budget; loads nothing. */
+/* Prints an estimate of a model's memory use for a budget (ebpo_model_memory). */
 #ifndef EBPO_TOOLS_MEMORY_FACTS_H
 #define EBPO_TOOLS_MEMORY_FACTS_H
 

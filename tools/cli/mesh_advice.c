@@ -34,6 +34,7 @@ const char *advice_doubts(char *out, size_t size, const mesh_input *p)
     return out;
 }
 
+/* Writes the options of the repairs in a record, such as "--weld --orient". */
 static const char *steps_text(char *out, size_t size, const ebpo_repair_record *r)
 {
     snprintf(out, size, "%s%s%s%s", r->weld ? " --weld" : "",
@@ -44,10 +45,14 @@ static const char *steps_text(char *out, size_t size, const ebpo_repair_record *
 
 /* ---- warnings ---- */
 
-static void print_count(FILE *out, bool *any, const ebpo_finding *f, const char *what)
+/* Prints the number of findings of one kind, if there are any. *any: a kind was printed before. */
+static void print_count(FILE *out, bool *any, const ebpo_finding *f, const char *one,
+                        const char *many)
 {
+    char text[80];
     if (f->count)
-        fprintf(out, "%s %llu %s", *any ? "," : ":", (unsigned long long)f->count, what);
+        fprintf(out, "%s %s", *any ? "," : ":",
+                words_plural(text, sizeof text, f->count, one, many));
     *any |= f->count > 0;
 }
 
@@ -55,11 +60,12 @@ static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
 {
     bool any = false;
     fputs("warning: this is a surface, not a solid; solid angles decide what is inside", out);
-    print_count(out, &any, &r->boundary_edges, "boundary edges");
-    print_count(out, &any, &r->misoriented_edges, "misoriented edges");
-    print_count(out, &any, &r->nonmanifold_edges, "edges shared by more than two faces");
+    print_count(out, &any, &r->boundary_edges, "boundary edge", "boundary edges");
+    print_count(out, &any, &r->misoriented_edges, "misoriented edge", "misoriented edges");
+    print_count(out, &any, &r->nonmanifold_edges, "edge shared by more than two faces",
+                "edges shared by more than two faces");
     if (!any)
-        print_count(out, &any, &r->unbalanced_edges, "unbalanced edges");
+        print_count(out, &any, &r->unbalanced_edges, "unbalanced edge", "unbalanced edges");
 }
 
 static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
@@ -68,7 +74,8 @@ static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try
     return findings_volume(text, &solid, &t->report, "");
 }
 
-/* Writes the solid that results from a repair. */
+/* Writes "a solid of volume V", or "a solid with ..." if the volume is not known, for the result of
+ * a repair. */
 static const char *solid_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
 {
     char volume[FINDINGS_VOLUME];
@@ -77,14 +84,14 @@ static const char *solid_text(char text[FINDINGS_VOLUME], const ebpo_repair_try 
     return text;
 }
 
-/* Prints the repair that was tried, or how to try repairs. */
+/* Prints the best repair that was tried, or how to try repairs. */
 static void print_remedy(FILE *out, const mesh_input *p)
 {
-    char steps[64], left[FINDINGS_VOLUME];
+    char steps[64], solid[FINDINGS_VOLUME];
     if (p->repairs_tried && p->repairs.chosen >= 0) {
         const ebpo_repair_try *best = &p->repairs.tries[p->repairs.chosen];
         fprintf(out, "; %s, which --repair does, leaves %s",
-                steps_text(steps, sizeof steps, &best->record), solid_text(left, best, p->rule));
+                steps_text(steps, sizeof steps, &best->record), solid_text(solid, best, p->rule));
     } else if (p->repairs_tried)
         fputs("; no automatic repair gives a solid; try --weld-distance if corners nearly "
               "coincide, or a mesh editor",
@@ -117,8 +124,8 @@ static void warn_of_nested(FILE *out, const char *command, const char *path, con
             s->nested == 1 ? "is" : "are");
 }
 
-/* Warns of faces that share positions, but not vertices, with an earlier face and its
- * orientation. */
+/* Warns of faces that have the positions and the orientation of an earlier face, but other
+ * vertices. */
 static void warn_of_repeated_positions(FILE *out, const char *command, const char *path,
                                        const mesh_input *p)
 {
@@ -126,7 +133,7 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
     fprintf(out,
             "ebpo %s: %s: warning: %s at the positions of an earlier one with the same orientation "
             "(face %llu%s), which counts twice in winding numbers; --weld with --drop-duplicates "
-            "drops such\n",
+            "drops such faces\n",
             command, path,
             words_plural(text, sizeof text, p->repeated_same, "face is", "faces are"),
             (unsigned long long)p->repeated.locations[0], p->repeated.count > 1 ? ", ..." : "");
@@ -147,13 +154,13 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
 {
     const ebpo_finding *f = &p->prepared.report.repeated_faces;
     const ebpo_repair_try *t = find_drop_only(p);
-    char text[80], steps[64], left[FINDINGS_VOLUME];
+    char text[80], steps[64], solid[FINDINGS_VOLUME];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
             (unsigned long long)f->locations[0]);
     fputs(f->count > 1 ? ", ...): " : "): ", out);
     if (!t) {
-        fprintf(out, "--drop-duplicates drops such%s\n",
+        fprintf(out, "--drop-duplicates drops such faces%s\n",
                 p->repairs_tried ? "" : "; 'ebpo check' without options reports the result");
         return;
     }
@@ -165,7 +172,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
                 (unsigned long long)(f->count - t->record.dropped_opposite));
     fputs(steps_text(steps, sizeof steps, &t->record), out);
     if (t->report.balanced)
-        fprintf(out, " leaves %s\n", solid_text(left, t, p->rule));
+        fprintf(out, " leaves %s\n", solid_text(solid, t, p->rule));
     else
         fprintf(out, " alone leaves a surface, %llu edges of which do not balance\n",
                 (unsigned long long)t->report.unbalanced_edges.count);
@@ -302,7 +309,8 @@ static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
     json_end(j);
 }
 
-/* Writes null when no vertices coincide: then the report has all repeated faces. */
+/* Writes the number of faces that repeat positions. If no vertices coincide, writes null, because
+ * the report then counts all repeated faces. */
 static void json_repeated(json *j, const mesh_input *p)
 {
     if (!p->prepared.report.repeated_positions.count) {

@@ -1,4 +1,5 @@
-/* Reports doubts about a mesh as a solid, and repairs that may help. */
+/* Reports doubts (reasons why a mesh may not bound the intended solid), and repairs that may help.
+ */
 #ifndef EBPO_TOOLS_MESH_ADVICE_H
 #define EBPO_TOOLS_MESH_ADVICE_H
 
@@ -7,17 +8,18 @@
 #include "cli/json.h"
 #include "cli/mesh_input.h"
 
-/* Prints a warning if the mesh is a surface or a doubtful solid. */
+/* Prints warnings if the mesh is a surface or has doubts, of repeated faces, and of components that
+ * are inside out or nested. command, path: for the messages. */
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p);
 
-/* Prints the result of each sequence of repairs; nothing when none was tried. */
+/* Prints the result of each sequence of repairs that was tried, if any. */
 void advice_print(FILE *out, const mesh_input *p);
 
-/* Prints the closed components that are cavities, inside out or nested, after repairs; nothing when
- * there are none. */
+/* Prints the numbers of repeated faces, and of closed components that are cavities, inside out or
+ * nested, after repairs. Prints nothing if there are none. */
 void advice_print_shells(FILE *out, const mesh_input *p);
 
-/* Writes members "doubts" and "repairs". */
+/* Writes the members "doubts", "repeated_by_position", "shells" and "repairs". */
 void advice_json(json *j, const mesh_input *p);
 
 /* Writes the doubts in words, separated by "; ", for messages. */

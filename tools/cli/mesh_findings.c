@@ -120,12 +120,12 @@ static const char *kind_of_mesh(const ebpo_mesh_report *report)
 const char *findings_extent(char *text, size_t size, double x, int power,
                             const ebpo_mesh_report *report)
 {
-    int thick = 0;
+    int dimensions = 0; /* number of axes on which the mesh extends */
     for (int k = 0; k < 3; k++)
-        thick += report->max[k] > report->min[k];
+        dimensions += report->max[k] > report->min[k];
     if (!isfinite(x))
         snprintf(text, size, "%s1.8e+308", signbit(x) ? "below -" : "beyond ");
-    else if (fabs(x) < DBL_MIN && thick >= power)
+    else if (fabs(x) < DBL_MIN && dimensions >= power)
         snprintf(text, size, signbit(x) ? "between -2.2e-308 and 0" : "below 2.2e-308");
     else
         snprintf(text, size, "%.6g", x);
@@ -137,7 +137,7 @@ ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_solid_volume solid = EBPO_SOLID_VOLUME_INIT;
-    /* Fails only if the struct has another size. */
+    /* fails only if the library has another size of the struct */
     if (ebpo_solid_volume_of(report, rule, shells, info, &solid, &error) != EBPO_OK)
         solid.hi = INFINITY;
     return solid;
@@ -176,7 +176,8 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
     return text;
 }
 
-/* Returns a note for a measure beyond the range of doubles. */
+/* Returns a note to append if the area or volume x is beyond the range of doubles; else "". text:
+ * result of findings_extent for x. */
 static const char *beyond_text(double x, const char *text)
 {
     bool printed = (isfinite(x) && fabs(x) >= DBL_MIN) || text[0] == '0';

@@ -11,36 +11,37 @@
  */
 ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
                                  const ebpo_shells *shells, const ebpo_info *info);
+/* Returns true if the bounds of the volume are equal. */
 static inline bool findings_volume_known(const ebpo_solid_volume *solid)
 {
     return solid->lo >= solid->hi;
 }
-/* Writes "volume" and the volume or its bounds. When the integral of the winding number differs
- * from the volume, also writes the integral; when no bounds are known, writes only the integral.
- * `unit`: as for table_unit. */
+/* Writes "volume" and the volume or its bounds. If the integral of the winding number differs from
+ * the volume, also writes the integral; if no bounds are known, writes only the integral. unit:
+ * unit of lengths, "" for none. */
 enum { FINDINGS_VOLUME = 320 };
 const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume *solid,
                             const ebpo_mesh_report *report, const char *unit);
 /* Writes members volume (null: not known), volume_lo, volume_hi and winding_integral. */
 void findings_volume_json(json *j, const ebpo_solid_volume *solid);
-/* Prints the kind of the mesh, each finding with its first positions, and the omitted checks.
- * `crossings_follow`: intersecting faces are checked later. */
+/* Prints the kind of the mesh, each kind of finding (defect) with its first faces or vertices, and
+ * the omitted checks. crossings_follow: the caller checks intersecting faces later. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, const ebpo_solid_volume *solid,
                     bool crossings_follow);
 /* Returns the plural words for the finding that the report calls `name`. */
 const char *findings_plural(const char *name);
-/* Prints the effects of repairs; nothing when none was requested. */
+/* Prints the effects of the requested repairs. */
 void findings_print_repair(FILE *out, const ebpo_repair_record *record);
-/* Writes an area (power 2) or volume (3) of the mesh in the report with %.6g, or states that it
- * exceeds the range of doubles, which is possible although each coordinate is a double. `text`: of
- * `size` bytes. */
+/* Writes the area (power 2) or volume (3) x of a mesh with %.6g, or states that x is beyond the
+ * range of doubles, which is possible although each coordinate is a double. report: gives the box
+ * of the mesh. */
 const char *findings_extent(char *text, size_t size, double x, int power,
                             const ebpo_mesh_report *report);
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report,
                    const ebpo_solid_volume *solid);
 void findings_json_repair(json *j, const char *key, const ebpo_repair_record *record);
-/* `unread`: words for data that was not read; "": none. */
+/* Writes facts of the input file. unread: description of data that was not read; "": none. */
 void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const char *unread);
 
 #endif

@@ -26,7 +26,7 @@ int repair_check(const char *command, repair_request requested)
     return EXIT_OK;
 }
 
-/* Adds the effects of the first of two preparations. */
+/* Adds the effects of a second preparation of the mesh to those of the first one. */
 static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
 {
     ebpo_repair_record *a = &first->record;
@@ -78,7 +78,8 @@ static ebpo_status try_and_repair(mesh_input *p, repair_request requested,
                : status;
 }
 
-/* Counts repeated faces. When no vertices coincide, the check has counted them before. */
+/* Counts repeated faces by position. If no vertices coincide, these are the repeated faces that the
+ * check of the mesh has counted. */
 static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *error)
 {
     p->repeated = p->prepared.report.repeated_faces;
@@ -90,7 +91,8 @@ static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *e
     return status;
 }
 
-/* Counts shells. The sign of the volume of a 2-manifold shell gives its orientation. */
+/* Counts shells (closed components) that are cavities, inside out or nested. A 2-manifold of one
+ * component needs no count: the sign of its volume shows if it is inside out. */
 static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *options,
                                 ebpo_error *error)
 {
@@ -108,7 +110,7 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     ebpo_solid_volume solid =
         findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
                        same_mesh && p->shells_counted ? &p->shells : NULL, NULL);
-    /* a component that coincides with itself counts twice there */
+    /* where faces repeat others with the same orientation, the volume counts twice */
     if (same_mesh && p->repeated_same) {
         solid.lo = 0;
         solid.hi = INFINITY;
@@ -122,18 +124,18 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repair_req
                                    ebpo_progress progress, ebpo_error *error)
 {
     ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
-    ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
-    options.progress = wanted.progress = progress;
-    options.threads = wanted.threads = threads;
+    ebpo_prepare_options repairs = EBPO_PREPARE_OPTIONS_INIT;
+    options.progress = repairs.progress = progress;
+    options.threads = repairs.threads = threads;
     options.workspace = workspace;
     options.attributes = more != READ_MESH;
     options.embed_textures = more == READ_TEXTURES;
-    wanted.weld = requested.weld;
-    wanted.weld_distance = requested.weld_distance;
-    wanted.drop_duplicates = requested.drop_duplicates;
-    wanted.orient = requested.orient;
-    wanted.flip = requested.flip;
-    wanted.fill_holes = requested.fill_holes;
+    repairs.weld = requested.weld;
+    repairs.weld_distance = requested.weld_distance;
+    repairs.drop_duplicates = requested.drop_duplicates;
+    repairs.orient = requested.orient;
+    repairs.flip = requested.flip;
+    repairs.fill_holes = requested.fill_holes;
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
     out->repairs = (ebpo_repairs)EBPO_REPAIRS_INIT;
@@ -146,13 +148,13 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repair_req
     out->as_read = out->mesh;
     out->as_read.faces = NULL;
     out->as_read.attributes = NULL;
-    status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
+    status = ebpo_mesh_prepare(&out->mesh, &repairs, &out->prepared, error);
     if (status == EBPO_OK)
-        status = try_and_repair(out, requested, &wanted, error);
+        status = try_and_repair(out, requested, &repairs, error);
     if (status == EBPO_OK)
         status = count_repeated(out, threads, error);
     if (status == EBPO_OK)
-        status = count_shells(out, &wanted, error);
+        status = count_shells(out, &repairs, error);
     out->doubts =
         ebpo_mesh_doubts(out->prepared.before.area, &out->prepared.report, &out->prepared.record);
     if (status == EBPO_OK)

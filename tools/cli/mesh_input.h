@@ -10,10 +10,12 @@
 
 typedef struct repair_request {
     bool weld, drop_duplicates, orient, flip, fill_holes;
-    bool repair; /* apply the shortest sequence of these that gives a plausible solid */
-    double
-        weld_distance; /* above 0: merges vertices within this distance before repairs are tried */
-    bool advise; /* not an option: if no repair is requested, tries repairs without applying them */
+    bool repair; /* --repair: apply the shortest sequence of the repairs weld, drop_duplicates,
+                  * orient and fill_holes that gives a plausible solid */
+    /* above 0: merge vertices within this distance, before other repairs are tried */
+    double weld_distance;
+    /* set by commands, not by an option: if no repair is requested, try repairs on copies */
+    bool advise;
 } repair_request;
 
 typedef struct mesh_input {
@@ -21,16 +23,17 @@ typedef struct mesh_input {
     ebpo_mesh as_read; /* the mesh before repairs: only its facts are valid; array pointers show
                         * which arrays existed, and must not be used */
     char unread[512];  /* result of ebpo_mesh_ignored; empty: everything was read */
-    ebpo_prepared prepared; /* findings and repairs made */
+    ebpo_prepared prepared; /* findings before and after repairs, and the repairs made */
     bool repairs_tried;     /* repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;
-    /* faces at the positions of an earlier face, in the repaired mesh; if vertices coincide, also
-     * how many of these faces have the opposite and the same orientation as the earlier face */
-    ebpo_finding repeated;
+    ebpo_finding repeated; /* faces of the repaired mesh at the positions of an earlier face */
+    /* if vertices coincide: how many of these faces have the opposite and the same orientation as
+     * the earlier face; else 0 */
     uint64_t repeated_opposite, repeated_same;
     bool shells_counted; /* closed components were counted in `shells` */
     ebpo_shells shells;
-    uint32_t doubts; /* ebpo_doubt, of the repaired mesh */
+    uint32_t doubts; /* ebpo_doubt bits: reasons why the repaired mesh may not bound the intended
+                      * solid */
     ebpo_rule rule;  /* rule of the solid; set by the caller, default nonzero */
 } mesh_input;
 
@@ -45,8 +48,8 @@ typedef enum mesh_reading {
     READ_TEXTURES /* attributes, and the bytes of the images that they name */
 } mesh_reading;
 
-/* Reads, repairs and checks a mesh. After success call ebpo_mesh_free(&out->mesh); after a failure
- * there is nothing to free. */
+/* Reads, repairs and checks a mesh. more: the data to read. After success call
+ * ebpo_mesh_free(&out->mesh); after a failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path,
                                           repair_request requested, mesh_reading more,
                                           ebpo_workspace *workspace, unsigned threads,
@@ -59,7 +62,7 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
 
-/* Returns the bounds of the volume of the solid, before or after repairs. */
+/* Returns the bounds of the volume of the solid, after (or before) repairs. */
 ebpo_solid_volume mesh_input_solid(const mesh_input *input, bool after);
 
 /* Warns of file contents that were not read, and of ambiguous triangulations. */

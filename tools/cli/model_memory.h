@@ -4,14 +4,15 @@
 
 #include <ebpo/query.h>
 
-/* Sets options->memory to no limit if the whole model needs at most half of the free memory, and
- * otherwise to half of the free memory. If that is less than the minimum of the model, sets the
- * minimum and prints a note on standard error. Remote files keep the default budget of the
- * library. */
+/* Sets options->memory. If the whole model needs at most half of the free memory, there is no limit
+ * (0). Otherwise the limit is half of the free memory. If the model needs more than this half, the
+ * limit is the least memory that the model needs, and a note is printed on standard error. Remote
+ * files keep the default budget of the library. */
 void model_memory_default(const char *command, const ebpo_file *file, const char *path,
                           ebpo_model_options *options);
 
-/* Prints the note, when `least` bytes are more than `half` of the free memory. */
+/* Prints this note. what: name of the model. least: bytes that it needs at least. half: bytes of
+ * half of the free memory. */
 void model_memory_report_least(const char *command, const char *what, uint64_t least,
                                uint64_t half);
 

@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <stddef.h>
 
+/* The printed members of ebpo_model_stats. STAT_FIVE: an array of five uint64_t. */
 static const struct stat_field {
     const char *name, *unit;
     size_t offset;

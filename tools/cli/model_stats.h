@@ -7,9 +7,10 @@
 
 #include "cli/json.h"
 
-/* Prints a line of words. */
+/* Prints all statistics in one line. */
 void stats_print(FILE *out, const ebpo_model_stats *stats);
-/* Prints a row with its unit for each value before and afterwards. */
+/* Prints a row for each statistic: its values after the first and after the last round, and its
+ * unit. */
 void stats_table(FILE *out, const ebpo_model_stats *first, const ebpo_model_stats *last);
 /* Writes members of the open object. */
 void stats_json(json *j, const ebpo_model_stats *stats);

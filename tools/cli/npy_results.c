@@ -9,7 +9,8 @@
 
 #include "cli/command.h"
 
-/* Bytes of the magic, the version and the length; bytes of the whole header. */
+/* PREFIX_SIZE: bytes of the signature, the version and the length; HEADER_SIZE: bytes of the whole
+ * header. */
 enum { PREFIX_SIZE = 10, HEADER_SIZE = 192 };
 
 static void write_header(char head[HEADER_SIZE], const char *dtype, uint64_t count)
@@ -42,8 +43,8 @@ bool npy_begin(npy_results *npy, points *in)
         return false;
     if (npy->begin < 0 && !in->rows_known) {
         fprintf(stderr,
-                "ebpo %s: --npy needs the number of results first, which this input does not "
-                "state; write to a file, or use a .npy, PLY or HDF5 file as input\n",
+                "ebpo %s: --npy must know the number of results at the beginning, but this input "
+                "does not state it; write to a file, or use a .npy, PLY or HDF5 file as input\n",
                 npy->command);
         return false;
     }

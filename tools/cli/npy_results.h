@@ -7,14 +7,16 @@
 #include "cli/points.h"
 
 typedef struct npy_results {
-    const char *command, *dtype; /* as NumPy writes it in a header */
-    unsigned bytes;              /* bytes of a result */
-    off_t begin; /* offset of the header in standard output; -1: the count was known */
+    const char *command; /* name of the command, for messages */
+    const char *dtype;   /* type of a result, as NumPy writes it in a header */
+    unsigned bytes;      /* bytes of a result */
+    off_t begin; /* offset of the header in standard output, which npy_end writes again; -1: the
+                  * number of results was known at the beginning */
 } npy_results;
 
-/* Writes the header, which states the number of results. When standard output is a file, npy_end
- * sets the number; otherwise the input must state it. Returns false if the number cannot be known
- * or writing failed (reported on stderr). */
+/* Writes the header, which states the number of results. If standard output is a file, npy_end sets
+ * the number later; otherwise the input must state it. Returns false if the number is not known or
+ * writing failed (reported on stderr). */
 bool npy_begin(npy_results *npy, points *in);
 /* Sets the number of results in the header, if standard output is a file. Returns false if writing
  * failed (reported on stderr). */

@@ -28,7 +28,8 @@ static double pass_names(double v, const char **after)
     return NAN;
 }
 
-/* strtod reads hexadecimal numbers, numbers beyond the range and invalid text. */
+/* Uses <charconv> if possible. strtod reads the texts that <charconv> refuses: hexadecimal numbers,
+ * numbers beyond the range of doubles, and invalid text. */
 double number_read(const char *text, const char *end, const char **after)
 {
     double v = 0;
@@ -74,7 +75,8 @@ static char *put_zeros(char *out, int count)
     return count > 0 ? out + count : out;
 }
 
-/* Writes digits "123" of 1.23e`exponent` without an exponent, which is -4 to 16. */
+/* Writes a number without an exponent. digits: "123" for 1.23 times ten to the power `exponent`,
+ * which is -4 to 16. count: number of digits. */
 static char *write_fixed(char *out, const char *digits, int count, int exponent)
 {
     int whole = exponent < 0 ? 0 : exponent + 1 < count ? exponent + 1 : count;

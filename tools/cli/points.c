@@ -17,6 +17,7 @@
 
 /* --- opening --- */
 
+/* Reports an error of the input. number: errno; 0: none. Returns false. */
 static bool fail_input(points *p, const char *what, int number)
 {
     fprintf(stderr, "ebpo %s: %s: %s%s%s\n", p->command, p->name, what, number ? ": " : "",
@@ -25,18 +26,18 @@ static bool fail_input(points *p, const char *what, int number)
     return false;
 }
 
-bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
+bool points_open(points *p, const char *command, const char *path, points_kind kind, bool raw,
                  double tmax)
 {
-    return points_open_shard(p, by, path, kind, raw, tmax, 0, 1);
+    return points_open_shard(p, command, path, kind, raw, tmax, 0, 1);
 }
 
-bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
+bool points_open_shard(points *p, const char *command, const char *path, points_kind kind, bool raw,
                        double tmax, uint64_t number, uint64_t part_count)
 {
     bool standard = !path || strcmp(path, "-") == 0;
     struct stat st;
-    *p = (points){ .command = by,
+    *p = (points){ .command = command,
                    .name = standard ? "standard input" : path,
                    .kind = kind,
                    .raw = raw,
@@ -45,7 +46,7 @@ bool points_open_shard(points *p, const char *by, const char *path, points_kind 
                    .fd = STDIN_FILENO,
                    .wake_fd = -1,
                    .rows_per_block = POINTS_BATCH,
-                   .rest_capacity = POINTS_LINE };
+                   .unread_capacity = POINTS_LINE };
     if (!standard && points_is_dataset(path))
         return points_open_dataset(p, path, number, part_count);
     if (!standard)
@@ -57,16 +58,16 @@ bool points_open_shard(points *p, const char *by, const char *path, points_kind 
         p->bytes_total = (uint64_t)(st.st_size - at);
     p->rows_known = raw && p->bytes_total;
     p->rows_total = p->bytes_total / (8 * (uint64_t)p->layout.per_row);
-    p->rest = malloc(p->rest_capacity + 1);
-    return p->rest || fail_input(p, "not enough memory", 0);
+    p->unread = malloc(p->unread_capacity + 1);
+    return p->unread || fail_input(p, "not enough memory", 0);
 }
 
 void points_close(points *p)
 {
     if (p->fd > STDIN_FILENO)
         close(p->fd);
-    free(p->rest);
-    free(p->held);
+    free(p->unread);
+    free(p->all_rows);
     points_block_free(&p->batch);
     *p = (points){ .fd = -1 };
 }
@@ -83,10 +84,11 @@ static bool alloc_block(points_block *b, size_t bytes)
     return b->bytes || points_fault(b, 0, "not enough memory");
 }
 
-static void keep_rest(points *p, points_block *b, size_t from)
+/* Moves the bytes of a block from `from` on to p->unread, for the next block. */
+static void keep_unread(points *p, points_block *b, size_t from)
 {
-    p->rest_count = b->count - from;
-    memcpy(p->rest, b->bytes + from, p->rest_count);
+    p->unread_count = b->count - from;
+    memcpy(p->unread, b->bytes + from, p->unread_count);
     b->count = from;
 }
 
@@ -101,10 +103,11 @@ static const char *last_line_end(const char *text, size_t bytes)
 #endif
 }
 
-/* Parses all complete lines; the last line may lack its line end. */
+/* Reads complete lines into the block. At the end of the input, the last line may lack its line
+ * end. */
 static void take_lines(points *p, points_block *b)
 {
-    size_t whole = 0, scanned = 0;
+    size_t whole = 0, scanned = 0; /* bytes of complete lines; bytes searched for line ends */
     for (;;) {
         const char *last = last_line_end(b->bytes + scanned, b->count - scanned);
         whole = last ? (size_t)(last - b->bytes) + 1 : whole;
@@ -125,14 +128,15 @@ static void take_lines(points *p, points_block *b)
                          "raw doubles)",
                          POINTS_LINE);
     } else if (!p->is_ended) {
-        keep_rest(p, b, whole);
+        keep_unread(p, b, whole);
     }
 }
 
-/* Detects a truncated input, and bytes after the last row. */
-static void check_rows(points *p, points_block *b, uint64_t more)
+/* Compares the number of rows with the number that the header of the array states. count: rows of
+ * this block. */
+static void check_rows(points *p, points_block *b, uint64_t count)
 {
-    p->rows_taken += more;
+    p->rows_taken += count;
     if (!b->failed &&
         (p->rows_taken > p->rows_total || (p->is_ended && p->rows_taken < p->rows_total)))
         points_fault(b, 0, "has %s rows than its shape states, %" PRIu64 "; the input is %s",
@@ -140,35 +144,38 @@ static void check_rows(points *p, points_block *b, uint64_t more)
                      p->rows_taken > p->rows_total ? "in another format" : "cut short");
 }
 
-/* Parses all complete rows. */
+/* Reads complete rows of binary numbers into the block. */
 static void take_numbers(points *p, points_block *b)
 {
-    size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->rows_per_block * each;
-    while (!p->is_ended && b->count < most && (b->count < each || points_more_is_there(p))) {
-        ssize_t read_count = points_read_some(p, b, b->bytes + b->count, most - b->count);
+    size_t row_bytes = (size_t)(p->layout.per_row * p->layout.bytes),
+           block_bytes = p->rows_per_block * row_bytes;
+    while (!p->is_ended && b->count < block_bytes &&
+           (b->count < row_bytes || points_more_is_there(p))) {
+        ssize_t read_count = points_read_some(p, b, b->bytes + b->count, block_bytes - b->count);
         b->count += read_count > 0 ? (size_t)read_count : 0;
     }
-    size_t left = b->count % each;
+    size_t left = b->count % row_bytes; /* bytes of an incomplete row */
     if (!p->is_ended)
-        keep_rest(p, b, b->count - left);
+        keep_unread(p, b, b->count - left);
     else if (left && !b->failed)
         points_fault(b, 0,
                      "%zu bytes remain at the end, but each item takes %zu; the input is "
                      "truncated or in another format",
-                     left, each);
+                     left, row_bytes);
     b->count -= p->is_ended ? left : 0;
     if (p->rows_stated)
-        check_rows(p, b, b->count / each);
+        check_rows(p, b, b->count / row_bytes);
 }
 
-static void take_held(points *p, points_block *b)
+static void take_all_rows(points *p, points_block *b)
 {
-    uint64_t left = p->rows_total - p->held_at;
+    uint64_t left = p->rows_total - p->all_rows_at;
     b->row_count = left < p->rows_per_block ? left : p->rows_per_block;
-    b->rows = p->held + p->held_at * (uint64_t)points_width(p->kind);
-    p->held_at += b->row_count;
+    b->rows = p->all_rows + p->all_rows_at * (uint64_t)points_width(p->kind);
+    p->all_rows_at += b->row_count;
 }
 
+/* Recognises the format, unless this has been done. */
 static void begin_input(points *p, points_block *b)
 {
     if (!p->is_begun && !p->failed)
@@ -193,17 +200,17 @@ bool points_take(points *p, points_block *b)
     begin_input(p, b);
     if (b->failed || p->failed)
         return b->failed;
-    if (p->held) {
-        take_held(p, b);
+    if (p->all_rows) {
+        take_all_rows(p, b);
         return b->row_count > 0;
     }
     size_t bytes = p->raw ? p->rows_per_block * (size_t)(p->layout.per_row * p->layout.bytes)
                           : (size_t)POINTS_LINE;
-    if (!alloc_block(b, bytes > p->rest_count ? bytes : p->rest_count))
+    if (!alloc_block(b, bytes > p->unread_count ? bytes : p->unread_count))
         return p->is_ended = true;
-    memcpy(b->bytes, p->rest, p->rest_count);
-    b->count = p->rest_count;
-    p->rest_count = 0;
+    memcpy(b->bytes, p->unread, p->unread_count);
+    b->count = p->unread_count;
+    p->unread_count = 0;
     if (p->raw)
         take_numbers(p, b);
     else
@@ -216,12 +223,13 @@ bool points_take(points *p, points_block *b)
 
 /* --- end of a block --- */
 
-/* Prints the error of a block; the position is a line, or a point from 1. */
+/* Prints the error of a block, with its position: a line, or a point, ray or box (counted from 1),
+ * or a vertex (counted from 0, as in PLY files). */
 static void report_fault(const points *p, const points_block *b)
 {
     static const char *const names[] = { "point", "ray", "box" };
     fprintf(stderr, "ebpo %s: %s: ", p->command, p->name);
-    if (b->fault_at && (p->raw || p->held))
+    if (b->fault_at && (p->raw || p->all_rows))
         fprintf(stderr, "%s %" PRIu64 ": ", p->from_zero ? "vertex" : names[p->kind],
                 p->row + b->fault_at - p->from_zero);
     else if (b->fault_at && p->line_from)

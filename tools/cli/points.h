@@ -1,28 +1,30 @@
-/* Reads points, rays or boxes from standard input or a file, in blocks. Blocks are taken one after
- * the other; several threads may parse blocks. Call points_finish_block in the order in which the
- * blocks were taken, so that an error is reported after the results of the rows before it. */
+/* Reads points, rays or boxes from standard input or a file, in blocks.
+ *
+ * Blocks are taken (points_take) one after the other; several threads may parse blocks
+ * (points_parse). Blocks must be finished (points_finish_block) in the order in which they were
+ * taken, so that an error is reported after the results of all earlier rows. */
 #ifndef EBPO_TOOLS_POINTS_H
 #define EBPO_TOOLS_POINTS_H
 
 #include "cli/points_input.h"
 
-/* Opens the input. `by`: name of the command, for messages. `path` NULL or "-": standard input.
- * `raw`: the input is doubles. `tmax`: default for rays without tmax. Returns false if the input
- * cannot be opened (reported on stderr). Call points_close in any case. */
-bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
+/* Opens the input. command: its name, for messages. path: NULL or "-" for standard input. raw: the
+ * input is doubles. tmax: default for rays without tmax. Returns false if the input cannot be
+ * opened (reported on stderr). Call points_close in any case. */
+bool points_open(points *p, const char *command, const char *path, points_kind kind, bool raw,
                  double tmax);
 /* Opens the input as points_open does, but reads only part `number` of `part_count` if it is an
  * HDF5 dataset. Call points_cut(p, number, part_count) next. */
-bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
+bool points_open_shard(points *p, const char *command, const char *path, points_kind kind, bool raw,
                        double tmax, uint64_t number, uint64_t part_count);
 void points_close(points *p);
 
-/* Reads the first bytes, and may wait for them. Returns true while there is no error; errors are
- * reported on stderr. points_take calls this itself. */
+/* Reads the first bytes, and may wait for them, to recognise the format. Returns false after an
+ * error, which is reported on stderr. points_take calls this function if the caller has not. */
 bool points_begin(points *p);
-/* Reads the next bytes: all that are available without waiting, but at least one row. Returns false
- * at the end and after a fatal error. Initialize blocks with zeros. Only one thread at a time may
- * call this. */
+/* Reads the next bytes into a block: all bytes that are available without waiting, but at least one
+ * row. Returns false at the end and after a fatal error. The caller initializes new blocks with
+ * zeros. Only one thread at a time may call this. */
 bool points_take(points *p, points_block *block);
 /* Counts the rows of a block whose results were written, and reports the error of the block, if
  * any, on stderr. Call in the order in which blocks were taken. Returns false after an error. */

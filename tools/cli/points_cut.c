@@ -21,7 +21,7 @@ static bool fail_cut(points *p, const char *what)
 /* Limits reading to bytes `from` to `to` of the file. */
 static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 {
-    p->rest_count = 0;
+    p->unread_count = 0;
     p->limited = true;
     p->bytes_left = p->bytes_total = to - from;
     p->bytes_taken = 0;
@@ -31,11 +31,13 @@ static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 
 /* --- numbers --- */
 
+/* Selects a part of binary numbers. begin: offset of the first row in the file of `size` bytes. */
 static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number,
                         uint64_t part_count)
 {
-    uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
-    if (p->rows_stated && (size - begin) / each != p->rows_total)
+    uint64_t row_bytes = (uint64_t)(p->layout.per_row * p->layout.bytes),
+             rows = (size - begin) / row_bytes;
+    if (p->rows_stated && rows != p->rows_total)
         return fail_cut(p, rows > p->rows_total
                                ? "has more rows than its shape states; it is in another format"
                                : "has fewer rows than its shape states; it is truncated");
@@ -46,25 +48,27 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
     p->rows_known = true;
     p->rows_total = end - first;
     /* the last part also reads the bytes after the last whole row, so that they are reported */
-    return limit_bytes(p, begin + first * each,
-                       number + 1 < part_count ? begin + end * each : size);
+    return limit_bytes(p, begin + first * row_bytes,
+                       number + 1 < part_count ? begin + end * row_bytes : size);
 }
 
-static bool cut_held(points *p, uint64_t number, uint64_t part_count)
+/* Selects a part of an input that has been read completely. */
+static bool cut_all_rows(points *p, uint64_t number, uint64_t part_count)
 {
     uint64_t rows = p->rows_total;
-    if (p->held_part)
+    if (p->all_rows_are_part)
         return true;
-    p->row = p->held_at = points_share(rows, number, part_count);
+    p->row = p->all_rows_at = points_share(rows, number, part_count);
     p->rows_total =
-        points_share(rows, number + 1, part_count); /* take_held stops before this row */
+        points_share(rows, number + 1, part_count); /* take_all_rows stops before this row */
     return true;
 }
 
 /* --- text --- */
 
-/* Returns the beginning of the first line that begins at `at` or later, in a file of `size` bytes;
- * UINT64_MAX after an error (reported on stderr). `begin`: offset of the first line. */
+/* Returns the offset of the first line that begins at the offset `at` or later, in a file of `size`
+ * bytes; `size`: there is no such line; UINT64_MAX after an error (reported on stderr). begin:
+ * offset of the first line. */
 static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
 {
     char piece[1 << 14];
@@ -86,8 +90,8 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
     return size;
 }
 
-/* Reads the names of columns, which all parts need; the parts share the lines after the names.
- * `begin`: offset of the first line; *out: offset of the first line after the names. */
+/* Reads the line with the names of columns, which all parts need. begin: offset of the first line.
+ * *out: offset of the line after the names, where the first part begins. */
 static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };
@@ -99,7 +103,7 @@ static bool take_names(points *p, uint64_t begin, uint64_t *out)
         if (!success)
             (void)points_finish_block(p, &b);
         else if (!p->fields && got == POINTS_LINE)
-            success = fail_cut(p, "holds no line of names in its first bytes");
+            success = fail_cut(p, "has no line of column names in its first bytes");
     }
     *out = begin + b.begin;
     points_block_free(&b);
@@ -128,12 +132,12 @@ static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, 
 bool points_cut(points *p, uint64_t number, uint64_t part_count)
 {
     struct stat st = { .st_size = 0 };
-    if (!p->held && (p->fd < 0 || fstat(p->fd, &st) != 0 || !S_ISREG(st.st_mode)))
+    if (!p->all_rows && (p->fd < 0 || fstat(p->fd, &st) != 0 || !S_ISREG(st.st_mode)))
         return fail_cut(p, "is not a file; a shard needs a file");
     if (!points_begin(p))
         return false;
-    if (p->held)
-        return cut_held(p, number, part_count);
-    uint64_t begin = p->bytes_taken - p->rest_count, size = (uint64_t)st.st_size;
+    if (p->all_rows)
+        return cut_all_rows(p, number, part_count);
+    uint64_t begin = p->bytes_taken - p->unread_count, size = (uint64_t)st.st_size;
     return (p->raw ? cut_numbers : cut_text)(p, begin, size, number, part_count);
 }

@@ -1,4 +1,4 @@
-/* Recognises the format of points by the first bytes. */
+/* Recognises the format of points by the first bytes, and reads headers and complete inputs. */
 #include <ebpo/mesh.h>
 #include <ebpo/rows.h>
 #include <inttypes.h>
@@ -25,13 +25,13 @@ static bool read_ply(points *p, points_block *b)
                             kind_words[p->kind]);
     if (!points_fill_all(p, b))
         return false;
-    if (ebpo_points_parse_ply(p->rest, p->rest_count, p->name, &p->held, &p->rows_total, &error) !=
-        EBPO_OK) {
+    if (ebpo_points_parse_ply(p->unread, p->unread_count, p->name, &p->all_rows, &p->rows_total,
+                              &error) != EBPO_OK) {
         fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
         p->failed = true;
         return false;
     }
-    p->from_zero = true; /* vertices are counted from 0 everywhere */
+    p->from_zero = true; /* messages count the vertices of a PLY from 0, as PLY files do */
     p->rows_known = true;
     return true;
 }
@@ -49,6 +49,7 @@ static const char *find_npy_value(const char *head, const char *name)
     return at;
 }
 
+/* Reads a type such as '<f8'. Returns false if it is not float64 or float32. */
 static bool parse_npy_type(points *p, const char *descr)
 {
     if (strnlen(descr, 5) < 5)
@@ -87,6 +88,7 @@ static bool parse_npy_shape(points *p, const char *shape)
         at += *at == ',';
         at += strspn(at, " ");
     }
+    /* rays have six or seven columns, because tmax may be missing */
     if (*at != ')' || columns < (uint64_t)points_raw_width(p->kind) ||
         columns > (uint64_t)points_width(p->kind))
         return false;
@@ -123,20 +125,20 @@ static bool parse_npy_header(points *p, points_block *b, const char *head)
     return true;
 }
 
-/* Reads magic, version, length of the header, header, numbers. */
+/* Reads the signature, the version, the length of the header, and the header. */
 static bool read_npy(points *p, points_block *b)
 {
     enum { PREFIX_SIZE = 12, HEADER_MAX = 1 << 16 };
     char head[4096];
-    while (p->rest_count < PREFIX_SIZE && !p->is_ended && points_fill(p, b))
+    while (p->unread_count < PREFIX_SIZE && !p->is_ended && points_fill(p, b))
         ;
-    if (!b->failed && p->rest_count < PREFIX_SIZE)
+    if (!b->failed && p->unread_count < PREFIX_SIZE)
         return points_fault(b, 0, "has no valid NumPy header");
-    const uint8_t *u = (const uint8_t *)p->rest;
+    const uint8_t *u = (const uint8_t *)p->unread;
     size_t before = u[6] == 1 ? 10 : 12,
            length = u[6] == 1 ? (size_t)u[8] | (size_t)u[9] << 8
                               : (size_t)u[8] | (size_t)u[9] << 8 | (size_t)u[10] << 16;
-    while (p->rest_count < before + length && length < sizeof head && !p->is_ended &&
+    while (p->unread_count < before + length && length < sizeof head && !p->is_ended &&
            points_fill(p, b))
         ;
     if (b->failed)
@@ -144,9 +146,9 @@ static bool read_npy(points *p, points_block *b)
     if (u[6] < 1 || u[6] > 3)
         return points_fault(b, 0, "is a NumPy array of version %d.%d; supported: 1.0 to 3.0", u[6],
                             u[7]);
-    if (p->rest_count < before + length || length >= sizeof head)
+    if (p->unread_count < before + length || length >= sizeof head)
         return points_fault(b, 0, "has no valid NumPy header");
-    memcpy(head, p->rest + before, length);
+    memcpy(head, p->unread + before, length);
     head[length] = 0;
     for (char *quote = head; (quote = strchr(quote, '"'));)
         *quote = '\''; /* Python writes ' or " */
@@ -157,7 +159,7 @@ static bool read_npy(points *p, points_block *b)
 
 /* --- HDF5 datasets --- */
 
-/* Returns the colon in "FILE.h5:/path", or NULL. */
+/* Returns the last colon of "FILE.h5:/path" that a slash follows; NULL: there is none. */
 static const char *dataset_colon(const char *path)
 {
     const char *colon = NULL;
@@ -182,29 +184,30 @@ bool points_file(const char *path, struct stat *st, const char **dataset)
     return found;
 }
 
-/* Reads rows from `first` to `end`, and the total number of rows. */
+/* Reads rows from `first` up to, but not including, `end`, and the total number of rows. */
 static ebpo_status read_dataset(points *p, const char *file, const char *name, uint64_t first,
                                 uint64_t end, uint64_t *total, ebpo_error *error)
 {
-    free(p->held);
+    free(p->all_rows);
     return ebpo_rows_read_part(file, name, (unsigned)points_raw_width(p->kind),
                                (unsigned)points_width(p->kind), p->tmax, first, end - first,
-                               &p->held, &p->rows_total, total, error);
+                               &p->all_rows, &p->rows_total, total, error);
 }
 
 static ebpo_status read_part(points *p, const char *file, const char *name, uint64_t number,
                              uint64_t part_count, ebpo_error *error)
 {
-    uint64_t first = 0, end = 0, total, now;
+    uint64_t first = 0, end = 0, total, total_again;
+    /* with several parts, first reads only the number of rows */
     ebpo_status status =
         read_dataset(p, file, name, 0, part_count > 1 ? 0 : UINT64_MAX, &total, error);
     if (status != EBPO_OK || part_count == 1)
         return status;
-    p->held_part = true;
+    p->all_rows_are_part = true;
     p->row = first = points_share(total, number, part_count);
     end = points_share(total, number + 1, part_count);
-    status = read_dataset(p, file, name, first, end, &now, error);
-    if (status == EBPO_OK && (now != total || p->rows_total != end - first)) {
+    status = read_dataset(p, file, name, first, end, &total_again, error);
+    if (status == EBPO_OK && (total_again != total || p->rows_total != end - first)) {
         snprintf(error->message, sizeof error->message, "%s: changed while it was read", file);
         status = EBPO_E_IO;
     }
@@ -229,29 +232,31 @@ bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t 
 
 static bool begins_with(const points *p, const char *with, size_t count)
 {
-    return p->rest_count >= count && memcmp(p->rest, with, count) == 0;
+    return p->unread_count >= count && memcmp(p->unread, with, count) == 0;
 }
 
-/* Raw doubles may begin with these four bytes, but hardly with letters after them: the first double
- * would be about 1e219 or 1e243. */
+/* Returns true if the input is a PLY. Raw doubles may begin with the bytes "ply\n", but hardly with
+ * letters after these bytes, because the first double would be about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
     if (!begins_with(p, "ply\n", 4) && !begins_with(p, "ply\r", 4) &&
         (p->raw || (!begins_with(p, "ply ", 4) && !begins_with(p, "ply\t", 4))))
         return false;
     for (size_t i = 5; i < SIGNATURE_SIZE && p->raw; i++)
-        if (i >= p->rest_count || p->rest[i] < 'a' || p->rest[i] > 'z')
+        if (i >= p->unread_count || p->unread[i] < 'a' || p->unread[i] > 'z')
             return false;
     return true;
 }
 
-/* Recognises other file formats that the library can name: text that is not points. */
+/* Returns true, after an error message, if the input is a file of another format, such as a mesh or
+ * an image, and not text. ebpo_points_parse_ply recognises such files; then error.offset is 0. */
 static bool is_foreign(points *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     double *xyz = NULL;
     uint64_t count;
-    if (ebpo_points_parse_ply(p->rest, p->rest_count, p->name, &xyz, &count, &error) == EBPO_OK ||
+    if (ebpo_points_parse_ply(p->unread, p->unread_count, p->name, &xyz, &count, &error) ==
+            EBPO_OK ||
         error.offset != 0)
         return free(xyz), false;
     fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
@@ -259,7 +264,8 @@ static bool is_foreign(points *p)
     return true;
 }
 
-/* Fails, and lists the datasets that may be meant. */
+/* Refuses an HDF5 file that was given without the path of a dataset, and lists datasets that the
+ * user may have meant. */
 static bool refuse_hdf5(points *p, points_block *b)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -296,12 +302,13 @@ static bool recognise_format(points *p, points_block *b)
     return p->raw || !is_foreign(p);
 }
 
-/* Does not wait for more bytes when a short line of text has arrived. */
+/* Decides from the first eight bytes of binary input, or from the first four bytes of text, so that
+ * a short line of text from a terminal or a pipe is evaluated at once. */
 bool points_recognise(points *p, points_block *b)
 {
     for (;;) {
-        bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f;
-        if (p->rest_count >= (p->raw || binary ? SIGNATURE_SIZE : 4) || p->is_ended || b->failed)
+        bool binary = p->unread_count && (uint8_t)p->unread[0] > 0x7f;
+        if (p->unread_count >= (p->raw || binary ? SIGNATURE_SIZE : 4) || p->is_ended || b->failed)
             break;
         points_fill(p, b);
     }

@@ -79,7 +79,8 @@ static bool all_numbers(char **field, int fields)
     return fields > 0;
 }
 
-/* Chooses fields by name, or the first ones when there are no more than needed. */
+/* Sets p->field: chooses columns by their names. If no needed name is known and the number of
+ * columns is right, takes the columns in their order. Returns false if columns are missing. */
 static bool choose_fields(points *p, char **field, int fields)
 {
     int needed = points_raw_width(p->kind), width = points_width(p->kind), found = 0;
@@ -116,7 +117,7 @@ bool points_take_header(points *p, points_block *b)
     *end = 0;
     while (s < end && is_blank(*s))
         s++;
-    s += s[0] == '/' && s[1] == '/' ? 2 : 0; /* as CloudCompare writes it */
+    s += s[0] == '/' && s[1] == '/' ? 2 : 0; /* CloudCompare writes // before the names */
     p->separator = (char)(memchr(s, ',', (size_t)(end - s))    ? ','
                           : memchr(s, ';', (size_t)(end - s))  ? ';'
                           : memchr(s, '\t', (size_t)(end - s)) ? '\t'

@@ -1,14 +1,16 @@
-/* Reads the line of names before points in text. */
+/* Reads the first line of text input, which names the columns (--header). */
 #ifndef EBPO_TOOLS_POINTS_HEADER_H
 #define EBPO_TOOLS_POINTS_HEADER_H
 
 #include "cli/points_input.h"
 
-/* Reads the line of names if it is in the block; the block then begins after this line, and the
- * names are in `p`. On false the block holds the error. */
+/* Reads the line of names if it is in the block. The block then begins after this line, and
+ * p->field, p->fields and p->separator are set. Returns false after an error, which is in the
+ * block. */
 bool points_take_header(points *p, points_block *b);
-/* Splits a line that ends at `end` with a zero byte into fields, without surrounding blanks and
- * quotes, each ended by a zero byte. Returns their number. */
+/* Splits a line into fields; removes blanks and quotes around each field, and ends it by a zero
+ * byte. A zero byte is at `end`, the end of the line. separator: 0 for blanks. Returns the number
+ * of fields. */
 int points_split(char separator, char *line, char *end, char *field[POINTS_FIELDS]);
 
 #endif

@@ -35,7 +35,7 @@ void points_block_free(points_block *b)
     *b = (points_block){ .bytes = NULL };
 }
 
-/* Waits for more input. Returns false if the wait was interrupted. */
+/* Waits for more input. Returns false if p->wake_fd has ended the wait. */
 static bool wait_for_more(const points *p)
 {
     struct pollfd both[] = { { .fd = p->wake_fd, .events = POLLIN },
@@ -67,22 +67,24 @@ ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
 
 bool points_fill(points *p, points_block *b)
 {
-    ssize_t got = points_read_some(p, b, p->rest + p->rest_count, p->rest_capacity - p->rest_count);
-    p->rest_count += got > 0 ? (size_t)got : 0;
+    ssize_t got =
+        points_read_some(p, b, p->unread + p->unread_count, p->unread_capacity - p->unread_count);
+    p->unread_count += got > 0 ? (size_t)got : 0;
     return got >= 0;
 }
 
 bool points_fill_all(points *p, points_block *b)
 {
     while (!p->is_ended) {
-        if (p->rest_count == p->rest_capacity) {
-            char *wider = p->rest_capacity <= SIZE_MAX / 4
-                              ? realloc(p->rest, 2 * p->rest_capacity + 1)
+        if (p->unread_count == p->unread_capacity) {
+            char *wider = p->unread_capacity <= SIZE_MAX / 4
+                              ? realloc(p->unread, 2 * p->unread_capacity + 1)
                               : NULL;
             if (!wider)
-                return points_fault(b, 0, "not enough memory for %zu bytes", 2 * p->rest_capacity);
-            p->rest = wider;
-            p->rest_capacity *= 2;
+                return points_fault(b, 0, "not enough memory for %zu bytes",
+                                    2 * p->unread_capacity);
+            p->unread = wider;
+            p->unread_capacity *= 2;
         }
         points_fill(p, b);
     }
@@ -91,8 +93,8 @@ bool points_fill_all(points *p, points_block *b)
 
 void points_drop(points *p, size_t bytes)
 {
-    p->rest_count -= bytes;
-    memmove(p->rest, p->rest + bytes, p->rest_count);
+    p->unread_count -= bytes;
+    memmove(p->unread, p->unread + bytes, p->unread_count);
 }
 
 bool points_more_is_there(const points *p)

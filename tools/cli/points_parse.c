@@ -12,6 +12,7 @@
 
 /* --- checks for all kinds of input --- */
 
+/* Checks the values of a row. at: its line or row, for the message. */
 static bool check_row(const points *p, points_block *b, uint64_t at, const double *row)
 {
     for (int i = 0; i < points_raw_width(p->kind); i++)
@@ -76,6 +77,7 @@ static bool all_finite(const double *v, uint64_t count)
     return !bad;
 }
 
+/* Sets b->row_count to the number of rows before the first invalid one. */
 static void check_rows(const points *p, points_block *b, uint64_t count)
 {
     uint64_t width = (uint64_t)points_width(p->kind), good = 0;
@@ -117,8 +119,8 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-/* Reports a wrong number of values. `at`: the text at which parsing stopped; `more`: it stopped
- * because the row is full. */
+/* Reports a wrong number of values. at: the text at which parsing stopped. more: parsing stopped
+ * because the row is complete, but more values follow. */
 static bool wrong_count(const points *p, points_block *b, const char *at, bool more)
 {
     static const char *const expected[] = {
@@ -154,7 +156,7 @@ static bool parse_values(const points *p, points_block *b, char *s, char *end, d
     return true;
 }
 
-/* Parses the fields chosen by a header. */
+/* Parses the fields that a header has chosen. */
 static bool parse_fields(const points *p, points_block *b, char *s, char *end, double *row,
                          int *count)
 {
@@ -176,7 +178,7 @@ static bool parse_fields(const points *p, points_block *b, char *s, char *end, d
     return true;
 }
 
-/* Returns false after an error. Empty lines and comments hold no row. */
+/* Adds the row of a line; empty lines and comments have no row. Returns false after an error. */
 static bool parse_line(const points *p, points_block *b, char *s, char *end)
 {
     double *row = b->space + b->row_count * (uint64_t)points_width(p->kind);
@@ -218,14 +220,14 @@ static void parse_text(const points *p, points_block *b)
     }
 }
 
-/* Parses the block. If taking the block failed, that error belongs after its last row; an error
- * found here replaces it. */
+/* If points_take has recorded an error, it belongs after the last row of the block. An error in an
+ * earlier row replaces it. */
 void points_parse(const points *p, points_block *b)
 {
-    if (p->held)
+    if (p->all_rows)
         check_rows(p, b, b->row_count);
     else if (b->count > b->begin)
         (p->raw ? parse_numbers : parse_text)(p, b);
-    if (b->failed && b->fault_at == POINTS_NEXT_LINE) /* not replaced */
+    if (b->failed && b->fault_at == POINTS_NEXT_LINE) /* the error of points_take */
         b->fault_at = b->lines + 1;
 }

@@ -4,7 +4,7 @@
 
 #include "cli/points_input.h"
 
-/* All threads may call this. */
+/* Converts the bytes of a block to rows, and checks them. All threads may call this. */
 void points_parse(const points *p, points_block *block);
 
 #endif

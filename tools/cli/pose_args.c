@@ -6,7 +6,8 @@
 
 enum { NUMBERS_MAX = 13 };
 
-/* Returns how many numbers there are, -1 for other text or more numbers. */
+/* Returns the number of numbers in the text; -1: the text has other words, or more than NUMBERS_MAX
+ * numbers. */
 static int read_numbers(const char *text, double number[NUMBERS_MAX])
 {
     static const char between[] = " \t,";

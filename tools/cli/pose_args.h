@@ -8,9 +8,10 @@
 /* For help texts. */
 #define POSE_FORM "X Y Z [QX QY QZ QW [SCALE]]"
 
-/* Reads POSE_FORM, the quaternion of any length but 0; or twelve numbers, the rows of a 3x4 matrix
- * (rotation and translation), optionally followed by a scale. Blanks or commas separate them. Parts
- * of *out that the text omits stay unchanged. Returns false for other text. */
+/* Reads a pose: POSE_FORM with a quaternion of any length except 0; or twelve numbers, the rows of
+ * a matrix of three rows and four columns (rotation and translation), and optionally a scale.
+ * Blanks or commas separate the numbers. If the text omits the rotation or the scale, this member
+ * of *out stays unchanged. Returns false for other text. */
 bool pose_read(const char *text, ebpo_pose *out);
 
 #endif

@@ -9,9 +9,8 @@
 
 enum { THREADS_MAX = 256 };
 
-/* Limit for this process, which runs one command. */
-static uint64_t limit_bytes;
-static bool limit_by_option;
+static uint64_t limit_bytes; /* limit of this process without stacks; 0: only the inherited limit */
+static bool limit_by_option; /* --memory has set the limit */
 static rlim_t inherited_limit = RLIM_INFINITY; /* limit inherited from the parent process */
 
 /* Returns the bytes in use that count for the limit: private writable memory. Under sanitizers this
@@ -41,8 +40,8 @@ static uint64_t stack_bytes(int64_t threads)
     return each * (uint64_t)(most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most);
 }
 
-/* Sets the limit, which never exceeds the limit inherited from the parent process. `bytes` 0: no
- * additional limit. */
+/* Sets the limit, which never exceeds the limit inherited from the parent process. bytes: 0: only
+ * the inherited limit. given: the limit comes from --memory. */
 static void set_limit(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;

@@ -1,21 +1,22 @@
-/* Limits the memory of a command: a model that needs too much ends with an error and does not
- * affect other programs. */
+/* Limits the memory of the process, so that a command that needs too much memory ends with an error
+ * and does not affect other programs. */
 #ifndef EBPO_TOOLS_PROCESS_MEMORY_H
 #define EBPO_TOOLS_PROCESS_MEMORY_H
 
 #include <ebpo/base.h>
 #include <stddef.h>
 
-/* Sets the limit of all commands, before anything else: the free memory. */
+/* Sets the default limit of all commands: the memory that is free now. Call first in main. */
 void process_memory_default(void);
 
-/* Sets the limit from --memory, for commands whose memory use follows from their work; `size` NULL:
- * unchanged. `threads`: as --threads; the stacks of the threads are added. The limit inherited from
- * the parent process is never exceeded. Returns false, with the usage message printed, for an
- * invalid size. */
+/* Sets the limit from the value of --memory, for commands that have no other way to limit their
+ * memory. size: NULL: the limit stays unchanged. threads: value of --threads; the stacks of the
+ * threads do not count for `size`. The limit inherited from the parent process is never exceeded.
+ * Returns false, after an error message, for an invalid size. */
 bool process_memory_take(const char *command, const char *size, int64_t threads);
 
-/* Writes the limit and its origin, for messages about memory; "" when there is none. */
+/* Writes the limit and its origin, to be appended to messages about memory; "": there is no limit.
+ */
 void process_memory_reason(char *out, size_t capacity);
 
 #endif

@@ -10,7 +10,8 @@
 
 double progress_now(void) { return 1e-9 * (double)tool_clock(); }
 
-/* While a mesh is read, progress is counted in bytes. */
+/* Draws the rate of the work: in bytes while a mesh is read, then in faces, if line->faces is set;
+ * else in the units of the reports. speed: units per second. */
 static void draw_rate(const progress_line *line, double speed, uint64_t total)
 {
     char rate[32];
@@ -55,7 +56,8 @@ void progress_end_stage(progress_line *line)
     line->begun = now;
 }
 
-/* Begins a stage. When there is no space for another stage, counts it with the last one. */
+/* Begins a stage. If there is no space for another stage, its time is added to that of the last
+ * stage. */
 static void begin_stage(progress_line *line, const char *stage)
 {
     int i = 0;
@@ -65,7 +67,8 @@ static void begin_stage(progress_line *line, const char *stage)
         line->stages[line->stage_count++].name = stage;
     line->current = i < PROGRESS_STAGES ? i : PROGRESS_STAGES - 1;
     line->stage = stage;
-    for (i = line->at; i < line->plan_count; i++) /* never goes back */
+    for (i = line->at; i < line->plan_count;
+         i++) /* the shown number of the stage never decreases */
         if (line->plan[i] == (int)stages_row(stage)) {
             line->at = i;
             break;

@@ -10,6 +10,7 @@ const char *const inside_modes[] = { "fast",        "cache",       "nodes",     
 const char *const distance_modes[] = { "exact", "recursive", "leaves", "envelope", NULL };
 const char *const ray_sides[] = { "both", "front", "back", NULL };
 
+/* [index in inside_modes] options of the mode */
 static const struct {
     ebpo_loading loading;
     ebpo_envelopes envelopes;
@@ -53,7 +54,8 @@ bool query_inside_fits(const char *name, const query_values *v)
 
 bool query_distance_fits(const char *name, const query_values *v)
 {
-    /* Options without effect on other searches, and on distances to envelopes. */
+    /* SEARCH_OPTIONS: options that only the default search (--mode exact) uses. FACE_OPTIONS:
+     * options that have no effect on distances to envelopes. */
     enum {
         SEARCH_OPTIONS = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
         FACE_OPTIONS =

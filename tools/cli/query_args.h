@@ -27,7 +27,7 @@ extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
 extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */
 extern const char *const ray_sides[];      /* for --sides, in the order of ebpo_ray_sides */
 
-/* Bits of options, for query_check_effect. */
+/* Options as bits, for query_check_effect. */
 enum {
     QUERY_LEVEL = 1,
     QUERY_DEADLINE = 2,
@@ -37,23 +37,24 @@ enum {
     QUERY_PREFETCH = 32
 };
 
-/* Returns true if distance returns lists: --nearest or --within. */
+/* Returns true if `ebpo distance` returns a list of faces for each point (--nearest, --within). */
 static inline bool query_lists(const query_values *v)
 {
     return v->nearest > 0 || isfinite(v->within);
 }
 
-/* Checks that none of the options `ineffective` was given, which have no effect with `with`, such
- * as "--mode leaves". Returns false after a report on stderr (exit with EXIT_USAGE). */
+/* Returns false if one of the options `ineffective` was given, which have no effect together with
+ * the option `with`, such as "--mode leaves". This error is reported on stderr; exit with
+ * EXIT_USAGE. */
 bool query_check_effect(const char *name, const query_values *v, unsigned ineffective,
                         const char *with);
-/* Returns false, with a report on stderr (exit with EXIT_USAGE), when an option has no effect with
- * the given --mode, or for distances with --max-level. */
+/* Return false if an option was given that has no effect with the other options of `inside` or
+ * `distance`. This error is reported on stderr; exit with EXIT_USAGE. */
 bool query_inside_fits(const char *name, const query_values *v);
 bool query_distance_fits(const char *name, const query_values *v);
 
-/* Converts the values to options of the library; `name` is the command, for messages. Returns false
- * for conflicting values, reported on stderr (exit with EXIT_USAGE). */
+/* Converts the values to options of the library. name: the command, for messages. Returns false for
+ * an invalid value, which is reported on stderr; exit with EXIT_USAGE. */
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
                         ebpo_inside_options *inside, ebpo_distance_options *distance);
 
@@ -71,11 +72,11 @@ typedef struct query_session {
         NULL, NULL, NULL   \
     }
 
-/* Returns an exit code; errors have been reported on stderr, also a missing level (-1: none is
- * requested). Call query_close in any case. */
+/* Opens a file, its model and a context. level: a level that the file must have; -1: none. Returns
+ * an exit code; errors have been reported on stderr. Call query_close in any case. */
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote);
-/* Does the same in two steps, without a context. */
+/* Open the file and then its model, in two steps, without a context. */
 int query_open_file(query_session *s, const char *name, const char *path,
                     const ebpo_model_options *options, int level, const remote_values *remote);
 int query_open_model(query_session *s, const char *name, const ebpo_model_options *options);

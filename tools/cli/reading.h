@@ -1,4 +1,4 @@
-/* Options for reading, with the number of threads of --threads. */
+/* Makes the options for reading parts of a file, from the value of --threads. */
 #ifndef EBPO_TOOLS_READING_H
 #define EBPO_TOOLS_READING_H
 

@@ -1,4 +1,5 @@
-/* Opens the FILE of a command, which may be a URL: shared options, and --stats. */
+/* Opens the file of a command by its path or URL. Defines the options that all commands have for
+ * this, and prints --stats. */
 #ifndef EBPO_TOOLS_REMOTE_ARGS_H
 #define EBPO_TOOLS_REMOTE_ARGS_H
 
@@ -7,10 +8,11 @@
 #include "cli/args.h"
 #include "cli/json.h"
 
+/* Values of the options; NULL, -1 and an empty list: not given. */
 typedef struct remote_values {
     bool stats, unversioned;
     int64_t max_expansion; /* as in ebpo_open_options */
-    bool compat;           /* also opens files with the layouts of other programs */
+    bool compat;           /* also open files that other programs have rewritten (--compat) */
     const char *cache, *cache_size, *user, *ca_file;
     unsigned cache_block; /* bytes; 0: default */
     double timeout, stall;
@@ -25,8 +27,8 @@ typedef struct remote_values {
         .timeout = -1, .stall = -1, .retries = -1, .connections = -1 \
     }
 
-/* Calls ebpo_open or ebpo_open_compat, by path or URL. Returns EBPO_E_ARGUMENT also for an invalid
- * option. */
+/* Opens a file by its path or URL (ebpo_open_with, ebpo_open_compat). EBPO_E_ARGUMENT: also for an
+ * invalid option. */
 EBPO_MUST_USE ebpo_status remote_open(ebpo_file **out, const char *name,
                                       const remote_values *values, ebpo_error *error);
 
@@ -38,14 +40,14 @@ const char *remote_shown(const char *name);
 
 /* Traffic of a file since it was opened. */
 typedef struct traffic {
-    uint64_t bytes, reads; /* requested from the source */
+    uint64_t bytes, reads; /* bytes and number of reads that were requested from the source */
     bool remote;           /* the file is a URL */
     ebpo_http_stats http;
 } traffic;
 traffic traffic_of(const ebpo_file *file);
 
-/* Print the traffic on stderr as a line or JSON, or as a member "traffic" of a JSON object. Without
- * --stats they print nothing. */
+/* Print the traffic if --stats was given: remote_report on stderr, as a line or as JSON,
+ * remote_json as a member "traffic" of a JSON object. */
 void remote_report(const traffic *t, const remote_values *values, bool as_json);
 void remote_json(json *j, const traffic *t, const remote_values *values);
 

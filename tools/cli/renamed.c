@@ -4,12 +4,12 @@
 #include <string.h>
 
 static const struct {
-    const char *old, *now;
+    const char *old, *current;
 } commands[] = { { "repair", "recover" }, { "touch", "haptic" } };
 
 /* Former options; command NULL: an option of every command. */
 static const struct {
-    const char *command, *old, *now;
+    const char *command, *old, *current;
 } options[] = {
     { "bench", "level", "--max-level" },
     { "bench", "save-answers", "--save-results" },
@@ -39,7 +39,7 @@ static const struct {
 };
 
 static const struct {
-    const char *option, *old, *now;
+    const char *option, *old, *current;
 } words[] = { { "face-coding", "usual", "default" } };
 
 static bool is_word(const char *word, const char *text, size_t length)
@@ -51,7 +51,7 @@ const char *renamed_command(const char *name)
 {
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
         if (strcmp(commands[i].old, name) == 0)
-            return commands[i].now;
+            return commands[i].current;
     return NULL;
 }
 
@@ -60,7 +60,7 @@ const char *renamed_option(const char *command, const char *name, size_t length)
     for (size_t i = 0; i < sizeof options / sizeof *options; i++)
         if ((!options[i].command || strcmp(options[i].command, command) == 0) &&
             is_word(options[i].old, name, length))
-            return options[i].now;
+            return options[i].current;
     return NULL;
 }
 
@@ -68,6 +68,6 @@ const char *renamed_word(const char *option, const char *word, size_t length)
 {
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strcmp(words[i].option, option) == 0 && is_word(words[i].old, word, length))
-            return words[i].now;
+            return words[i].current;
     return NULL;
 }

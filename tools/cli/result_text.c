@@ -87,10 +87,10 @@ bool result_text_write(result_text *t, const char *command)
 {
     struct stat st;
     bool success = !t->failed && !t->write_failed,
-         file = fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode);
+         is_file = fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode); /* needs no pieces */
     size_t at = t->skipped_bytes < t->count ? t->skipped_bytes : t->count;
     t->skipped_bytes -= at;
-    for (size_t i = 0; success && !file && i < t->cut_count; i++) {
+    for (size_t i = 0; success && !is_file && i < t->cut_count; i++) {
         if (t->cuts[i] <= at)
             continue;
         success = command_write(command, t->bytes + at, t->cuts[i] - at);

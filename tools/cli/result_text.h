@@ -1,5 +1,9 @@
-/* Buffers results as bytes until they are written. The buffer grows, and records where each result
- * ends. */
+/* Buffers results as bytes until they are written to standard output.
+ *
+ * A *row* is all output for one input row; it has one or more *results*, such as the faces of a
+ * list. Consecutive results of at most RESULT_PIECE bytes together are a *piece*, which is written
+ * to a pipe at once. If a row becomes too long for the buffer, the buffer *spills*: the owner
+ * decides whether to write or to drop the text (`spill`). */
 #ifndef EBPO_TOOLS_RESULT_TEXT_H
 #define EBPO_TOOLS_RESULT_TEXT_H
 
@@ -11,14 +15,14 @@ typedef struct result_text result_text;
 struct result_text {
     char *bytes;
     size_t count, capacity;
-    size_t spill_at;      /* size from which the buffer spills */
+    size_t spill_at;      /* number of bytes from which the buffer spills */
     size_t result, piece; /* end of the last result and of the last piece */
-    size_t *cuts;         /* [cut_count] ends of pieces: groups of results of at most 4096 bytes */
+    size_t *cuts;         /* [cut_count] ends of pieces */
     size_t cut_count, cut_capacity;
-    uint64_t rows;        /* rows with complete results since it was last set to 0 */
+    uint64_t rows;        /* complete rows since the owner has set this to 0 */
     size_t row;           /* end of the last complete row */
-    size_t row_written;   /* bytes after `row` that were already written */
-    size_t skipped_bytes; /* first bytes of the text that were already written and are skipped */
+    size_t row_written;   /* bytes of the row after `row` that were already written */
+    size_t skipped_bytes; /* first bytes of the text that were already written, to be skipped */
     bool failed;          /* out of memory; the buffered text is lost */
     bool write_failed;    /* writing failed, which has been reported */
     bool full;            /* text after the last complete row is dropped until result_text_retry */
@@ -39,8 +43,9 @@ char *result_text_grow(result_text *t);
 /* A pipe takes RESULT_PIECE bytes atomically; RESULT_SPILL is the default size before spilling. */
 enum { RESULT_PIECE = 4096, RESULT_SPILL = 1 << 20 };
 
-/* Returns where to write the next at most RESULT_MAX bytes; result_text_end sets how many were
- * written. Never NULL: without memory, the buffered text is lost and `failed` is set. */
+/* Returns the position at which the caller may write at most RESULT_MAX bytes. The caller then
+ * calls result_text_end with the end of the written bytes. Never returns NULL: without memory, the
+ * buffered text is lost and `failed` is set. */
 static inline char *result_text_capacity(result_text *t)
 {
     return t->count < t->spill_at && t->count + RESULT_MAX <= t->capacity ? t->bytes + t->count
@@ -51,8 +56,9 @@ static inline void result_text_end(result_text *t, const char *end)
     t->count = (size_t)(end - t->bytes);
 }
 
+/* Ends a piece at the offset `at`. */
 void result_text_cut(result_text *t, size_t at);
-/* Ends a result. Results that fit into one piece are written together. */
+/* Ends a result, and, before it, the piece if both together are longer than RESULT_PIECE. */
 static inline void result_text_close(result_text *t)
 {
     if (t->count - t->piece > RESULT_PIECE && t->result > t->piece)

@@ -75,15 +75,16 @@ void raw_double(FILE *out, double v)
 
 /* --- attributes: written after the face index --- */
 
-/* Writes the attributes of `face`, which may be EBPO_NO_FACE. ebpo_sample cannot fail here, as the
- * file of the queries has the attributes of `sampler`; if it does, no attributes are written. */
+/* Writes the attributes of a face at a point; face: may be EBPO_NO_FACE. ebpo_sample should not
+ * fail, because the sampler was made for the file of the queries; if it fails, the values are
+ * written as missing. */
 static char *put_attributes(char *at, result_form form, const ebpo_sampler *sampler,
                             const double point[3], uint64_t face)
 {
     double values[EBPO_SAMPLER_MAX];
     ebpo_error error = EBPO_ERROR_INIT;
     unsigned count = sampler ? ebpo_sampler_columns(sampler) : 0;
-    bool none = face == EBPO_NO_FACE;
+    bool none = face == EBPO_NO_FACE; /* the values are missing */
     if (count && ebpo_sample(sampler, point, &face, 1, values, &error) != EBPO_OK)
         none = true;
     if (count && form == RESULTS_JSON)
@@ -102,8 +103,8 @@ static char *put_attributes(char *at, result_form form, const ebpo_sampler *samp
 
 /* --- the model of a catalogue --- */
 
-/* Writes the index of the model. `model` NULL: there is no catalogue; *model UINT64_MAX: no model.
- */
+/* Writes the index of the model in the catalogue. model: NULL: there is no catalogue, and nothing
+ * is written. *model: UINT64_MAX: no model. */
 static char *put_model(char *at, result_form form, const uint64_t *model)
 {
     if (!model)
@@ -157,7 +158,8 @@ void results_inside(result_text *t, result_form form, const ebpo_inside_result *
 
 /* --- distance --- */
 
-/* Returns true if there is a nearest point, also when the distance exceeds doubles (inf). */
+/* Returns true if there is a nearest point. The distance may still be inf, if it is beyond the
+ * range of doubles. */
 static bool has_point(const ebpo_distance_result *r)
 {
     return isfinite(r->distance) || r->face != EBPO_NO_FACE;
@@ -279,8 +281,8 @@ static char *put_hit(char *at, result_form form, const ebpo_ray_hit *hit)
     return number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
 }
 
-/* Writes a hit with its attributes at the point of t. A t beyond the range of doubles (inf) has no
- * point and no attributes. */
+/* Writes a hit with the attributes at its point. If t is beyond the range of doubles (inf), the
+ * attributes are missing. */
 static char *put_found(char *at, result_form form, const ebpo_ray *ray, const ebpo_ray_hit *hit,
                        const ebpo_sampler *sampler, const uint64_t *model)
 {

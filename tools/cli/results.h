@@ -14,14 +14,15 @@ extern const char *const where_words[]; /* OUT, IN, ON, MAYBE */
 
 void results_inside(result_text *t, result_form form, const ebpo_inside_result *results,
                     uint64_t count);
-/* `intervals`: writes lo and hi only. `sampler`, here and below: attributes to write after the
- * face; or NULL. `model`, here and below: [count] indices of models in the catalogue, UINT64_MAX
- * for none; or NULL. */
+/* intervals: writes only lo and hi. In this and the next functions: sampler: attributes to write
+ * after the face; or NULL. model: [count] indices of models in the catalogue, UINT64_MAX for none;
+ * NULL: there is no catalogue. */
 void results_distance(result_text *t, result_form form, bool intervals,
                       const ebpo_distance_result *results, uint64_t count,
                       const ebpo_sampler *sampler, const uint64_t *model);
-/* Writes one of the nearest faces of a point, with the text before it; after the last face the text
- * that ends the list. */
+/* results_near writes one face of the list of nearest faces, with the text before it. first: the
+ * face is the first one of the list. results_near_end writes the text that ends the list. none: the
+ * list is empty. */
 void results_near(result_text *t, result_form form, const ebpo_near_face *face, bool first,
                   const ebpo_sampler *sampler);
 void results_near_end(result_text *t, result_form form, bool none, const ebpo_sampler *sampler);
@@ -34,8 +35,8 @@ void results_ray_all(result_text *t, result_form form, const ebpo_ray *ray,
                      const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler);
 void results_box(result_text *t, result_form form, const uint64_t *faces, uint64_t count);
 
-/* Writes a line of names, which are separated by commas; `attributes`: at most RESULT_NAMES bytes
- * of names, or NULL. */
+/* Writes the line with the names of columns. names: separated by commas. attributes: names of the
+ * attributes, at most RESULT_NAMES bytes; or NULL. */
 enum { RESULT_NAMES = 400 };
 void results_header(result_text *t, result_form form, const char *names, const char *attributes);
 

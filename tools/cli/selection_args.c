@@ -41,7 +41,7 @@ static bool uses_seed(const ebpo_selection_traits *t) { return t->uses_seed; }
 
 /* Returns the selections with a trait as bits, and writes their names, "kmedoids, offset or
  * random", to `names`. */
-static uint32_t of_trait(trait_fn has, char *names, size_t size)
+static uint32_t selections_with(trait_fn has, char *names, size_t size)
 {
     uint32_t bits = 0;
     names[0] = 0;
@@ -49,22 +49,23 @@ static uint32_t of_trait(trait_fn has, char *names, size_t size)
         const ebpo_selection_traits *t = ebpo_selection_describe((ebpo_selection)i);
         if (!has(t))
             continue;
-        char rest[200];
-        snprintf(rest, sizeof rest, "%s", names);
+        char later[200]; /* names of the following selections */
+        snprintf(later, sizeof later, "%s", names);
         const char *between = !bits ? "" : bits & (bits - 1) ? ", " : " or ";
-        snprintf(names, size, "%s%s%.150s", t->name, between, rest);
+        snprintf(names, size, "%s%s%.150s", t->name, between, later);
         bits |= 1u << i;
     }
     return bits;
 }
 
-/* Refuses options that affect none of the chosen selections. */
+/* Refuses options that were given but affect none of the chosen selections. options: "--epsilon
+ * is"; has: the trait of the selections that use the options. */
 static int check_effect(const char *name, const selection_options *o, bool given,
                         const char *options, trait_fn has)
 {
     char names[200], message[300];
-    uint32_t taking = of_trait(has, names, sizeof names);
-    if (!given || o->chosen & taking)
+    uint32_t affected = selections_with(has, names, sizeof names);
+    if (!given || o->chosen & affected)
         return EXIT_OK;
     snprintf(message, sizeof message, "%s for --select %s", options, names);
     return command_usage(name, "%s", message);
@@ -96,10 +97,10 @@ ebpo_status selection_k_root(const char *text, uint64_t faces, double *out, ebpo
     *out = 0;
     if (!text)
         return EBPO_OK;
-    bool fine = read_k_root(text, &k, &share);
+    bool is_read = read_k_root(text, &k, &share);
     if (share)
         k = fmax(1, k / 100 * (double)faces);
-    if (!fine || !(k <= max_planes)) {
+    if (!is_read || !(k <= max_planes)) {
         snprintf(error->message, sizeof error->message,
                  "--k-root: %.40s of %" PRIu64
                  " faces is more than 1e9 planes; give a smaller share",

@@ -31,7 +31,7 @@ static void give_up(int number)
 
 void signals_install(void)
 {
-    /* A limit on file size is an error like a full disk. */
+    /* A write beyond the limit on file size then fails with an error, as on a full disk. */
     signal(SIGXFSZ, SIG_IGN);
     /* SIGPIPE: the reader of the output has read enough, as head does. */
     static const int numbers[] = { SIGINT, SIGTERM, SIGHUP, SIGPIPE };

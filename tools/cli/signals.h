@@ -1,5 +1,5 @@
-/* Handles SIGINT, SIGTERM, SIGHUP and SIGPIPE: removes temporary files and ends the process by the
- * same signal. SIGXFSZ becomes a write error. */
+/* Handles SIGINT, SIGTERM, SIGHUP and SIGPIPE: removes temporary files, and then ends the process
+ * by the same signal. SIGXFSZ is ignored, so that the write that exceeds the limit fails. */
 #ifndef EBPO_TOOLS_SIGNALS_H
 #define EBPO_TOOLS_SIGNALS_H
 
@@ -10,8 +10,8 @@ void signals_install(void);
  */
 void signals_set_cleanup(void (*clean_up)(void));
 
-/* Registers a second function, which then removes the temporary copies of standard input and
- * output. Both functions are called. */
+/* Registers a second function, which removes the temporary copies of standard input and output. A
+ * signal calls both functions. */
 void signals_set_scratch_cleanup(void (*clean_up)(void));
 
 #endif

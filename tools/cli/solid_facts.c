@@ -13,7 +13,7 @@ static double cell_volume(const ebpo_info *info, int level)
 
 double facts_volume(const ebpo_info *info, int level)
 {
-    if (!isnormal(cell_volume(info, level))) /* then the sums of the file have no meaning */
+    if (!isnormal(cell_volume(info, level))) /* the volumes in the file have overflowed */
         return NAN;
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
@@ -60,7 +60,7 @@ double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double
                    : findings_volume_known(solid) ? solid->lo
                                                   : fabs(solid->integral);
     double percent = 100 * volume / whole;
-    return isfinite(percent) ? percent : NAN; /* without a meaningless sign */
+    return isfinite(percent) ? percent : NAN; /* infinity would have a meaningless sign */
 }
 
 double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int level)
@@ -79,7 +79,7 @@ double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid,
                           double limit)
 {
     double least = facts_excess(info, solid, limit);
-    /* 1e-9 of the volume: possible rounding error */
+    /* 1e-7 percent is 1e-9 of the volume: a possible rounding error */
     return least > 1e-7 ? facts_excess(info, solid, volume) / least : NAN;
 }
 

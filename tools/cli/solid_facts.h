@@ -1,4 +1,5 @@
-/* Volumes of envelopes and of the solid, and the base of percentages. */
+/* Computes volumes of envelopes and of the solid, and percentages of a base: the volume of the
+ * solid, the integral of its winding number, or the volume of the root box. */
 #ifndef EBPO_TOOLS_SOLID_FACTS_H
 #define EBPO_TOOLS_SOLID_FACTS_H
 
@@ -15,14 +16,15 @@ EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned thr
                                         ebpo_progress progress, double *volume, ebpo_error *error);
 /* Returns the bounds of the volume of the solid. `shells`: as for ebpo_solid_volume_of. */
 ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells);
-/* Returns these bounds from the measurements of the mesh. */
+/* Returns the bounds of the volume of the solid, or, if they are not equal, those of `mass`, the
+ * measurements of the mesh. */
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass);
 /* Returns the word for the base of percentages: "solid"; "box" (the root box) for a surface;
  * "integral" (of the winding number) if the volume of the solid is not known. */
 const char *facts_whole(const ebpo_info *info, const ebpo_solid_volume *solid);
-/* Prints the base, for the legend of a table. */
+/* Prints which base the percentages have, for the legend of a table. */
 void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume *solid);
-/* Returns facts_volume in percent of the base. */
+/* Returns the volume of the envelopes of a level in percent of the base. */
 double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int level);
 /* Returns any volume in percent of the base. */
 double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double volume);

@@ -1,4 +1,5 @@
-/* Maps the stages of the library to the stages shown to users. */
+/* Maps the stages of the library (the texts of its progress reports) to the rows of the table of
+ * stages that users see. */
 #ifndef EBPO_TOOLS_STAGE_ROWS_H
 #define EBPO_TOOLS_STAGE_ROWS_H
 
@@ -22,7 +23,7 @@ typedef enum stage_row {
     STAGE_ROWS
 } stage_row;
 
-/* EBP 2017, 3.6.4 and tables 8 to 10 and 18: six stages, and their sum. */
+/* The six stages of the thesis EBP 2017 (3.6.4, tables 8 to 10 and 18), as bits. */
 enum {
     THESIS_LEAVES = 1 << 0,
     THESIS_CORNERS = 1 << 1,
@@ -34,9 +35,9 @@ enum {
 };
 
 typedef struct stage_name {
-    const char *name;
-    unsigned thesis;       /* stages of the thesis with the same work */
-    const char *stages[8]; /* stages of the library */
+    const char *name;      /* name of the row */
+    unsigned thesis;       /* bits of the thesis' stages that do the same work */
+    const char *stages[8]; /* stages of the library that the row sums */
 } stage_name;
 extern const stage_name stage_names[STAGE_ROWS];
 

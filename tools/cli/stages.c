@@ -56,6 +56,7 @@ void stages_split(progress_line *line, const ebpo_build_times *times)
 
 /* --- words --- */
 
+/* Prints the name, the seconds and the faces per second of a row. */
 static void print_row(FILE *out, const char *name, double seconds, uint64_t faces)
 {
     char rate[32] = "";
@@ -75,7 +76,8 @@ static void print_thesis(FILE *out, unsigned thesis)
     fprintf(out, "%s\n", thesis ? "" : "-");
 }
 
-/* Sums the seconds of each row. Returns the stages of the thesis that began, as bits. */
+/* Sums the seconds of each row. began: rows with a stage that began. Returns the bits of the
+ * thesis' stages that these rows do. */
 static unsigned sum_by_row(const progress_line *line, const stage_facts *f,
                            double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
 {
@@ -121,7 +123,8 @@ static void thesis_numbers(json *j, unsigned thesis)
     json_end(j);
 }
 
-/* Writes a stage of the thesis, and the rows that do its work. The last stage is the sum. */
+/* Writes a stage of the thesis, and the rows that do its work. number: 0 to 5; THESIS_STAGES: the
+ * sum of all stages. */
 static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS],
                          const double taken[STAGE_ROWS])
 {

@@ -25,12 +25,12 @@ enum { STAGE_PLAN_MAX = STAGE_ROWS + 3 };
  * number. */
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX]);
 
-/* Splits the stage of the library for cells and envelopes of the pieces into two, by the times of
- * their threads. Call before the two functions below. */
+/* The library makes cells and envelopes in one stage. Splits its time into two stages, in the ratio
+ * of the processor times in `times`. Call this before stages_print and stages_json. */
 void stages_split(progress_line *line, const ebpo_build_times *times);
 
-/* Print the times of the stages, as a table and as JSON. Call after progress_end_stage. seconds:
- * total time. */
+/* Print the times of the stages, as a table or as JSON. Call them after progress_end_stage.
+ * seconds: total time. */
 void stages_print(FILE *out, const progress_line *line, const stage_facts *f, double seconds);
 void stages_json(json *j, const progress_line *line, const stage_facts *f);
 

@@ -1,25 +1,26 @@
-/* Standard streams: replaces closed streams, and the operand "-": standard input is read into a
- * temporary file, standard output is written from one. Meshes are not read sequentially, and
- * outputs are replaced atomically. */
+/* Handles standard streams. Replaces closed streams. Replaces the operand "-" by a temporary file:
+ * standard input is copied to it at first, or it is copied to standard output at the end. Commands
+ * need files, because meshes are not read sequentially, and outputs are replaced atomically. */
 #ifndef EBPO_TOOLS_STANDARD_FILES_H
 #define EBPO_TOOLS_STANDARD_FILES_H
 
 #include "cli/args.h"
 
-/* Replaces closed standard streams by unusable files, before any file is opened. Returns false if
- * that is impossible; then nothing may be opened. */
+/* Replaces closed standard streams by unusable files. Must be called before any file is opened.
+ * Returns false if this is impossible; then nothing may be opened. */
 bool standard_files_occupy(void);
 
-/* Replaces operands "-" by temporary files, as spec->dash says for each. If one of them is an
- * output, the command prints to standard error. Returns an exit code, EXIT_OK also if no operand is
- * "-". Errors have been reported. */
+/* Replaces operands "-" by temporary files, as spec->dash states. If an output is replaced, prints
+ * of the command to standard output go to standard error. Returns an exit code, EXIT_OK also if no
+ * operand is "-". Errors have been reported. */
 int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX]);
 
-/* Returns a path for messages: "standard-input" or "standard-output" for a temporary file. */
+/* Returns the name of a file for messages: "standard-input" or "standard-output" for a temporary
+ * file, else the path. */
 const char *standard_files_shown(const char *path);
 
-/* Called after the command: copies its output if its exit code is EXIT_OK. Returns the exit code.
- */
+/* Ends the streams after the command has ended with `code`. If the code is EXIT_OK, copies the
+ * temporary output to standard output. Returns the exit code. */
 int standard_files_end(const arg_spec *spec, int code);
 
 #endif

@@ -17,23 +17,24 @@ void table_legend(FILE *out);
 /* Prints x by the printf `format` with one conversion of a double; "-" when x is not finite. */
 const char *table_cell(char out[TABLE_CELL], const char *format, double x);
 
-/* As table_cell; but when x is not finite, returns words that can follow "volume". */
+/* Does the same as table_cell, but if x is not finite, returns words that can follow "volume". */
 const char *table_volume(char out[TABLE_CELL], const char *format, double x);
 
-/* Prints the meaning of "-" in columns of volumes, below a table that has some. */
+/* Prints the meaning of "-" in columns of volumes, below a table that has such cells. */
 void table_beyond(FILE *out);
 
-/* Writes x * 2^exponent with `digits` significant digits, 1 to 17, as %g does; beyond the range of
- * a double with at most 9, such as 4.2e+901. */
+/* Writes x * 2^exponent with `digits` significant digits, 1 to 17, as %g does. A number beyond the
+ * range of a double, such as 4.2e+901, has at most 9 digits. */
 const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exponent);
 
-/* Writes x * 2^exponent as a number; beyond the range of a double as the same text. */
+/* Writes x * 2^exponent as a JSON number, or, beyond the range of a double, as the string of
+ * table_scaled. */
 void table_json(json *j, const char *key, double x, int64_t exponent);
 
-/* Returns true if a double holds x * 2^exponent, neither infinite nor rounded to 0 or near it. */
+/* Returns true if x * 2^exponent is in the range of normal doubles, or 0. */
 bool table_in_range(double x, int64_t exponent);
 
-/* Returns "mm^3" with a blank before it; "" without a unit. */
+/* Writes " mm^3" for the unit mm and the power 3; "" without a unit. */
 const char *table_unit(char out[TABLE_CELL], const char *unit, int power);
 
 #endif

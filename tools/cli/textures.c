@@ -8,13 +8,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* Indices in textures.list; DIGEST: bytes of a digest. */
 enum { NAMES, USES, DIGESTS, IMAGES, DIGEST = 32 };
 
+/* Bytes in memory, and their number. */
 typedef struct span {
     const char *s;
     uint64_t n;
 } span;
 
+/* Returns the bytes of a row in one of the arrays; empty if the array was not read. */
 static span list_of(const textures *t, int which, uint64_t row)
 {
     const ebpo_attribute_values *v = &t->list[which];
@@ -27,7 +30,7 @@ static span list_of(const textures *t, int which, uint64_t row)
                                        : (span){ "", 0 };
 }
 
-/* Returns the index of the array of textures; -1: another attribute. */
+/* Returns the index in textures.list of an attribute; -1: it is not about images. */
 static int which_of(const ebpo_attribute_facts *a)
 {
     static const char *const names[TEXTURE_ARRAYS] = { "name", "use", "sha256", "bytes" };
@@ -97,22 +100,23 @@ bool textures_same(const ebpo_file *a, const ebpo_file *b)
 
 /* --- facts --- */
 
-/* Returns the number of bytes of an image, also when the bytes were not read. */
+/* Returns the number of bytes of an image, even if the bytes were not read. */
 static uint64_t byte_count(const textures *t, uint64_t row)
 {
     const uint64_t *ends = t->list[IMAGES].ends;
     return !ends ? t->columns[IMAGES] : row ? ends[row] - ends[row - 1] : ends[0];
 }
 
-/* A row has a digest and no bytes when the image was not embedded or was an empty file. */
+/* Returns true if the file has the bytes of the image. A row with a digest but without bytes is an
+ * image that was not embedded, or an empty image file, whose digest is that of no bytes. */
 static bool is_kept(const textures *t, uint64_t row)
 {
-    static const char nothing[] =
+    static const char digest_of_nothing[] =
         "\xe3\xb0\xc4\x42\x98\xfc\x1c\x14\x9a\xfb\xf4\xc8\x99\x6f\xb9\x24"
         "\x27\xae\x41\xe4\x64\x9b\x93\x4c\xa4\x95\x99\x1b\x78\x52\xb8\x55";
     span digest = list_of(t, DIGESTS, row);
     return t->embedded && digest.n == DIGEST &&
-           (byte_count(t, row) || memcmp(digest.s, nothing, DIGEST) == 0);
+           (byte_count(t, row) || memcmp(digest.s, digest_of_nothing, DIGEST) == 0);
 }
 
 /* Returns a zero-terminated copy without control characters; NULL when memory is short. */
@@ -184,7 +188,8 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* Returns true if no word between the slashes of the name is "..". */
+/* Returns true if the name is that of a file below the folder: no word between its slashes is empty
+ * or "..", the last word is not ".", and it has no drive letter. */
 static bool stays_below(const char *name)
 {
     size_t n = 0;
@@ -235,12 +240,13 @@ static char *safe_name(span s)
     return NULL;
 }
 
-/* Opens the folder of a file and creates it if needed; does not follow links. -1: see errno. */
+/* Opens the folder of a file, and creates it if needed; does not follow links. top: the folder in
+ * which `name` is. *last: the file's name without folders. Returns -1 after an error (errno). */
 static int open_folder(int top, char *name, char **last)
 {
     int folder = dup(top);
-    char *left = NULL, *word = strtok_r(name, "/", &left), *next;
-    for (; folder >= 0 && (next = strtok_r(NULL, "/", &left)); word = next) {
+    char *position = NULL, *word = strtok_r(name, "/", &position), *next;
+    for (; folder >= 0 && (next = strtok_r(NULL, "/", &position)); word = next) {
         int below = mkdirat(folder, word, 0777) == 0 || errno == EEXIST
                         ? openat(folder, word, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)
                         : -1;
@@ -265,8 +271,8 @@ static bool write_all(int fd, span bytes)
     return true;
 }
 
-/* Opens a file without a name. Returns less than 0 when such files are not supported, or when /proc
- * is missing, which link_file needs. */
+/* Opens a file without a name. Returns a negative number if such files are not supported, or if
+ * /proc, which link_file needs, is missing. */
 static int open_unnamed(int folder)
 {
 #ifdef EBPO_HAVE_O_TMPFILE
@@ -277,7 +283,8 @@ static int open_unnamed(int folder)
     return -1;
 }
 
-/* Renames the complete file, so that the name never refers to an incomplete image. */
+/* Gives a complete file without a name its name, so that the name never refers to an incomplete
+ * image. */
 static bool link_file(int fd, int folder, const char *name)
 {
     char path[64];
@@ -285,7 +292,7 @@ static bool link_file(int fd, int folder, const char *name)
     return linkat(AT_FDCWD, path, folder, name, AT_SYMLINK_FOLLOW) == 0;
 }
 
-/* Leaves existing files unchanged. */
+/* Writes a new file. Fails with EEXIST if the file exists, and leaves it unchanged. */
 static bool write_file(int top, char *name, span bytes)
 {
     char *last;
@@ -311,6 +318,7 @@ static bool write_file(int top, char *name, span bytes)
     return good;
 }
 
+/* Checks the names of all images in the file, before anything is written. */
 static ebpo_status check_names(const textures *t, ebpo_error *error)
 {
     uint64_t kept = 0;
@@ -339,7 +347,8 @@ static bool spans_equal(span a, span b)
     return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0);
 }
 
-/* Returns true if an earlier row is the same image under the same name, spelled differently. */
+/* Returns true if an earlier row has the same image, and its name leads to the same file although
+ * it may be spelled differently. */
 static bool is_repeated(const textures *t, uint64_t row)
 {
     char *name = safe_name(list_of(t, NAMES, row));

@@ -9,23 +9,26 @@
 
 enum { TEXTURE_ARRAYS = 4 };
 
-/* Lists in the file: names, uses, digests, and bytes of images. */
+/* The four arrays about images: names, uses, digests and bytes. Row i of each array is for image i.
+ */
 typedef struct textures {
-    uint64_t count;
+    uint64_t count;                             /* number of images */
     ebpo_attribute_values list[TEXTURE_ARRAYS]; /* without values: absent or not read */
-    uint32_t columns[TEXTURE_ARRAYS];           /* of arrays without ends */
-    bool embedded;                              /* the file has bytes of images */
+    uint32_t columns[TEXTURE_ARRAYS]; /* bytes of each row, for arrays whose rows are equally long
+                                       * (list[i].ends is NULL) */
+    bool embedded;                    /* the file has the bytes of images */
 } textures;
 
-/* `bytes`: reads the images, too. On failure nothing is left to free. */
+/* Reads the arrays. bytes: reads also the bytes of the images. On failure there is nothing to free.
+ */
 EBPO_MUST_USE ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes,
                                         ebpo_error *error);
 void textures_free(textures *t);
-/* Returns true if the file has bytes of images; reads none of them. */
+/* Returns true if the file has the bytes of images. Does not read them. */
 bool textures_embedded(const ebpo_file *file);
 
-/* Returns true if both files name the same images, with the same bytes according to their
- * digests. Also true when one file cannot be read. */
+/* Returns true if both files name the same images with the same digests, or if a file cannot be
+ * read. */
 bool textures_same(const ebpo_file *a, const ebpo_file *b);
 
 void textures_print(FILE *out, const textures *t);

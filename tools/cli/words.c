@@ -131,7 +131,8 @@ bool words_read_unit(const char *text, const char *const *units, const uint64_t 
     return false;
 }
 
-/* Reads digits, also with a fraction, whose digits are from *fraction to *end. */
+/* Reads a decimal number. *whole: the number before the point. The digits after the point are from
+ * *fraction to *end. Returns false for other text. */
 static bool read_amount(const char *text, const char **end, uint64_t *whole, const char **fraction)
 {
     char *stop;
@@ -147,8 +148,8 @@ static bool read_amount(const char *text, const char **end, uint64_t *whole, con
     return *end > *fraction;
 }
 
-/* Returns the decimal fraction times the factor, rounded down. The digits are taken from the last
- * one on, so that each remainder is exact. */
+/* Returns the decimal fraction 0.DIGITS times the factor, rounded down. Evaluates the digits from
+ * the last one to the first one, in integers. */
 static uint64_t fraction_of(const char *digits, const char *end, uint64_t factor)
 {
     uint64_t sum = 0;
@@ -185,7 +186,7 @@ bool words_read_size(const char *text, uint64_t *out)
            !__builtin_add_overflow(bytes, fraction_of(fraction, end, factor), out);
 }
 
-/* Reads "3" or "3-" or "0-5". */
+/* Reads "3", "3-" or "0-5". Returns the end of the text that was read; NULL for other text. */
 static const char *read_run(const char *text, int *first, int *last, bool *to_end)
 {
     char *end;

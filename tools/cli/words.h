@@ -1,4 +1,4 @@
-/* Formats and parses numbers and flags for people. */
+/* Formats and parses numbers, sizes, levels and names of options for people. */
 #ifndef EBPO_TOOLS_WORDS_H
 #define EBPO_TOOLS_WORDS_H
 
@@ -7,7 +7,7 @@
 
 #include <ebpo/build.h>
 
-/* Fetches words from the library; call first in main. */
+/* Fills selection_words from the library; call first in main. */
 void words_init(void);
 
 /* Writes 999, 12.3 k, 4.56 M. */
@@ -29,8 +29,8 @@ char *words_colour(char out[8], uint32_t colour);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);
-/* Reads digits, then nothing or one of the units (NULL-terminated); *out: the number times its
- * factor. */
+/* Reads digits, then nothing or one of the units. Sets *out to the number times the factor of its
+ * unit. units: NULL-terminated; "" for no unit. factors: [unit]. Returns false for other text. */
 bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors,
                      uint64_t *out);
 /* Reads 64M, 1GB, 0.5G, 512k, 1000000 (powers of 1000) and 64MiB, 1Gi (of 1024). */
@@ -40,7 +40,8 @@ bool words_read_size(const char *text, uint64_t *out);
 typedef struct word_levels {
     uint32_t set; /* one bit for each level */
     int first, last;
-    bool to_end; /* the range is open ("3-"): no level below the deepest was named by its number */
+    bool
+        to_end; /* a range is open ("3-"), so the deepest level of a file may be less than `last` */
     bool is_contiguous; /* no level between the first and the last is missing */
 } word_levels;
 
@@ -50,7 +51,7 @@ bool words_read_levels(const char *text, word_levels *out);
 #define WORDS_DATE_EXPECTED \
     "a date as in ISO 8601 and in the calendar, such as 2026-11-26 or 2026-11-26T21:43:05Z"
 
-/* Expected forms, for texts that the two functions refuse. */
+/* Expected forms, for texts that words_read_size and words_read_levels refuse. */
 #define WORDS_SIZE_EXPECTED   "a size such as 512M, 0.5G or 1GiB"
 #define WORDS_LEVELS_EXPECTED "levels such as 3, 0-5, 3- or 0,2,4; the deepest possible is 20"
 bool words_end_with(const char *text, const char *end);

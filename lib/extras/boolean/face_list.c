@@ -174,7 +174,7 @@ static ebpo_status list_base(ebpo_face_list *faces, ebpo_error *error)
         bool listed_all = faces->base_source != NULL;
         for (uint64_t i = 0; i < count && listed_all; i++) {
             faces->base_source[i] = near[i].source;
-            listed_all = list_face(faces, (const double(*)[3])near[i].corner, near[i].number);
+            listed_all = list_face(faces, (const double(*)[3])near[i].corner, near[i].file_face);
         }
         if (!listed_all)
             status = ebpo_fail_memory(&cause, count * sizeof *near);

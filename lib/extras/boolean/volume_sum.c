@@ -103,7 +103,7 @@ static void to_integer(mpz_t out, const ebpo_sum *sum)
     }
 }
 
-/* Computes six sign the volume in units of 2^EBPO_VOLUME_UNIT. */
+/* Computes six times the volume in units of 2^EBPO_VOLUME_UNIT. */
 static void join_sums(mpz_t out, const ebpo_volume_sum *s)
 {
     to_integer(out, &s->by_doubles);

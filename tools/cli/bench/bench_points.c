@@ -17,6 +17,7 @@ enum { DEFAULT_COUNT = 100000 };
 typedef enum generator { UNIFORM, PATH, CAMERA, SEGMENTS, DEGENERATE, NO_GENERATOR } generator;
 static const char *const generators[] = { "uniform", "path", "camera", "segments", "degenerate" };
 
+/* Allocates memory for `count` rows. Returns an exit code. */
 static int reserve_space(bench_points *out, uint64_t count)
 {
     uint64_t bytes;
@@ -49,13 +50,13 @@ static int fill_from_mesh(bench_points *out, ebpo_file *file, const bench_scene 
         return command_failed("bench", &error);
     for (int k = 0; k < 3; k++)
         square += (report->max[k] - report->min[k]) * (report->max[k] - report->min[k]);
-    bool good = true;
+    bool made = true;
     if (out->kind == POINTS_RAYS)
         bench_rays_degenerate(scene, &mesh, seed, out->count, out->rows);
     else
-        good = bench_walk(&mesh, report->mean_edge, sqrt(square), seed, out->count, out->rows);
+        made = bench_walk(&mesh, report->mean_edge, sqrt(square), seed, out->count, out->rows);
     ebpo_mesh_free(&mesh);
-    return good ? EXIT_OK : command_no_memory("bench");
+    return made ? EXIT_OK : command_no_memory("bench");
 }
 
 static int fill_rows(bench_points *out, ebpo_file *file, generator what, uint64_t seed)
@@ -95,6 +96,7 @@ static int generate_rows(bench_points *out, const char *model, const remote_valu
     return code;
 }
 
+/* Reads the rows of the input, but at most `most` rows. Returns an exit code. */
 static int read_all(bench_points *out, points *in, uint64_t most)
 {
     uint64_t capacity = 0, row_count = 1;

@@ -47,6 +47,8 @@ uint64_t bench_clock_cost(void)
 
 static const ebpo_ray_hit no_hit = { .t = INFINITY, .face = EBPO_NO_FACE };
 
+/* any_result and all_result represent the results of other ray queries as a hit: see bench_result.
+ */
 static ebpo_ray_hit any_result(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : no_hit; }
 
 static ebpo_ray_hit all_result(const ebpo_ray_hit *hits, uint64_t count)
@@ -184,6 +186,7 @@ ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *resul
 
 /* --- the system --- */
 
+/* Returns the share of a file's pages that are in memory; -1: not known. */
 static double share_in_memory(int fd, size_t bytes)
 {
     size_t page = (size_t)sysconf(_SC_PAGESIZE), pages = (bytes + page - 1) / page, in_memory = 0;

@@ -32,10 +32,11 @@ typedef struct bench_job {
     int width;          /* number of doubles in a row */
     uint64_t count;
     double rate;         /* single queries per second; 0: no limit */
-    uint64_t *ns;        /* [count] */
-    void *result_values; /* [count] of one member of bench_result */
+    uint64_t *ns;        /* [count] nanoseconds of each query */
+    void *result_values; /* [count] results, each of the member of bench_result for `query` */
 } bench_job;
 
+/* Returns the size of a result in result_values. */
 size_t bench_result_bytes(bench_query query);
 
 typedef struct bench_metrics {
@@ -47,6 +48,7 @@ typedef struct bench_metrics {
 /* Returns the time that reading the clock adds to a measurement: the median of 10,001 readings. */
 uint64_t bench_clock_cost(void);
 
+/* Runs query `number`, and writes its result to job->result_values. */
 EBPO_MUST_USE ebpo_status bench_run_query(const bench_job *job, ebpo_context *context,
                                           uint64_t number, ebpo_error *error);
 /* Runs and times each query separately. Sets all members of *out except `batch`. Sorts job->ns. */
@@ -63,6 +65,7 @@ double bench_drop_file(const char *path);
 /* Returns the peak memory of this process (Linux), since the last bench_reset_peak if the system
  * allows a reset; 0: not known. */
 uint64_t bench_peak_memory(void);
+/* Resets the peak memory, if the system allows this. */
 void bench_reset_peak(void);
 
 #endif

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* HOPS_MAX: maximum number of edges that one step crosses. SWING_STEPS: steps of one swing to both
+ * sides of the surface. */
 enum { HOPS_MAX = 100, SWING_STEPS = 1000 };
 
 typedef struct walker {
@@ -199,15 +201,16 @@ static bool cross_edge(walker *w, int i)
     return normalise_vector(w->d) || place_randomly(w);
 }
 
+/* Moves along the surface by the length `remaining`. Returns false if no face has an area. */
 static bool advance_walker(walker *w, double remaining)
 {
     for (int hop = 0; hop < HOPS_MAX; hop++) {
         int nearest = 0;
         double distance = INFINITY, ignored[3];
         for (int i = 0; i < 3; i++) {
-            double here = edge_distance(w, i, ignored);
-            if (here < distance) {
-                distance = here;
+            double to_edge = edge_distance(w, i, ignored);
+            if (to_edge < distance) {
+                distance = to_edge;
                 nearest = i;
             }
         }
@@ -219,10 +222,11 @@ static bool advance_walker(walker *w, double remaining)
         if (!cross_edge(w, nearest))
             return false;
     }
-    place_on_face(w); /* cycles around a vertex */
+    place_on_face(w); /* the walk circles around a vertex */
     return true;
 }
 
+/* Changes the direction slowly and at random, and updates the smoothed normal. */
 static void turn_walker(walker *w)
 {
     double left[3], off[3];
@@ -253,17 +257,17 @@ bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64
 {
     walker w = { .mesh = mesh, .random = seed };
     double step = mean_edge > 0 ? mean_edge / 10 : diagonal / 1000;
-    bool good = index_vertices(&w);
-    if (good && (good = place_randomly(&w)))
+    bool placed = index_vertices(&w);
+    if (placed && (placed = place_randomly(&w)))
         memcpy(w.side, w.n, sizeof w.side);
-    for (uint64_t i = 0; i < count && good; i++) {
+    for (uint64_t i = 0; i < count && placed; i++) {
         double swing = 0.01 * diagonal * wave_height((double)(i % SWING_STEPS) / SWING_STEPS);
         for (int k = 0; k < 3; k++)
             out[3 * i + (unsigned)k] = w.p[k] + swing * w.side[k];
-        good = advance_walker(&w, step);
+        placed = advance_walker(&w, step);
         turn_walker(&w);
     }
     free(w.face_begin);
     free(w.vertex_faces);
-    return good;
+    return placed;
 }

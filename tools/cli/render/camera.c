@@ -48,14 +48,15 @@ static void centre_model(camera *c, const ebpo_mesh *mesh)
         c->target[k] = low[k] / 2 + high[k] / 2;
 }
 
-/* Computes the distance at which every vertex is visible, and the offset that centres the model in
- * the picture. */
+/* Sets the distance of the eye at which every vertex is visible. *shift_x, *shift_y: offset of the
+ * target, to the right and upwards, that would centre the model in the picture. */
 static void measure_view(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x,
                          double *shift_y)
 {
+    /* tx, ty: tangents of half the usable angles of view */
     double tx = c->tangent * aspect * margin, ty = c->tangent * margin, distance = 0;
     double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
-    for (int pass = 0; pass < 2; pass++) {
+    for (int pass = 0; pass < 2; pass++) { /* first the distance, then the extent in the picture */
         for (uint64_t i = 0; i < mesh->vertex_count; i++) {
             double v[3];
             read_vertex(mesh, i, v);
@@ -86,10 +87,10 @@ void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double eleva
 {
     double aspect = (double)width / height, sx, sy;
     memset(out, 0, sizeof *out);
-    out->tangent = 0.22; /* a long focal length: 25 degrees */
+    out->tangent = 0.22; /* an angle of view of 25 degrees, so that perspective distorts little */
     aim_camera(out, azimuth, elevation, up_axis);
     centre_model(out, mesh);
-    for (int round = 0; round < 3; round++) {
+    for (int round = 0; round < 3; round++) { /* centring changes the distance, and vice versa */
         measure_view(out, mesh, aspect, &sx, &sy);
         for (int k = 0; k < 3; k++)
             out->target[k] += sx * out->right[k] + sy * out->up[k];

@@ -21,8 +21,8 @@ const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
 
-/* Functions of cairo, which is loaded when the first caption is drawn: cairo needs fifteen
- * libraries, which every command would otherwise load at start. */
+/* Functions of cairo. cairo is loaded when the first caption is drawn, because it needs fifteen
+ * libraries, which otherwise every command would load at its start. */
 #define CAIRO_FUNCTIONS(X)      \
     X(image_surface_create)     \
     X(image_surface_get_data)   \
@@ -44,8 +44,9 @@ static struct {
 #undef MEMBER
 } lib;
 
-/* MISSING: cairo is not installed, and captions are omitted. FAILED: cairo is installed but could
- * not be loaded; this is an error, as a picture without captions would not be the requested one. */
+/* UNTRIED: cairo has not been needed yet. MISSING: cairo is not installed, and captions are
+ * omitted. FAILED: cairo is installed but could not be loaded. This is an error, because the
+ * picture would lack its captions. */
 static enum { UNTRIED, LOADED, MISSING, FAILED } loaded;
 
 static void load_cairo(void)
@@ -84,7 +85,7 @@ static cairo_surface_t *text_coverage(int width, int height, const char *text, b
         lib.set_font_size(cairo, size * 0.96 * width / extents.x_advance);
         lib.text_extents(cairo, text, &extents);
     }
-    /* on whole pixels, and all captions on one baseline, independent of their letters */
+    /* begins at a whole pixel; all captions have the same baseline, whatever their letters are */
     lib.move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
     lib.show_text(cairo, text);
     *success = lib.status(cairo) == CAIRO_STATUS_SUCCESS;

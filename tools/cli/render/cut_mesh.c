@@ -6,8 +6,8 @@
 #include <string.h>
 
 typedef struct mesh_builder {
-    ebpo_mesh mesh; /* counted first, then filled */
-    bool filling;
+    ebpo_mesh mesh;
+    bool filling; /* false: add_node only counts vertices and faces; true: it fills the arrays */
 } mesh_builder;
 
 static bool add_node(void *user, const ebpo_view_node *v)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Copies the normal of each polygon to all triangles of the polygon. */
 static void spread_normals(const ebpo_lod_nodes *nodes, const float *of_polygon, float *of_triangle)
 {
     for (uint64_t i = 0; i < nodes->polygon_count; i++, of_polygon += 3)

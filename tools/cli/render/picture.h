@@ -1,4 +1,4 @@
-/* A picture in memory: 8-bit sRGB, rows from the top. */
+/* Makes a picture in memory (8-bit sRGB, rows from the top), draws captions, and encodes PNG. */
 #ifndef EBPO_TOOLS_PICTURE_H
 #define EBPO_TOOLS_PICTURE_H
 

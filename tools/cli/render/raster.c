@@ -1,5 +1,5 @@
-/* Rasterizes in two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is
- * linear on the screen); then pixels are shaded from their samples. */
+/* Rasterizes in two steps. First each sample gets the nearest triangle, by a z-buffer of 1/depth,
+ * which is linear on the screen. Then pixels are shaded from their samples. */
 #include "cli/render/raster.h"
 
 #include <math.h>
@@ -27,13 +27,15 @@ typedef struct raster {
     const camera *view;
     const ebpo_mesh *mesh;
     const raster_style *style;
-    int width, height, side;     /* in samples; side: samples across a pixel */
+    int width, height;           /* size of the picture in samples */
+    int side;                    /* samples across a pixel */
     double focal, inverse_focal; /* samples per unit of x / depth, and its reciprocal */
     sample *samples;
     float (*normal)[3]; /* normal of each triangle, in camera axes, towards the eye */
-    double spiral[OCCLUSION_STEPS][2], turn[256][2]; /* sample positions for occlusion: a spiral in
-                                                      * the unit disk, and its rotations */
-    double linear[256];                              /* sRGB values as linear light */
+    /* positions for ambient occlusion: a spiral in the unit disk, and rotations of the spiral as
+     * (cosine, sine) */
+    double spiral[OCCLUSION_STEPS][2], turn[256][2];
+    double linear[256]; /* [sRGB value] linear light */
 } raster;
 
 static double dot_product(const double a[3], const double b[3])
@@ -83,8 +85,9 @@ static bool unit_normal(double (*c)[3], double out[3])
 
 /* --- first step --- */
 
-/* Returns the sides (bit i: from corner i to the next) that are outlines of the polygon: in the
- * fans of ebpo_lod_level, sides between neighbouring triangles of one plane are not outlines. */
+/* Returns the sides of a triangle that are outlines of its polygon, as bits; bit i: the side from
+ * corner i to the next one. ebpo_lod_level divides a polygon into a fan of consecutive triangles
+ * with the same first corner. A side between two triangles of a fan in one plane is no outline. */
 static unsigned outline_sides(const raster *r, uint64_t face, const double normal[3])
 {
     const uint32_t *f = r->mesh->faces + 3 * face;
@@ -105,8 +108,8 @@ static unsigned outline_sides(const raster *r, uint64_t face, const double norma
     return sides;
 }
 
-/* The sides of a triangle. Side i leads from corner i to the next one; its value is the distance
- * from the side in samples, >= 0 inside. */
+/* The sides of a triangle on the screen. Side i leads from corner i to the next one. a x + b y + c
+ * is the distance of a sample from the side, in samples; it is not negative inside. */
 typedef struct sides {
     double a[3], b[3], c[3];
 } sides;
@@ -129,6 +132,8 @@ static bool make_sides(const projected p[3], sides *out)
 
 static int clamp_index(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
 
+/* Gives a triangle to all its samples that have no nearer triangle. outlines: sides that are
+ * outlines, as bits. */
 static void fill_triangle(raster *r, const projected p[3], uint32_t triangle, unsigned outlines)
 {
     sides s;
@@ -163,7 +168,7 @@ static void fill_triangle(raster *r, const projected p[3], uint32_t triangle, un
         }
 }
 
-/* Returns the normal of the style for a face, in camera axes. */
+/* Replaces n by the normal of the style for a face, in camera axes, if the style has one. */
 static void style_normal(const raster *r, uint64_t face, double n[3])
 {
     const float *given = r->style->normals ? r->style->normals + 3 * face : NULL;
@@ -198,6 +203,7 @@ static void draw_face(raster *r, uint64_t face)
 
 /* --- second step --- */
 
+/* Computes the position of a sample with this 1/depth, in camera axes. */
 static void sample_position(const raster *r, int x, int y, double inverse, double out[3])
 {
     double depth = 1 / inverse, scale = depth * r->inverse_focal;
@@ -365,6 +371,8 @@ static uint8_t to_srgb(double v)
     return (uint8_t)(s <= 0 ? 0 : s >= 1 ? 255 : s * 255 + 0.5);
 }
 
+/* Sets a pixel to the mean of the light of its samples. Samples without a triangle keep the colour
+ * that the pixel has. */
 static void resolve_pixel(const raster *r, int x, int y, double max_distance, uint8_t *rgb)
 {
     static const double ink[3] = { 0.03, 0.04, 0.06 };
@@ -387,7 +395,7 @@ static void resolve_pixel(const raster *r, int x, int y, double max_distance, ui
         rgb[k] = to_srgb(sum[k] / (r->side * r->side));
 }
 
-/* Rows of one thread in the second step: rows number, number + threads, ... */
+/* The rows of one thread in the second step: number, number + threads, and so on. */
 typedef struct thread_rows {
     const raster *r;
     picture *out;

@@ -19,21 +19,23 @@ typedef struct camera {
 void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
                 int width, int height);
 
-/* Values of raster_style.paint. A face with the bit RASTER_HOLLOW is drawn only where its back is
- * visible. */
+/* Values of raster_style.paint: the colour of a face, and the bit RASTER_HOLLOW: the face is drawn
+ * only if its back is visible. RASTER_PLAIN: raster_style.colour. RASTER_OTHER: blue, for a second
+ * model. */
 enum { RASTER_PLAIN = 0, RASTER_OTHER = 1, RASTER_RED = 2, RASTER_HOLLOW = 4 };
 
 typedef struct raster_style {
     double colour[3];     /* linear, 0 .. 1 */
-    bool closed;          /* back faces are never visible: skip them */
+    bool closed;          /* back faces are never visible, so they are not drawn */
     bool edges;           /* draw the outlines of polygons */
-    const uint8_t *paint; /* painting of each face; NULL: RASTER_PLAIN, in `colour` */
-    /* Colours that replace `colour`, each sRGB and a fourth byte: of faces, or of vertices,
-     * interpolated on faces. NULL: none. */
+    const uint8_t *paint; /* [face_count] RASTER_...; NULL: RASTER_PLAIN for all faces */
+    /* [face_count][4] and [vertex_count][4] colours that replace `colour`: sRGB, and a fourth byte
+     * that is ignored. Colours of vertices are interpolated on faces. NULL: none. */
     const uint8_t *face_colours, *vertex_colours;
-    /* [face_count][3] unit normals for lighting, or 0: geometric normal; NULL: all geometric */
+    /* [face_count][3] unit normals for lighting; 0, 0, 0: the geometric normal is used. NULL: the
+     * geometric normals of all faces are used. */
     const float *normals;
-    /* [vertex_count][3] unit normals, interpolated on faces; NULL: none */
+    /* [vertex_count][3] unit normals for lighting, interpolated on faces; NULL: none */
     const float *vertex_normals;
 } raster_style;
 
