@@ -7,12 +7,13 @@
 enum { PAIRS_SHOWN = 10 };
 
 typedef struct crossing_list {
-    json *j; /* NULL: words */
-    progress_line *line;
-    ebpo_self_intersection first[PAIRS_SHOWN];
-    int count;
+    json *j;                                   /* where to print pairs at once; NULL: keep them */
+    progress_line *line;                       /* wiped before printing */
+    ebpo_self_intersection first[PAIRS_SHOWN]; /* if `j` is NULL: the first pairs */
+    int count;                                 /* number of pairs in `first` */
 } crossing_list;
 
+/* Words for an ebpo_pair_kind. */
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
 static const char *const verbs[] = { "", "touch", "cross", "overlap" };
 
@@ -71,8 +72,8 @@ static void print_words(const crossing_list *p, const ebpo_self_intersections_su
         printf("    ... (--json prints all)\n");
 }
 
-/* Ends the list of pairs; the outermost object stays open. After a failure the object contains the
- * pairs found so far, and no count. */
+/* Ends the list of pairs and the object "crossings"; the outermost object stays open. found: false
+ * after a failure; "count" is then null. */
 static void end_json(json *j, const ebpo_self_intersections_summary *s, bool found)
 {
     json_end(j);

@@ -9,9 +9,7 @@
 
 /* --- names as HTML text --- */
 
-/* Buttons filter the rows of the table by the groups of their instances, without scripts. */
-
-/* Writes text between tags. */
+/* Writes text between tags; escapes < and &. */
 static void html_put_text(FILE *f, const char *text)
 {
     for (; *text; text++) {
@@ -118,6 +116,8 @@ ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_clash *fou
     return EBPO_OK;
 }
 
+/* --- list of clashes --- */
+
 void clash_sort(clash_list *list)
 {
     if (list->count)
@@ -132,7 +132,13 @@ void clash_free(clash_list *list)
     *list = (clash_list){ 0 };
 }
 
-/* Returns the nth group of the two instances; EBPO_SCENE_NONE after the last group. */
+/* --- buttons ---
+ *
+ * A click on a button shows only rows with an instance of its group. Buttons are radio inputs that
+ * hide rows by style rules, so that the page needs no scripts. */
+
+/* Returns the nth group of the two instances: first the groups of `a`, then those of `b`. Returns
+ * EBPO_SCENE_NONE after the last group. */
 static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
 {
     uint64_t of_a = 0;
@@ -142,6 +148,7 @@ static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
                       : ebpo_scene_group_of(scene, c->worst.b, nth - of_a);
 }
 
+/* Returns false if the nth group is also an earlier group of the two instances. */
 static bool is_first_group(const clash *c, const ebpo_scene *scene, uint64_t nth)
 {
     uint64_t group = group_of(c, scene, nth);
@@ -151,6 +158,7 @@ static bool is_first_group(const clash *c, const ebpo_scene *scene, uint64_t nth
     return true;
 }
 
+/* Adds the number of clashes of each group to `sums`. */
 static void count_clashes(const clash_list *list, const ebpo_scene *scene, uint64_t *sums)
 {
     for (uint64_t i = 0; i < list->count; i++)
@@ -201,7 +209,7 @@ static bool put_filter(FILE *f, const clash_list *list, const ebpo_scene *scene)
     return true;
 }
 
-/* Writes the classes of a row, which follow its name in <tr>. */
+/* Writes the class attribute of a row, inside <tr>: "gN" for each group N of its instances. */
 static void put_classes(FILE *f, const clash *c, const ebpo_scene *scene)
 {
     bool any = false;
@@ -350,7 +358,7 @@ static bool put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, c
     put_head(f, list, title, from, to, frames);
     put_kinds(f, list);
     fputs("<h2>The worst first</h2>\n", f);
-    bool fine = put_filter(f, list, scene);
+    bool complete = put_filter(f, list, scene);
     fprintf(f,
             "<table class=c><tr class=h><th>#<th>Picture<th>Parts<th>Kind<th>How much"
             "<th>Where%s\n",
@@ -358,7 +366,7 @@ static bool put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, c
     for (uint64_t i = 0; i < list->count; i++)
         put_row(f, scene, &list->clash[i], i + 1, frames);
     fputs("</table>\n</html>\n", f);
-    return fine;
+    return complete;
 }
 
 ebpo_status clash_page(const clash_list *list, const ebpo_scene *scene, const char *title,
@@ -367,9 +375,9 @@ ebpo_status clash_page(const clash_list *list, const ebpo_scene *scene, const ch
     char *text = NULL;
     size_t size = 0;
     FILE *f = open_memstream(&text, &size);
-    bool fine = f && put_page(f, list, scene, title, from, to, frames);
+    bool complete = f && put_page(f, list, scene, title, from, to, frames);
     ebpo_status status = EBPO_OK;
-    if ((f && fclose(f) != 0) || !fine) {
+    if ((f && fclose(f) != 0) || !complete) {
         snprintf(error->message, sizeof error->message, "%s: no memory for the page", path);
         status = error->status = EBPO_E_MEMORY;
     }

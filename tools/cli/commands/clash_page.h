@@ -4,8 +4,7 @@
 
 #include "cli/commands/clash_list.h"
 
-/* Sorts the list, and writes its page; replaces the file `path` atomically. The first clashes have
- * pictures.
+/* Writes the page of a list in the order of clash_sort; replaces the file `path` atomically.
  *
  *   title   name of the scene's file
  *   frames  number of evaluated times, from `from` to `to` */

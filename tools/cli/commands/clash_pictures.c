@@ -13,8 +13,14 @@
 #include "cli/render/picture.h"
 #include "cli/render/raster.h"
 
-enum { WIDTH = 480, HEIGHT = 360, CAPTION = 28, UP = 2, THREADS_MAX = 64 };
-static const double azimuth = 35, elevation = 28;
+enum {
+    WIDTH = 480, /* sizes in pixels */
+    HEIGHT = 360,
+    CAPTION = 28, /* height of a caption */
+    UP = 2,       /* the z axis points up */
+    THREADS_MAX = 64
+};
+static const double azimuth = 35, elevation = 28; /* of the camera, in degrees */
 
 const char *clash_pictures_missing(void) { return NULL; }
 
@@ -60,14 +66,14 @@ static double longest_side(const double min[3], const double max[3])
     return fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
 }
 
-/* Chooses the region to draw: the smaller instance and the contact. If the contact is small
- * compared with this instance, the region is the contact and its surroundings. */
+/* Chooses the region to draw, a cube: the smaller instance and the contact. If the contact is small
+ * compared with the smaller instance, the region is the contact and its surroundings. */
 static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double middle[3],
                                double *half_side, ebpo_error *error)
 {
     const ebpo_scene_clash *clash_facts = &c->worst;
     double min[2][3], max[2][3];
-    bool placed = isfinite(clash_facts->location[0]);
+    bool has_location = isfinite(clash_facts->location[0]);
     for (int i = 0; i < 2; i++) {
         ebpo_status status = ebpo_scene_instance_box(scene, i ? clash_facts->b : clash_facts->a,
                                                      c->time, c->time, min[i], max[i], error);
@@ -77,10 +83,10 @@ static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double m
     int small = longest_side(min[1], max[1]) < longest_side(min[0], max[0]);
     double size = longest_side(min[small], max[small]),
            contact = longest_side(clash_facts->location_min, clash_facts->location_max);
-    bool zoom = placed && clash_facts->crossing && contact > 0 && 8 * contact < size;
+    bool zoom = has_location && clash_facts->crossing && contact > 0 && 8 * contact < size;
     const double *low = zoom ? clash_facts->location_min : min[small],
                  *high = zoom ? clash_facts->location_max : max[small];
-    if (placed) {
+    if (has_location) {
         widen_box(min[small], max[small], clash_facts->location_min);
         widen_box(min[small], max[small], clash_facts->location_max);
     }
@@ -140,8 +146,8 @@ ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error
     if (status == EBPO_OK)
         status = paint_pair(scene, c, threads, &p, error);
     if (status == EBPO_OK) {
-        painted_crop(&p, middle,
-                     1.5 * half_side); /* removes faces between the eye and the region */
+        /* without faces between the eye and the region */
+        painted_crop(&p, middle, 1.5 * half_side);
         for (int k = 0; k < 3; k++) {
             min[k] = middle[k] - half_side;
             max[k] = middle[k] + half_side;
@@ -158,23 +164,24 @@ ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error
 struct clash_strip {
     ebpo_scene *scene;
     unsigned threads;
-    int tiles, done, columns;
-    uint64_t instances;
-    bool boxes; /* draw boxes instead of faces, except for intersecting instances: the scene has too
-                 * many faces */
-    double min[3], max[3];
+    int tiles, done, columns; /* number of tiles in all, drawn so far, and in a row */
+    uint64_t instances;       /* number of instances in the scene */
+    /* the scene has too many faces: draw instances without intersecting faces as boxes */
+    bool boxes;
+    double min[3], max[3]; /* box of the scene at all times */
     picture picture;
 };
 
-enum { FACES_MAX = 2000000 };
+enum { FACES_MAX = 2000000 }; /* scenes with more faces are drawn with boxes */
 
+/* Returns the number of faces of all instances. */
 static uint64_t faces_of(const ebpo_scene *scene, uint64_t models)
 {
     uint64_t sum = 0;
     for (uint64_t i = 0; i < models; i++) {
-        ebpo_scene_model_facts clash_facts = EBPO_SCENE_MODEL_FACTS_INIT;
-        (void)ebpo_scene_get_model_facts(scene, i, &clash_facts);
-        sum += clash_facts.instances * ebpo_file_info(ebpo_scene_file(scene, i))->face_count;
+        ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
+        (void)ebpo_scene_get_model_facts(scene, i, &model);
+        sum += model.instances * ebpo_file_info(ebpo_scene_file(scene, i))->face_count;
     }
     return sum;
 }
@@ -245,6 +252,7 @@ static ebpo_status paint_instances(const clash_strip *s, double time, uint8_t *c
     return status;
 }
 
+/* Draws the next tile. count: number of clashes at `time`, for the caption. */
 static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time, uint64_t count,
                              ebpo_error *error)
 {

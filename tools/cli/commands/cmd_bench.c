@@ -18,7 +18,7 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    query_values q; /* the first member: the options of other query commands set it */
+    query_values q; /* must be the first member, because shared options of queries set it */
     int query;
     const char *points, *mode, *save_points, *save_results;
     int64_t count, seed, repeat;
@@ -29,22 +29,29 @@ static const char *const query_words[] = {
     "inside", "distance", "ray", "ray-any", "ray-all", NULL
 };
 enum { REPEAT_MAX = 99 };
-/* Kinds of results of a distance or ray query. RESULT_INTERVAL: an interval, as the maximum level
- * or the deadline did not allow the exact distance. */
+/* Kinds of results of a distance or ray query. RESULT_NONE: there is no face within the maximum
+ * distance, or no hit. RESULT_INTERVAL: the maximum level or the deadline allowed only an interval.
+ */
 enum { RESULT_NONE, RESULT_FOUND, RESULT_INTERVAL };
 
 #include "cli/options/bench.inc"
 
 /* All measurements. */
 typedef struct results {
-    uint64_t clock_ns;
-    double cold_pages, cold_open_seconds, cold_seconds, open_seconds;
-    uint64_t cold_bytes, cold_reads, peak;
+    uint64_t clock_ns;        /* time of reading the clock, in nanoseconds */
+    double cold_pages;        /* share of the file that remained in the page cache; below 0: not
+                               * known */
+    double cold_open_seconds; /* cold start: time to open the model */
+    double cold_seconds;      /* cold start: time to the first result */
+    double open_seconds;      /* time to open the model again */
+    uint64_t cold_bytes;      /* cold start: number of bytes read */
+    uint64_t cold_reads;      /* cold start: number of reads */
+    uint64_t peak;            /* maximum memory of the process in bytes; 0: not known */
     bench_metrics metrics;
     ebpo_model_stats model, model_end; /* after the first pass, and at the end */
     traffic traffic;                   /* traffic of the warm session */
-    uint64_t
-        counts[4]; /* inside: by ebpo_where; other queries: by RESULT_NONE to RESULT_INTERVAL */
+    /* numbers of results; of `inside` by ebpo_where, otherwise by RESULT_NONE to RESULT_INTERVAL */
+    uint64_t counts[4];
 } results;
 
 /* The words of --mode depend on the query. */
@@ -90,6 +97,7 @@ static int cold_start(const bench_job *job, const char *path,
     return code;
 }
 
+/* Returns the metrics with the median of the means. */
 static bench_metrics median_by_mean(const bench_metrics *f, int count)
 {
     for (int i = 0; i < count; i++) {
@@ -102,6 +110,7 @@ static bench_metrics median_by_mean(const bench_metrics *f, int count)
     return f[0];
 }
 
+/* Returns the median of the batch times. */
 static double median_batch(const bench_metrics *f, int count)
 {
     bench_metrics by_batch[REPEAT_MAX];
@@ -142,7 +151,7 @@ static bool options_fit(const values *v)
            query_inside_fits("bench", &v->q);
 }
 
-/* Compares the bits of numbers, as NAN stands for a result that was not found. */
+/* Compares the bits of numbers, because NAN, which is a valid result, does not equal itself. */
 static bool same_reals(const double *a, const double *b, int count)
 {
     return memcmp(a, b, (size_t)count * sizeof *a) == 0;

@@ -21,8 +21,9 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    query_values query; /* the first member: the options of other query commands set it */
-    const char *inside, *distance, *out, *temp_dir, *box;
+    query_values query; /* must be the first member, because shared options of queries set it */
+    const char *inside, *distance; /* names of files of points; NULL: not given */
+    const char *out, *temp_dir, *box;
     arg_list poses, sections;
     int64_t level;
     double tolerance;
@@ -79,9 +80,10 @@ typedef struct cell_result {
     uint64_t faces_written; /* number of written faces of cells */
 } cell_result;
 
-/* Returns true if the exact result is requested. */
+/* Returns true if the exact result, not cells that approximate it, is written to --output. */
 static bool writes_result(const values *v) { return v->out && !v->cells; }
 
+/* Returns true if the exact volume of the result was computed. */
 static bool is_exact(const cell_result *a) { return a->exact.volume.kind == EBPO_VALUE_EXACT; }
 
 static int32_t volume_kind(const cell_result *a)
@@ -91,7 +93,8 @@ static int32_t volume_kind(const cell_result *a)
 
 enum { OPERAND_NAME = 512 };
 
-/* Writes the letter and the file of an operand, or which region it is. */
+/* Writes the letter and the file name of an operand. Operands after the models are regions: the box
+ * and half-spaces. */
 static const char *name_operand(const cell_result *a, uint32_t i, char out[OPERAND_NAME])
 {
     if (i < a->operands->count)
@@ -249,14 +252,14 @@ static void print_cells(const cell_result *a)
 static ebpo_status compute_points(const values *v, ebpo_boolean *b, const double *rows,
                                   uint64_t count, ebpo_boolean_result *results, ebpo_error *error)
 {
-    ebpo_boundary_options how = EBPO_BOUNDARY_OPTIONS_INIT;
-    how.tolerance = v->tolerance;
+    ebpo_boundary_options boundary_options = EBPO_BOUNDARY_OPTIONS_INIT;
+    boundary_options.tolerance = v->tolerance;
     ebpo_status status =
         v->inside ? ebpo_boolean_inside_many(b, rows, count, results, error) : EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_boundary_distance d;
         if (v->distance)
-            status = ebpo_boolean_distance(b, rows + 3 * i, &how, &d, error);
+            status = ebpo_boolean_distance(b, rows + 3 * i, &boundary_options, &d, error);
         if (status == EBPO_OK && v->distance)
             print_distance(v, &d);
         else if (status == EBPO_OK)
@@ -314,24 +317,26 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
     return status;
 }
 
+/* Writes the exact result, or computes the volume and the cells. If the exact volume is known, it
+ * is no error that no cells can be made. */
 static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress progress,
                                  ebpo_error *error)
 {
     ebpo_boolean_cells *cells = NULL;
-    ebpo_volume_options measuring = EBPO_VOLUME_OPTIONS_INIT;
-    ebpo_cells_options how = EBPO_CELLS_OPTIONS_INIT;
-    how.level = (int)a->v->level;
-    how.progress = measuring.progress = progress;
+    ebpo_volume_options volume_options = EBPO_VOLUME_OPTIONS_INIT;
+    ebpo_cells_options cells_options = EBPO_CELLS_OPTIONS_INIT;
+    cells_options.level = (int)a->v->level;
+    cells_options.progress = volume_options.progress = progress;
     ebpo_status status = EBPO_OK;
     if (writes_result(a->v))
         status = boolean_write_result(&a->output, b, progress, error);
     if (status != EBPO_OK || writes_result(a->v))
         return status;
     if (a->volume)
-        status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
+        status = ebpo_boolean_exact_volume(b, &volume_options, &a->exact, error);
     bool exact = status == EBPO_OK && is_exact(a);
     if (status == EBPO_OK)
-        status = ebpo_boolean_cells_new(b, &how, &cells, error);
+        status = ebpo_boolean_cells_new(b, &cells_options, &cells, error);
     if (status == EBPO_E_LIMIT && exact && !a->v->cells) {
         a->no_cells = true;
         snprintf(a->why_no_cells, sizeof a->why_no_cells, "%s", error->message);
@@ -392,14 +397,14 @@ static int check_values(const values *v, const boolean_operands *operands)
         return command_usage("boolean", "--cells needs --output");
     if (v->inner && !v->cells)
         return command_usage("boolean", "--inner needs --output and --cells");
-    const char *of_result = v->doubles        ? "double"
-                            : v->crossings    ? "crossings"
-                            : v->changed_only ? "changed-only"
-                            : v->colours      ? "operand-colours"
-                            : v->temp_dir     ? "temp-dir"
-                                              : NULL;
-    if (of_result && !writes_result(v))
-        return command_usage("boolean", "--%s needs --output, and excludes --cells", of_result);
+    const char *result_option = v->doubles        ? "double"
+                                : v->crossings    ? "crossings"
+                                : v->changed_only ? "changed-only"
+                                : v->colours      ? "operand-colours"
+                                : v->temp_dir     ? "temp-dir"
+                                                  : NULL;
+    if (result_option && !writes_result(v))
+        return command_usage("boolean", "--%s needs --output, and excludes --cells", result_option);
     if (v->changed_only && (v->volume || v->crossings || !words_end_with(v->out, ".ply")))
         return command_usage("boolean", "--changed-only writes a .ply file, and excludes --volume "
                                         "and --crossings");
@@ -435,14 +440,14 @@ static int read_regions(const values *v, double box[6], double (*plane)[4],
 }
 
 static int evaluate_expression(const values *v, const boolean_nodes *nodes,
-                               const boolean_operands *operands, ebpo_boolean_options *how,
-                               ebpo_workspace *workspace)
+                               const boolean_operands *operands,
+                               ebpo_boolean_options *boolean_options, ebpo_workspace *workspace)
 {
     ebpo_boolean *b;
     ebpo_error error = EBPO_ERROR_INIT;
-    how->threads = (unsigned)v->query.threads;
-    if (ebpo_boolean_new(operands->operand, operands->count, nodes->node, nodes->count, how, &b,
-                         &error) != EBPO_OK)
+    boolean_options->threads = (unsigned)v->query.threads;
+    if (ebpo_boolean_new(operands->operand, operands->count, nodes->node, nodes->count,
+                         boolean_options, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
     int code =
         v->inside || v->distance ? query_points(v, b) : make_cells(v, operands, workspace, b);
@@ -450,8 +455,8 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
     return code;
 }
 
-/* If the exact result is written under a limit of memory, makes its workspace, and sets the limit
- * of each model: a quarter of the memory is for the models. */
+/* If the exact result is written with --memory, makes the workspace, and sets the limit of each
+ * model: all models together may use a quarter of the memory. */
 static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
                         ebpo_workspace **out)
 {
@@ -468,12 +473,13 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
 
 static const values standard = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
 
-/* Default memory for each model if only changes are wanted, which need only a part of A. */
+/* Default memory in bytes for each model with --changed-only, which reads only a part of operand A.
+ */
 static const uint64_t changes_memory = UINT64_C(256) << 20;
 
 /* Opens the models, and evaluates the expression. */
 static int run_expression(const values *v, const char *expression, boolean_operands *operands,
-                          ebpo_boolean_options *how)
+                          ebpo_boolean_options *boolean_options)
 {
     boolean_nodes nodes;
     ebpo_model_options model_options;
@@ -497,7 +503,7 @@ static int run_expression(const values *v, const char *expression, boolean_opera
     if (code == EXIT_OK)
         code = boolean_operands_open(operands, "boolean", &model_options, &v->query.remote);
     if (code == EXIT_OK)
-        code = evaluate_expression(v, &nodes, operands, how, workspace);
+        code = evaluate_expression(v, &nodes, operands, boolean_options, workspace);
     ebpo_workspace_free(workspace);
     return code;
 }
@@ -507,12 +513,12 @@ static int run_boolean(void *given, const char **operand)
     const values *v = given;
     boolean_operands operands;
     double box[6], plane[ARG_LIST_MAX][4];
-    ebpo_boolean_options how = EBPO_BOOLEAN_OPTIONS_INIT;
+    ebpo_boolean_options boolean_options = EBPO_BOOLEAN_OPTIONS_INIT;
     int code = boolean_operands_list(&operands, "boolean", operand + 1);
     if (code == EXIT_OK)
-        code = read_regions(v, box, plane, &how);
+        code = read_regions(v, box, plane, &boolean_options);
     if (code == EXIT_OK)
-        code = run_expression(v, operand[0], &operands, &how);
+        code = run_expression(v, operand[0], &operands, &boolean_options);
     boolean_operands_close(&operands);
     return code;
 }

@@ -28,13 +28,13 @@ typedef struct values {
 
 static const values standard = { .out = NULL };
 
-/* Contents of a header, or why it could not be read. */
+/* A file below the folder. */
 typedef struct entry {
-    bool known;
-    char *reason;
-    char *path;       /* as in the catalogue */
-    char *shown_path; /* relative to the folder, for messages */
-    ebpo_catalogue_entry reported;
+    bool listed;                   /* the catalogue lists the file */
+    char *reason;                  /* if not: why */
+    char *path;                    /* as in the catalogue */
+    char *shown_path;              /* relative to the folder, for messages */
+    ebpo_catalogue_entry reported; /* if `listed`: facts from the file's header */
 } entry;
 
 typedef struct catalogue {
@@ -45,10 +45,11 @@ typedef struct catalogue {
     folder_files files;
     entry *entry; /* [files.count] */
     progress_line *progress;
-    pthread_mutex_t lock; /* protects `progress`, `taken` and `done` */
-    size_t taken, done;
+    pthread_mutex_t lock; /* protects `progress`, `next` and `done` */
+    size_t next;          /* the next file to read */
+    size_t done;          /* number of read headers */
     atomic_bool no_memory;
-    /* totals of all models */
+    /* totals of all listed models */
     uint64_t models, solids, faces, bytes;
     double min[3], max[3];
 } catalogue;
@@ -75,7 +76,7 @@ static bool is_utf8(const char *text)
 
 static void omit_entry(catalogue *c, entry *e, const char *reason)
 {
-    e->known = false;
+    e->listed = false;
     e->reason = strdup(reason);
     if (!e->reason)
         c->no_memory = true;
@@ -85,11 +86,11 @@ static void read_entry(catalogue *c, size_t number)
 {
     entry *e = &c->entry[number];
     const char *path = c->files.path[number];
-    remote_values how = REMOTE_VALUES_INIT;
+    remote_values remote = REMOTE_VALUES_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     char *name = NULL;
-    how.max_expansion = c->v->max_expansion;
+    remote.max_expansion = c->v->max_expansion;
     if (asprintf(&name, "%s/%s", c->folder, path) < 0)
         name = NULL;
     if (asprintf(&e->path, "%s%s", c->path_prefix, path) < 0)
@@ -99,9 +100,9 @@ static void read_entry(catalogue *c, size_t number)
         c->no_memory = true;
     } else if (!is_utf8(e->path)) {
         omit_entry(c, e, "its name is not UTF-8; rename the file");
-    } else if (remote_open(&file, name, &how, &error) == EBPO_OK) {
+    } else if (remote_open(&file, name, &remote, &error) == EBPO_OK) {
         ebpo_catalogue_entry_of(file, e->path, &e->reported);
-        e->known = true;
+        e->listed = true;
         if (!has_box(&e->reported))
             omit_entry(c, e, "has no box, as it has no faces");
     } else {
@@ -115,8 +116,8 @@ static void *read_entries(void *user)
 {
     catalogue *c = user;
     pthread_mutex_lock(&c->lock);
-    while (c->taken < c->files.count) {
-        size_t number = c->taken++;
+    while (c->next < c->files.count) {
+        size_t number = c->next++;
         pthread_mutex_unlock(&c->lock);
         read_entry(c, number);
         pthread_mutex_lock(&c->lock);
@@ -128,20 +129,21 @@ static void *read_entries(void *user)
 
 static size_t threads_for(const catalogue *c)
 {
-    size_t wanted = c->v->threads ? (size_t)c->v->threads : command_cores();
-    wanted = wanted < THREADS_MAX ? wanted : THREADS_MAX;
-    return wanted < c->files.count ? wanted : c->files.count;
+    size_t count = c->v->threads ? (size_t)c->v->threads : command_cores();
+    count = count < THREADS_MAX ? count : THREADS_MAX;
+    return count < c->files.count ? count : c->files.count;
 }
 
+/* Reads all headers in several threads. Returns false if there is not enough memory. */
 static bool read_all(catalogue *c)
 {
     pthread_t thread[THREADS_MAX];
-    size_t wanted = threads_for(c), started = 0;
+    size_t count = threads_for(c), started = 0;
     c->entry = calloc(c->files.count, sizeof *c->entry);
     if (!c->entry)
         return false;
     pthread_mutex_init(&c->lock, NULL);
-    while (started + 1 < wanted && command_thread(&thread[started], read_entries, c) == 0)
+    while (started + 1 < count && command_thread(&thread[started], read_entries, c) == 0)
         started++;
     read_entries(c);
     while (started > 0)
@@ -159,7 +161,7 @@ static void sum_models(catalogue *c)
     }
     for (size_t i = 0; i < c->files.count; i++) {
         const ebpo_catalogue_entry *e = &c->entry[i].reported;
-        if (!c->entry[i].known)
+        if (!c->entry[i].listed)
             continue;
         c->models++;
         c->solids += e->solid;
@@ -184,28 +186,28 @@ static char *real_folder(const char *path)
     return real;
 }
 
-/* Returns the relative path from folder `a` to files in `b`: "", "x/" or "../x/"; or NULL. Both
- * must be resolved. */
+/* Returns the relative path from folder `a` to files in folder `b`, such as "", "x/" or "../x/";
+ * NULL: there is not enough memory. Both folders must be absolute paths without links. */
 static char *relative_path(const char *a, const char *b)
 {
-    size_t same = 0, at = 0;
-    for (;; at++) { /* common folders */
+    size_t common = 0, at = 0; /* length of the common parent folder */
+    for (;; at++) {
         bool ends_a = !a[at] || a[at] == '/', ends_b = !b[at] || b[at] == '/';
         if (ends_a && ends_b)
-            same = at;
+            common = at;
         if (a[at] != b[at] || !a[at])
             break;
     }
     size_t ups = 0;
-    for (const char *s = a + same; *s; s++)
+    for (const char *s = a + common; *s; s++)
         ups += *s == '/' && s[1];
-    const char *rest = b + same + (b[same] == '/');
-    char *path = malloc(3 * ups + strlen(rest) + 2), *end = path;
+    const char *below = b + common + (b[common] == '/'); /* path of `b` in the common folder */
+    char *path = malloc(3 * ups + strlen(below) + 2), *end = path;
     for (size_t i = 0; path && i < ups; i++)
         end = stpcpy(end, "../");
     if (path) {
-        end = stpcpy(end, rest);
-        strcpy(end, *rest ? "/" : "");
+        end = stpcpy(end, below);
+        strcpy(end, *below ? "/" : "");
     }
     return path;
 }
@@ -226,11 +228,11 @@ static int find_relative_path(catalogue *c)
 
 /* --- the file --- */
 
-/* Paths of entries are relative to the folder of the file. */
+/* Writes the catalogue. Paths of entries are relative to its folder. Returns the exit code. */
 static int write_all(const catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue_options catalogue_options = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue *made = NULL;
     const char *slash = strrchr(c->out, '/');
     char *folder = slash ? strndup(c->out, (size_t)(slash - c->out) + 1) : strdup("");
@@ -242,10 +244,10 @@ static int write_all(const catalogue *c)
         return command_no_memory("catalogue");
     }
     for (size_t i = 0; i < c->files.count; i++)
-        if (c->entry[i].known)
+        if (c->entry[i].listed)
             entries[count++] = c->entry[i].reported;
-    how.folder = folder;
-    ebpo_status status = ebpo_catalogue_new(entries, count, &how, &made, &error);
+    catalogue_options.folder = folder;
+    ebpo_status status = ebpo_catalogue_new(entries, count, &catalogue_options, &made, &error);
     if (status == EBPO_OK)
         status = ebpo_catalogue_save(made, c->out, &error);
     ebpo_catalogue_free(made);
@@ -265,7 +267,7 @@ static void report_omitted(const catalogue *c)
 {
     for (size_t i = 0; i < c->files.count; i++) {
         const entry *e = &c->entry[i];
-        if (e->known)
+        if (e->listed)
             continue;
         bool named = strstr(e->reason, e->shown_path) != NULL;
         fprintf(stderr, "ebpo catalogue: omitted: %s%s%s\n", named ? "" : e->shown_path,
@@ -288,7 +290,7 @@ static void print_json(const catalogue *c)
     json_uint(&j, "folders_unread", c->files.unread);
     json_array(&j, "omitted");
     for (size_t i = 0; i < c->files.count; i++)
-        if (!c->entry[i].known) {
+        if (!c->entry[i].listed) {
             json_object(&j, NULL);
             json_text(&j, "path", c->files.path[i]);
             json_text(&j, "why", c->entry[i].reason);
@@ -313,8 +315,8 @@ static void print_words(const catalogue *c)
 
 /* --- command --- */
 
-/* Returns true if the catalogue would overwrite a file that it lists, or after an error: then
- * reports it on stderr and sets `code`. */
+/* Returns true if the catalogue would overwrite a file below the folder, or if there is not enough
+ * memory; reports this on standard error and sets *code. */
 static bool overwrites_model(const catalogue *c, int *code)
 {
     for (size_t i = 0; i < c->files.count; i++) {
@@ -323,9 +325,9 @@ static bool overwrites_model(const catalogue *c, int *code)
             *code = command_no_memory("catalogue");
             return true;
         }
-        bool same = command_overwrites("catalogue", path, c->out);
+        bool overwrites = command_overwrites("catalogue", path, c->out);
         free(path);
-        if (same) {
+        if (overwrites) {
             *code = EXIT_USAGE;
             return true;
         }

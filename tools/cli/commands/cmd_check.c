@@ -1,4 +1,5 @@
-/* ebpo check: reports the properties of a mesh before building, and the positions of findings. */
+/* ebpo check: reports the properties of a mesh before building. With --findings it also reports the
+ * positions of findings (defects, see ebpo/findings.h). */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,10 +25,10 @@
 /* --- positions of findings --- */
 
 typedef struct finding_printer {
-    json *j; /* NULL: words, if `words` */
-    bool words;
-    progress_line *line;
-    uint64_t count[EBPO_FINDING_KINDS];
+    json *j;                            /* where to print findings; NULL: not as JSON */
+    bool words;                         /* if `j` is NULL: print findings in words */
+    progress_line *line;                /* wiped before printing */
+    uint64_t count[EBPO_FINDING_KINDS]; /* number of findings of each kind so far */
 } finding_printer;
 
 /* Returns true if `to` is "all" or the name of a PLY file. */
@@ -60,7 +61,7 @@ static void finding_json(json *j, const ebpo_mesh_finding *p)
     json_end(j);
 }
 
-enum { FACES_SHOWN = 8 };
+enum { FACES_SHOWN = 8 }; /* faces of a finding that are printed in words */
 
 static void finding_words(const ebpo_mesh_finding *p)
 {
@@ -110,26 +111,27 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
     }
 }
 
-/* Prints all positions or, if `to` names a PLY file, writes the coloured file and prints its
- * legend. j: prints JSON into the open object instead; NULL: prints words, unless `quiet`. */
+/* Finds the positions of findings. If `to` names a PLY file, writes the mesh with coloured findings
+ * there. If `j` is not NULL, prints all positions into its open object. If `j` is NULL, prints the
+ * legend of the PLY file or, without a file, all positions in words; if `quiet`, prints nothing. */
 static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigned threads,
                                   ebpo_progress progress, json *j, bool quiet, progress_line *line,
                                   ebpo_error *error)
 {
-    ebpo_findings_options how = EBPO_FINDINGS_OPTIONS_INIT;
+    ebpo_findings_options search = EBPO_FINDINGS_OPTIONS_INIT;
     finding_printer t = { .j = j, .line = line };
-    how.threads = threads;
-    how.progress = progress;
-    how.ply = findings_ply_path(to);
-    t.words = !quiet && !how.ply;
+    search.threads = threads;
+    search.progress = progress;
+    search.ply = findings_ply_path(to);
+    t.words = !quiet && !search.ply;
     if (j)
         json_array(j, "locations");
-    ebpo_status status = ebpo_mesh_findings(mesh, &how, take_finding, &t, NULL, error);
+    ebpo_status status = ebpo_mesh_findings(mesh, &search, take_finding, &t, NULL, error);
     progress_wipe(line);
     if (j)
         json_end(j);
-    else if (status == EBPO_OK && how.ply && !quiet)
-        print_legend(how.ply, t.count);
+    else if (status == EBPO_OK && search.ply && !quiet)
+        print_legend(search.ply, t.count);
     return status;
 }
 
@@ -138,7 +140,8 @@ static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigne
 typedef struct values {
     repair_request repairs_wanted;
     bool require_solid, crossings, json, quiet;
-    const char *out, *findings;
+    const char *out;      /* PLY file of --crossings; NULL: none */
+    const char *findings; /* "all", or the name of a PLY file; NULL: not requested */
     int64_t threads;
     memory_values memory;
 } values;
@@ -182,12 +185,12 @@ static void print_words(const values *v, const mesh_input *p, const char *path)
 static ebpo_status search_crossings(const values *v, mesh_input *p, ebpo_progress progress, json *j,
                                     progress_line *line, ebpo_error *error)
 {
-    ebpo_self_intersections_options how = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
-    how.threads = (unsigned)v->threads;
-    how.progress = progress;
-    how.ply = v->out;
-    return check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? j : NULL, v->quiet, line,
-                           error);
+    ebpo_self_intersections_options search = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
+    search.threads = (unsigned)v->threads;
+    search.progress = progress;
+    search.ply = v->out;
+    return check_crossings(&p->mesh, &p->prepared.report, &search, v->json ? j : NULL, v->quiet,
+                           line, error);
 }
 #endif
 
@@ -251,10 +254,10 @@ static int run_check(void *given, const char **operand)
         return command_usage("check", "--output needs --crossings; give both");
     if (v->findings && !is_findings_target(v->findings))
         return command_usage("check", "--findings takes 'all', or a file whose name ends in .ply");
-    const char *picture = v->findings ? findings_ply_path(v->findings) : NULL;
-    if (picture && command_overwrites("check", operand[0], picture))
+    const char *findings_ply = v->findings ? findings_ply_path(v->findings) : NULL;
+    if (findings_ply && command_overwrites("check", operand[0], findings_ply))
         return EXIT_USAGE;
-    if (picture && v->out && command_overwrites("check", v->out, picture))
+    if (findings_ply && v->out && command_overwrites("check", v->out, findings_ply))
         return EXIT_USAGE;
     if (v->out && command_overwrites("check", operand[0], v->out))
         return EXIT_USAGE;
@@ -262,8 +265,8 @@ static int run_check(void *given, const char **operand)
     ebpo_workspace *workspace = NULL;
     mesh_input p;
     ebpo_status status = v->out ? ebpo_check_output(v->out, &error) : EBPO_OK;
-    if (status == EBPO_OK && picture)
-        status = ebpo_check_output(picture, &error);
+    if (status == EBPO_OK && findings_ply)
+        status = ebpo_check_output(findings_ply, &error);
     if (status == EBPO_OK)
         status = memory_new(&workspace, &v->memory, &error);
     if (status == EBPO_OK)

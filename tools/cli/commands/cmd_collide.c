@@ -19,14 +19,15 @@
 #include "cli/query_args.h"
 #include "cli/words.h"
 
-/* --- distance, depth and relation --- */
+/* --- measures: distance, depth and separation --- */
 
-/* Values of the options. If not given, `tolerance` is 0, and `at_least` is below 0. */
+/* Values of the options for measures. */
 typedef struct measure_values {
     bool distance, depth;
-    double tolerance, at_least;
-    const char *separation; /* X Y Z, or NULL */
-    double direction[3];    /* set by measures_fit */
+    double tolerance;       /* 0: not given */
+    double at_least;        /* below 0: not given */
+    const char *separation; /* the direction as text, X Y Z; NULL: not given */
+    double direction[3];    /* `separation` as numbers, set by measures_fit */
 } measure_values;
 
 #define MEASURE_VALUES_INIT                        \
@@ -41,15 +42,15 @@ static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "IN
                                                  "A_INSIDE_B", "B_INSIDE_A", "EQUAL",
                                                  "not known" };
 
-/* Finds the relation of two models for which a query did not return intersecting faces. *relation:
- * the name of an ebpo_relation to print; NULL if there is nothing to add, because the models are
+/* Finds the relation of two models for which a query returned no intersecting faces. *relation: the
+ * name of an ebpo_relation to print; NULL if nothing is to be printed, because the models are
  * DISJOINT or their faces intersect. */
-static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *how,
+static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *collide_options,
                                  const char **relation, ebpo_error *error)
 {
     ebpo_relation_result r;
     *relation = NULL;
-    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
+    ebpo_status status = ebpo_collide_relation(c, collide_options, &r, error);
     if (status == EBPO_OK && r.relation != EBPO_DISJOINT && r.contact != 1)
         *relation = collide_relations[r.relation];
     if (status != EBPO_E_ABSENT && status != EBPO_E_LIMIT)
@@ -59,8 +60,8 @@ static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *h
     return EBPO_OK;
 }
 
-/* Prints the relation at the end of the line as " NAME", or as a member of JSON. NULL: prints
- * nothing. */
+/* Prints the relation at the end of the line as " NAME", or as a member of JSON. If `relation` is
+ * NULL, prints nothing. */
 static void print_relation(bool as_json, const char *relation)
 {
     bool undecided = relation == collide_relations[EBPO_RELATION_UNDECIDED];
@@ -91,24 +92,25 @@ static bool measures_requested(const measure_values *f)
     return f->distance || f->depth || f->separation;
 }
 
-/* Returns false, with a message on standard error, for options that cannot be combined. others:
- * true if --all or --self was given. */
-static bool measures_fit(measure_values *f, bool others)
+/* Returns false, with a message on standard error, for options that cannot be combined.
+ * all_or_self: --all or --self was given. */
+static bool measures_fit(measure_values *f, bool all_or_self)
 {
-    const char *wrong = NULL;
-    if ((measures_requested(f) && others) || f->distance + f->depth + (f->separation != NULL) > 1 ||
+    const char *message = NULL;
+    if ((measures_requested(f) && all_or_self) ||
+        f->distance + f->depth + (f->separation != NULL) > 1 ||
         (!f->distance && !f->depth && f->tolerance > 0))
-        wrong = "--distance, --depth and --separation exclude each other, --all and --self; "
-                "--tolerance is for --distance and --depth only";
+        message = "only one of --distance, --depth, --separation, --all and --self can be given; "
+                  "--tolerance is only for --distance and --depth";
     else if (f->separation && !read_direction(f->separation, f->direction))
-        wrong = "--separation expects a direction, three numbers 'X Y Z'";
+        message = "--separation expects a direction, three numbers 'X Y Z'";
     else if (f->at_least >= 0 && (!f->distance || f->tolerance > 0))
-        wrong = "--at-least is for --distance, without --tolerance";
+        message = "--at-least is for --distance, without --tolerance";
     else if (f->depth && !(f->tolerance > 0))
-        wrong = "--depth needs a --tolerance greater than 0";
-    if (wrong)
-        (void)command_usage("collide", "%s", wrong);
-    return !wrong;
+        message = "--depth needs a --tolerance greater than 0";
+    if (message)
+        (void)command_usage("collide", "%s", message);
+    return !message;
 }
 
 /* Prints the two bounds. */
@@ -144,7 +146,7 @@ static void print_nearest_pair(bool as_json, const ebpo_collide_distance_result 
         printf(" %" PRIu64 " %" PRIu64, c->pair.face_a, c->pair.face_b);
 }
 
-/* Ends the line, with the relation of models that overlap as sets of points. */
+/* Prints the relation, unless `relation` is NULL, and ends the line. */
 static void print_end(bool as_json, const char *relation)
 {
     print_relation(as_json, relation);
@@ -171,20 +173,21 @@ static void print_at_least(bool as_json, const ebpo_collide_distance_result *c,
 }
 
 static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_collider *c,
-                                  const ebpo_collide_options *how, ebpo_error *error)
+                                  const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     ebpo_collide_distance_options distance_options = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result result;
     distance_options.tolerance = f->tolerance;
     distance_options.at_least = f->at_least;
-    ebpo_status status = ebpo_collide_distance(c, how, &distance_options, &result, error);
+    ebpo_status status =
+        ebpo_collide_distance(c, collide_options, &distance_options, &result, error);
     if (status != EBPO_OK)
         return status;
-    /* if not apart, the line already reports an intersection, or that nothing is known */
+    /* otherwise the line already shows that faces intersect, or that this is not known */
     bool apart = result.distance.lo > 0 || (result.at_least >= 0 && result.distance.hi > 0);
     const char *relation = NULL;
     if (apart)
-        status = find_relation(c, how, &relation, error);
+        status = find_relation(c, collide_options, &relation, error);
     if (status != EBPO_OK)
         return status;
     if (f->at_least >= 0)
@@ -209,12 +212,12 @@ static void print_depth(bool as_json, const char *name, bool solid, const ebpo_v
 }
 
 static ebpo_status query_depth(const measure_values *f, bool as_json, ebpo_collider *c,
-                               const ebpo_collide_options *how, ebpo_error *error)
+                               const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     ebpo_value_bounds depth[2] = { { 0, 0, 0, 0 }, { 0, 0, 0, 0 } };
     ebpo_status status[2];
     for (int i = 0; i < 2; i++) {
-        status[i] = ebpo_collide_depth(c, how, f->tolerance, i == 0 ? &depth[0] : NULL,
+        status[i] = ebpo_collide_depth(c, collide_options, f->tolerance, i == 0 ? &depth[0] : NULL,
                                        i == 1 ? &depth[1] : NULL, error);
         if (status[i] != EBPO_OK && status[i] != EBPO_E_NOT_SOLID)
             return status[i];
@@ -232,19 +235,20 @@ static ebpo_status query_depth(const measure_values *f, bool as_json, ebpo_colli
 /* --- separation distance along a direction --- */
 
 static ebpo_status query_separation(const measure_values *f, bool as_json, ebpo_collider *c,
-                                    const ebpo_collide_options *how, ebpo_error *error)
+                                    const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     static const char *const value_kinds[] = { "exact", "interval", "bound" };
     ebpo_separation separation;
-    ebpo_status status = ebpo_collide_separation(c, how, f->direction, &separation, error);
+    ebpo_status status =
+        ebpo_collide_separation(c, collide_options, f->direction, &separation, error);
     if (status != EBPO_OK)
         return status;
-    bool any = separation.pair.face_a != EBPO_NO_FACE;
+    bool has_faces = separation.pair.face_a != EBPO_NO_FACE;
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &separation.t);
     if (as_json)
         printf(", \"value_kind\": \"%s\"", value_kinds[separation.t.kind]);
-    if (any)
+    if (has_faces)
         printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
                        : " %" PRIu64 " %" PRIu64,
                separation.pair.face_a, separation.pair.face_b);
@@ -253,11 +257,11 @@ static ebpo_status query_separation(const measure_values *f, bool as_json, ebpo_
 }
 
 static ebpo_status query_measures(const measure_values *f, bool as_json, ebpo_collider *c,
-                                  const ebpo_collide_options *how, ebpo_error *error)
+                                  const ebpo_collide_options *collide_options, ebpo_error *error)
 {
-    return f->separation ? query_separation(f, as_json, c, how, error)
-           : f->distance ? query_distance(f, as_json, c, how, error)
-                         : query_depth(f, as_json, c, how, error);
+    return f->separation ? query_separation(f, as_json, c, collide_options, error)
+           : f->distance ? query_distance(f, as_json, c, collide_options, error)
+                         : query_depth(f, as_json, c, collide_options, error);
 }
 
 /* --- the command --- */
@@ -266,12 +270,14 @@ typedef struct collide_values {
     query_values query;
     const char *pose_a, *pose_b, *out;
     bool first, self, relation, quiet;
-    uint64_t printed; /* pairs */
+    uint64_t printed; /* number of pairs printed so far */
     measure_values measures;
 } collide_values;
 
 #include "cli/options/collide.inc"
 
+/* Reads the value of the option --NAME; `text` is NULL if the option was not given, and *out
+ * unchanged. */
 static bool read_pose(const char *name, const char *text, ebpo_pose *out)
 {
     if (!text || pose_read(text, out))
@@ -285,6 +291,7 @@ static bool read_pose(const char *name, const char *text, ebpo_pose *out)
 
 /* --- results --- */
 
+/* Words for an ebpo_pair_kind. */
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
 
 static void print_pair(bool as_json, const ebpo_face_pair *p)
@@ -306,17 +313,17 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return command_flush("collide");
 }
 
-/* Words for the values -1, 0 and 1. */
-static const char *const truths[] = { "null", "false", "true" };
+/* JSON for a result -1 (not known), 0 (no) and 1 (yes); the index is the result + 1. */
+static const char *const json_truths[] = { "null", "false", "true" };
 
 /* Prints the line for models whose faces do not intersect. With --all, JSON has one object for
  * each pair; without pairs, it has one object if a relation is printed, otherwise none. */
 static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
-                              const ebpo_collide_options *how, ebpo_error *error)
+                              const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     const char *relation;
     bool as_json = v->query.json;
-    ebpo_status status = find_relation(c, how, &relation, error);
+    ebpo_status status = find_relation(c, collide_options, &relation, error);
     if (status != EBPO_OK || (as_json && v->query.all && !relation))
         return status;
     printf(as_json ? "{\"kind\": \"APART\"" : "none");
@@ -326,15 +333,15 @@ static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
 }
 
 static ebpo_status query_first(const collide_values *v, ebpo_collider *c,
-                               const ebpo_collide_options *how, ebpo_error *error)
+                               const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     ebpo_face_pair pair;
     int32_t found;
-    ebpo_status status = ebpo_collide_first(c, how, &pair, &found, error);
+    ebpo_status status = ebpo_collide_first(c, collide_options, &pair, &found, error);
     if (status != EBPO_OK)
         return status;
     if (found == 0)
-        return print_none(v, c, how, error);
+        return print_none(v, c, collide_options, error);
     if (found == 1)
         print_pair(v->query.json, &pair);
     else
@@ -343,24 +350,25 @@ static ebpo_status query_first(const collide_values *v, ebpo_collider *c,
 }
 
 static ebpo_status query_relation(const collide_values *v, ebpo_collider *c,
-                                  const ebpo_collide_options *how, ebpo_error *error)
+                                  const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     ebpo_relation_result r;
-    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
+    ebpo_status status = ebpo_collide_relation(c, collide_options, &r, error);
     if (status != EBPO_OK)
         return status;
     if (!v->query.json)
         puts(collide_relations[r.relation]);
     else if (r.relation == EBPO_RELATION_UNDECIDED)
-        printf("{\"relation\": null, \"contact\": %s}\n", truths[r.contact + 1]);
+        printf("{\"relation\": null, \"contact\": %s}\n", json_truths[r.contact + 1]);
     else
         printf("{\"relation\": \"%s\", \"contact\": %s}\n", collide_relations[r.relation],
-               truths[r.contact + 1]);
+               json_truths[r.contact + 1]);
     return EBPO_OK;
 }
 
-/* Words for the values -1, 0 and 1. */
-static const char *const words[] = { "possible", "apart", "meeting" };
+/* Words for ebpo_level_result.common: -1 (not known), 0 (no) and 1 (yes); the index is the result
+ * + 1. */
+static const char *const common_words[] = { "possible", "apart", "meeting" };
 
 static void print_levels(bool as_json, const ebpo_level_result *r)
 {
@@ -368,34 +376,35 @@ static void print_levels(bool as_json, const ebpo_level_result *r)
     if (as_json)
         printf("{\"common\": %s, \"contact\": %s, \"undecided_pairs\": %llu, \"lo\": %s, \"hi\": "
                "%s}\n",
-               truths[r->common + 1], truths[r->contact + 1],
+               json_truths[r->common + 1], json_truths[r->contact + 1],
                (unsigned long long)r->undecided_pairs, json_number(r->distance.lo, lo),
                json_number(r->distance.hi, hi));
     else
-        printf("%s %llu %s %s\n", words[r->common + 1], (unsigned long long)r->undecided_pairs,
-               words_real(r->distance.lo, lo), words_real(r->distance.hi, hi));
+        printf("%s %llu %s %s\n", common_words[r->common + 1],
+               (unsigned long long)r->undecided_pairs, words_real(r->distance.lo, lo),
+               words_real(r->distance.hi, hi));
 }
 
 static ebpo_status query_levels(const collide_values *v, ebpo_collider *c,
-                                const ebpo_collide_options *how, ebpo_error *error)
+                                const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     ebpo_level_result r;
-    ebpo_status status = ebpo_collide_levels(c, how, &r, error);
+    ebpo_status status = ebpo_collide_levels(c, collide_options, &r, error);
     if (status == EBPO_OK)
         print_levels(v->query.json, &r);
     return status;
 }
 
-/* Prints every pair, or that there is none. */
-static ebpo_status query_pairs(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
-                               ebpo_error *error)
+/* Prints every pair; if there are no pairs, prints "none" or the relation of the models. */
+static ebpo_status query_pairs(collide_values *v, ebpo_collider *c,
+                               const ebpo_collide_options *collide_options, ebpo_error *error)
 {
-    ebpo_status status = v->self ? ebpo_collide_self(c, how, take_pairs, v, error)
-                                 : ebpo_collide_all(c, how, take_pairs, v, error);
+    ebpo_status status = v->self ? ebpo_collide_self(c, collide_options, take_pairs, v, error)
+                                 : ebpo_collide_all(c, collide_options, take_pairs, v, error);
     if (status != EBPO_OK || v->printed)
         return status;
     if (!v->self)
-        return print_none(v, c, how, error);
+        return print_none(v, c, collide_options, error);
     if (!v->query.json)
         puts("none");
     return EBPO_OK;
@@ -403,16 +412,16 @@ static ebpo_status query_pairs(collide_values *v, ebpo_collider *c, const ebpo_c
 
 /* Writes --output. The report goes to standard error, as results go to standard output. */
 static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
-                               const ebpo_collide_options *how, ebpo_error *error)
+                               const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     bool ply = words_end_with(v->out, ".ply");
     const char *relation = NULL;
-    ebpo_status status =
-        ebpo_collide_write(c, how, ply ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5, v->out, error);
+    ebpo_status status = ebpo_collide_write(c, collide_options,
+                                            ply ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5, v->out, error);
     if (v->quiet)
         return status;
     if (status == EBPO_OK)
-        status = find_relation(c, how, &relation, error);
+        status = find_relation(c, collide_options, &relation, error);
     if (status == EBPO_OK)
         fprintf(stderr, "%s: %s%s%s\n", v->out,
                 ply ? "both models, with intersecting faces in red"
@@ -422,22 +431,23 @@ static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
 }
 
 /* Runs the queries of the command line one after the other. */
-static ebpo_status query_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
-                             ebpo_error *error)
+static ebpo_status query_all(collide_values *v, ebpo_collider *c,
+                             const ebpo_collide_options *collide_options, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (v->query.level >= 0)
-        return query_levels(v, c, how, error);
+        return query_levels(v, c, collide_options, error);
     if (v->relation)
-        status = query_relation(v, c, how, error);
+        status = query_relation(v, c, collide_options, error);
     if (status == EBPO_OK && v->out)
-        status = write_pairs(v, c, how, error);
+        status = write_pairs(v, c, collide_options, error);
     if (status == EBPO_OK && measures_requested(&v->measures))
-        return query_measures(&v->measures, v->query.json, c, how, error);
+        return query_measures(&v->measures, v->query.json, c, collide_options, error);
     if (status == EBPO_OK && (v->query.all || v->self))
-        return query_pairs(v, c, how, error);
-    bool other = v->relation || v->out;
-    return status == EBPO_OK && (v->first || !other) ? query_first(v, c, how, error) : status;
+        return query_pairs(v, c, collide_options, error);
+    bool has_query = v->relation || v->out;
+    return status == EBPO_OK && (v->first || !has_query) ? query_first(v, c, collide_options, error)
+                                                         : status;
 }
 
 static void json_stats(const ebpo_collider_stats *s)
@@ -474,7 +484,7 @@ static void report_stats(const ebpo_collider *c, bool as_json)
 }
 
 static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
-                          ebpo_collide_options *how)
+                          ebpo_collide_options *collide_options)
 {
     ebpo_collider_options collider_options = EBPO_COLLIDER_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -482,9 +492,9 @@ static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
     progress_line line;
     collider_options.threads = (unsigned)v->query.threads;
     ebpo_status status = ebpo_collider_new(a, b, &collider_options, &c, &error);
-    how->progress = progress_start(&line, "collide", v->quiet);
+    collide_options->progress = progress_start(&line, "collide", v->quiet);
     if (status == EBPO_OK)
-        status = query_all(v, c, how, &error);
+        status = query_all(v, c, collide_options, &error);
     progress_wipe(&line);
     if (c && v->query.remote.stats)
         report_stats(c, v->query.json);
@@ -494,8 +504,8 @@ static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
     return command_flush("collide") ? EXIT_OK : EXIT_FAILED;
 }
 
-/* Makes the budget of both models for --memory, which applies to both together, unless both fit
- * completely. */
+/* Makes the budget that both models share, for --memory. Makes none if both models fit completely.
+ */
 static ebpo_status share_memory(const query_session *a, const query_session *b,
                                 ebpo_model_options *model_options, ebpo_error *error)
 {
@@ -505,16 +515,17 @@ static ebpo_status share_memory(const query_session *a, const query_session *b,
     ebpo_status status = ebpo_model_memory(a->file, &unlimited, &plan[0], error);
     if (status == EBPO_OK)
         status = ebpo_model_memory(b->file, &unlimited, &plan[1], error);
-    bool all =
+    bool fits =
         model_options->cut_level < 0 && plan[0].whole + plan[1].whole <= model_options->memory;
-    if (status != EBPO_OK || all)
+    if (status != EBPO_OK || fits)
         return status;
     return ebpo_budget_new(model_options->memory, &model_options->budget, error);
 }
 
-/* Sets the memory of both models if --memory is not given: no limit if both need at most half of
- * the free memory, otherwise half of the free memory, or the minimum if that is more. Remote files
- * keep the default budget of the library. */
+/* Sets the memory of both models if --memory is not given. There is no limit if both models need at
+ * most half of the free memory. Otherwise the limit is half of the free memory or, if more, what
+ * the models need at least. Remote files keep the default budget of the library. `b` is NULL if
+ * both models are the same. */
 static void default_memory(const query_session *a, const query_session *b,
                            const char *const path[2], ebpo_model_options *model_options)
 {
@@ -558,7 +569,7 @@ static int open_models(query_session *a, query_session *b, const collide_values 
 static int run_collide(void *given, const char **operand)
 {
     collide_values *v = given;
-    ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collide_options collide_options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
@@ -579,16 +590,16 @@ static int run_collide(void *given, const char **operand)
     if (v->query.level >= 0 && (v->first || v->self || v->query.all ||
                                 measures_requested(&v->measures) || v->relation || v->out))
         return command_usage("collide", "--max-level allows no other query");
-    if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
-        !read_pose("pose-b", v->pose_b, &how.pose_b) ||
+    if (!read_pose("pose-a", v->pose_a, &collide_options.pose_a) ||
+        !read_pose("pose-b", v->pose_b, &collide_options.pose_b) ||
         !query_options_from("collide", &v->query, &model_options, &inside, &distance))
         return EXIT_USAGE;
-    how.deadline_ns = distance.deadline_ns;
-    how.level = distance.level;
+    collide_options.deadline_ns = distance.deadline_ns;
+    collide_options.level = distance.level;
     setvbuf(stdout, NULL, _IOFBF, 1 << 18);
     int code = open_models(&a, &b, v, operand, &model_options);
     if (code == EXIT_OK)
-        code = query_collider(v, a.model, b.model ? b.model : a.model, &how);
+        code = query_collider(v, a.model, b.model ? b.model : a.model, &collide_options);
     query_close(&b);
     query_close(&a);
     ebpo_budget_free(model_options.budget);

@@ -26,20 +26,21 @@
 #include "cli/tables.h"
 #include "cli/words.h"
 
-/* --- the mesh and the file, described --- */
+/* --- reports of the mesh and of the file --- */
 
 /* Properties of a conversion that its reports use, and the form of the reports. */
 typedef struct convert_reported {
-    const char *in, *out; /* `in`: name for messages */
-    bool piped;           /* the mesh came from standard input */
+    const char *in;  /* the name of the mesh file in messages */
+    const char *out; /* the path of the written file */
+    bool piped;      /* the mesh came from standard input */
     bool json, quiet, timings;
     bool wants_surface;    /* --parts names the simplified surface */
     bool repair_requested; /* --repair was given */
-    bool chosen;           /* the parts were chosen by size */
-    bool by_groups;        /* warnings are reported for each group, not here */
+    bool chosen;           /* the command chose the parts, to reach --target-size */
+    bool by_groups;        /* convert_pieces.c reports warnings for each group instead */
 } convert_reported;
 
-/* Reports the mesh, and warnings. Call before building. */
+/* Reports the mesh, and warnings on it. Call before the build, which empties the mesh. */
 static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
 {
     ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
@@ -62,7 +63,8 @@ static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
 
 /* --- the summary: five lines --- */
 
-static void print_what(const char *out, const ebpo_info *info)
+/* Prints whether the file is a solid or a surface, and its counts. */
+static void print_kind(const char *out, const ebpo_info *info)
 {
     char faces[64], parts[64];
     printf("%s: %s of %s", out, info->solid ? "a solid" : "a surface",
@@ -111,12 +113,13 @@ static void print_levels(const ebpo_info *info, const ebpo_solid_volume *solid)
     putchar('\n');
 }
 
-/* Prints a name quoted for a shell. */
+/* Prints a blank and the name of a file, quoted for a shell if necessary. */
 static void print_name(const char *name)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
                                 "._-/+,:@%";
-    const char *folder = name[0] == '-' && name[1] ? "./" : ""; /* "-" is standard input */
+    /* so that the name is not read as an option; "-" alone is standard input */
+    const char *folder = name[0] == '-' && name[1] ? "./" : "";
     if (strspn(name, plain) == strlen(name)) {
         printf(" %s%s", folder, name);
         return;
@@ -130,6 +133,7 @@ static void print_name(const char *name)
     putchar('\'');
 }
 
+/* Prints the command that the user may run next. */
 static void print_next(const convert_reported *t, const ebpo_info *info, const mesh_input *p)
 {
     fputs("  next      ", stdout);
@@ -188,7 +192,7 @@ static ebpo_status convert_report_file(const convert_reported *t, const mesh_inp
         ebpo_solid_volume solid = facts_solid(info, p->shells_counted ? &p->shells : NULL);
         if (t->timings)
             stages_print(stdout, line, stages, seconds);
-        print_what(t->out, info);
+        print_kind(t->out, info);
         print_sound(info, &solid, p);
         print_size(info, t->chosen, seconds);
         print_levels(info, &solid);
@@ -224,7 +228,8 @@ typedef struct values {
 #include "cli/options/convert.inc"
 
 /* Returns the parts of --parts. A list with minus signs also omits the parts that need an omitted
- * part. Returns 0 for another list that lacks a needed part, which is not valid. */
+ * part. A list without minus signs must contain the parts that its parts need; otherwise returns 0.
+ */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
@@ -300,12 +305,14 @@ static int check_target(const values *v, ebpo_subset_options *target)
     return code;
 }
 
+/* Returns true if the command chooses the parts, to reach --target-size. */
 static bool chooses_parts(const values *v) { return v->target_size && v->profile < 0 && !v->parts; }
 
+/* Returns the parts to build. With --profile or chosen parts, all parts are built and some of them
+ * written, so that the file equals a subset of the full file. */
 static uint32_t parts_of(const values *v)
 {
-    if (v->profile >= 0 ||
-        chooses_parts(v)) /* all are built, so that the file equals a subset of the full file */
+    if (v->profile >= 0 || chooses_parts(v))
         return ebpo_profile_parts(EBPO_PROFILE_FULL);
     return v->parts ? listed_parts(v->parts) : DEFAULT_PARTS;
 }
@@ -335,8 +342,8 @@ static convert_reported reported_of(const values *v, const char *in, const char 
 
 /* --- work --- */
 
-/* Fails if there is not enough memory to measure the error bound of the envelopes after the build.
- * Call before the build, which may take long. */
+/* Fails if there is not enough memory for the step after the build that selects levels (--max-error
+ * and --target-size). Call before the build, which may take long. */
 static ebpo_status check_selection_memory(const values *v, uint64_t faces, const char *in,
                                           const ebpo_workspace *workspace, ebpo_error *error)
 {
@@ -356,7 +363,8 @@ static ebpo_status check_selection_memory(const values *v, uint64_t faces, const
     return EBPO_E_LIMIT;
 }
 
-/* Builds the tree and writes the file. `target`: the requested error bound or file size. */
+/* Builds the tree and writes the file. Empties the mesh of `p`. target: the requested error bound
+ * or file size. */
 static ebpo_status build_and_write(const values *v, mesh_input *p, const char *out,
                                    const ebpo_subset_options *target, ebpo_progress progress,
                                    ebpo_build_times *times, ebpo_error *error)
@@ -414,11 +422,11 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     return status;
 }
 
-/* Options for the files of all pieces of a mesh that is split. */
+/* What the functions for one piece of a split mesh need. */
 typedef struct piece_build {
     const values *v;
-    const ebpo_subset_options *target;
-    const char *in;
+    const ebpo_subset_options *target; /* as in build_and_write */
+    const char *in;                    /* path of the whole mesh, for messages */
     const ebpo_workspace *workspace;
 } piece_build;
 

@@ -15,11 +15,12 @@ static bool gives_interval(const ebpo_distance_options *o)
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
 }
 
+/* The list of the faces near one point. */
 typedef struct listing {
-    const ebpo_sampler *sampler;
-    result_text *text;
+    const ebpo_sampler *sampler; /* for --attribute; NULL: none */
+    result_text *text;           /* the list is appended here */
     result_form form;
-    bool begun;
+    bool begun; /* a face was printed */
 } listing;
 
 static bool list_face(void *user, const ebpo_near_face *face)
@@ -46,8 +47,8 @@ static ebpo_status compute_lists(const query_job *job, query_worker *w, const do
     return status;
 }
 
-/* Returns the indices of models in a catalogue; they are stored in w->results after the `count`
- * distances. */
+/* Returns where the index of the nearest model is stored for each of `count` points of a query in a
+ * catalogue: in w->results, after the distances. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
@@ -56,10 +57,10 @@ static uint64_t *models_of(const query_worker *w, uint64_t count)
 static ebpo_status compute_distances(const query_job *job, query_worker *w, const double *rows,
                                      uint64_t count, ebpo_error *error)
 {
-    ebpo_catalogue_query_options how = query_catalogue_options(job);
+    ebpo_catalogue_query_options catalogue_options = query_catalogue_options(job);
     if (job->catalogue)
-        return ebpo_catalogue_distance(job->catalogue, job->models, rows, count, &how, w->results,
-                                       models_of(w, count), error);
+        return ebpo_catalogue_distance(job->catalogue, job->models, rows, count, &catalogue_options,
+                                       w->results, models_of(w, count), error);
     if (count && query_lists(job->values))
         return compute_lists(job, w, rows, count, error);
     return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);

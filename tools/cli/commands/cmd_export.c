@@ -19,7 +19,8 @@ typedef struct values {
     int format;
     int64_t level, threads;
     const char *levels, *memory;
-    bool mesh, json, quiet, to_deepest;
+    bool mesh, json, quiet;
+    bool to_deepest; /* --levels ends with '-': up to the last level of the file */
     remote_values remote;
 } values;
 
@@ -29,6 +30,8 @@ static const char *const format_words[] = {
 
 #include "cli/options/export.inc"
 
+/* Sets v->format from the ending of the output's name, unless --format was given. Returns an exit
+ * code. */
 static int choose_format(values *v, const char *out)
 {
     const char *dot = strrchr(out, '.');
@@ -43,6 +46,7 @@ static int choose_format(values *v, const char *out)
                                "the output's extension is not that of a format; give --format");
 }
 
+/* Sets the levels to export. Returns an exit code. */
 static int choose_levels(values *v, ebpo_export_options *o)
 {
     word_levels levels;
@@ -67,6 +71,8 @@ static int choose_levels(values *v, ebpo_export_options *o)
     return EXIT_OK;
 }
 
+/* Checks that outputs do not overwrite the input. second: the second file of the format; "": none.
+ */
 static int check_names(const char *in, const char *out, const char *second)
 {
     const char *names[] = { out, second };
@@ -80,13 +86,14 @@ static int check_names(const char *in, const char *out, const char *second)
 
 static void print_colours(const ebpo_export_report *r)
 {
-    const uint64_t of[2] = { r->vertex_colours, r->face_colours };
+    const uint64_t result[2] = { r->vertex_colours, r->face_colours };
     for (int i = 0; i < 2; i++)
-        if (of[i] != EBPO_EXPORT_NO_COLOURS)
+        if (result[i] != EBPO_EXPORT_NO_COLOURS)
             printf("colours of %s: %s\n", i ? "faces" : "vertices",
-                   of[i] == EBPO_EXPORT_WRITTEN ? "written"
-                   : i ? "omitted, as this format has none; xdmf and vtkhdf do"
-                       : "omitted, as this format has none; the other formats do");
+                   result[i] == EBPO_EXPORT_WRITTEN ? "written"
+                   : i ? "omitted: this format has no colours of faces; xdmf and vtkhdf have them"
+                       : "omitted: this format has no colours of vertices; other formats have "
+                         "them");
 }
 
 static void print_report(const char *out, const char *second, const ebpo_export_report *r)

@@ -18,8 +18,8 @@
 /* The mesh to write. */
 typedef struct extracted {
     ebpo_mesh mesh;
-    ebpo_subtree *mesh_owner; /* owner of the mesh, unless NULL */
-    double volume;
+    ebpo_subtree *mesh_owner; /* owns the arrays of `mesh`; NULL: `mesh` owns them */
+    double volume;            /* of the envelopes, with --level */
 } extracted;
 
 typedef struct values {
@@ -30,8 +30,8 @@ typedef struct values {
     remote_values remote;
 } values;
 
-/* All octcodes are smaller than this value. Limits of options are doubles, which represent the
- * value exactly. */
+/* The limit of --subtree: all octcodes are smaller. The limits of options are doubles, which
+ * represent this value exactly. */
 #define OCTCODE_MAX (INT64_C(1) << 61)
 
 #include "cli/options/extract.inc"
@@ -58,7 +58,8 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_OK;
 }
 
-/* Warns of pruned nodes, which are gray nodes without children. The subtree must be complete. */
+/* Warns if nodes of the subtree are pruned. A pruned node is a gray node (an inner node) without
+ * children. */
 static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
 {
     ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
@@ -76,18 +77,18 @@ static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
                 remote_shown(path), nodes_text);
 }
 
-/* Returns the faces as a mesh, borrowed from the subtree. */
+/* Sets out->mesh to the faces of the subtree --subtree, which remains the owner of the arrays. */
 static ebpo_status take_subtree(const ebpo_file *file, const values *v, const char *path,
                                 const ebpo_workspace *workspace, extracted *out, ebpo_error *error)
 {
-    ebpo_subtree_options how = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_subtree_options subtree_options = EBPO_SUBTREE_OPTIONS_INIT;
     ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
     ebpo_workspace_stats allowed = EBPO_WORKSPACE_STATS_INIT;
     ebpo_workspace_get_stats(workspace, &allowed);
-    how.parts = EBPO_PART_MESH;
-    how.memory = allowed.memory;
+    subtree_options.parts = EBPO_PART_MESH;
+    subtree_options.memory = allowed.memory;
     ebpo_status status =
-        ebpo_subtree_open(file, (uint64_t)v->subtree, &how, &out->mesh_owner, error);
+        ebpo_subtree_open(file, (uint64_t)v->subtree, &subtree_options, &out->mesh_owner, error);
     if (status == EBPO_OK)
         status = ebpo_subtree_get_faces(out->mesh_owner, &faces, error);
     if (status == EBPO_OK)
@@ -100,23 +101,25 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v, const ch
     return status;
 }
 
-/* Warns that data of other elements is omitted: it is written only when vertex indices are those of
- * the source. */
+/* Warns if elements of the source other than vertices and faces are omitted. They are written only
+ * if vertices have the order of the source, because they may refer to vertex indices. */
 static void warn_of_elements(const ebpo_file *file, bool source_order, const char *path)
 {
     ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
-    bool others = false;
+    bool has_elements = false;
     for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++)
-        others = others || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0 &&
-                            strcmp(a.element, "ebpo:texture") != 0);
-    if (others && (!source_order || ebpo_file_info(file)->repair_record.welded_vertices))
+        has_elements =
+            has_elements || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0 &&
+                             strcmp(a.element, "ebpo:texture") != 0);
+    if (has_elements && (!source_order || ebpo_file_info(file)->repair_record.welded_vertices))
         fprintf(stderr,
                 "ebpo extract: %s: note: other elements are omitted, as their vertex indices "
                 "refer to the source\n",
                 remote_shown(path));
 }
 
-static ebpo_status take_part(ebpo_file *file, const values *v, const char *path,
+/* Sets *out to the requested mesh: a subtree, the envelopes of a level, or the whole model. */
+static ebpo_status take_mesh(ebpo_file *file, const values *v, const char *path,
                              ebpo_workspace *workspace, ebpo_progress progress, extracted *out,
                              ebpo_error *error)
 {
@@ -148,7 +151,8 @@ static ebpo_status take_part(ebpo_file *file, const values *v, const char *path,
     return status;
 }
 
-static ebpo_status take_textures(const ebpo_file *file, const values *v, ebpo_error *error)
+/* Writes the images of textures to the folder --textures. */
+static ebpo_status write_textures(const ebpo_file *file, const values *v, ebpo_error *error)
 {
     textures t;
     uint64_t written;
@@ -212,9 +216,9 @@ static int run_extract(void *given, const char **operand)
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK && v->textures)
-        status = take_textures(file, v, &error);
+        status = write_textures(file, v, &error);
     if (status == EBPO_OK && operand[1])
-        status = take_part(file, v, operand[0], workspace, progress, &out, &error);
+        status = take_mesh(file, v, operand[0], workspace, progress, &out, &error);
     if (status == EBPO_OK && operand[1])
         status = ebpo_mesh_write_ply(&out.mesh, operand[1], &error);
     progress_wipe(&line);

@@ -1,5 +1,5 @@
-/* ebpo fetch: fetches a file, or a part of it, from a web server; keeps the fetched data when
- * interrupted. */
+/* ebpo fetch: fetches a file, or a part of it, from a web server. If the command is interrupted, it
+ * keeps the fetched data in the folder OUT.part, and the next run resumes. */
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -30,7 +30,7 @@ static bool is_fetched_data(const char *name)
            strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
 }
 
-/* Removes the blocks, and then the folder if it is empty. */
+/* Removes the fetched data, and then the folder if it is empty. */
 static void remove_part(const char *folder)
 {
     DIR *d = opendir(folder);
@@ -43,17 +43,17 @@ static void remove_part(const char *folder)
     rmdir(folder);
 }
 
-/* --- progress: drawn by the thread of transfers, while this thread waits --- */
+/* --- progress: drawn by the thread of transfers, while the main thread waits --- */
 
 typedef struct ticker {
-    _Atomic bool active;
-    _Atomic bool shown;        /* set by the thread of transfers */
-    _Atomic(ebpo_file *) file; /* NULL while it is being opened */
-    double last;
+    _Atomic bool active;       /* the line may be drawn */
+    _Atomic bool shown;        /* the thread of transfers has drawn the line */
+    _Atomic(ebpo_file *) file; /* NULL while the file is being opened */
+    double last;               /* when the line was drawn last */
 } ticker;
 
-/* Prints the number of fetched bytes. Called ten times a second during transfers; returns false, so
- * that it never stops them. */
+/* Prints the number of fetched bytes, at most five times a second. Called ten times a second during
+ * transfers; returns false, so that transfers continue. */
 static bool show_bytes(void *user)
 {
     ticker *t = user;
@@ -87,8 +87,8 @@ static void wipe_ticker(ticker *t)
 
 /* --- work --- */
 
-/* Reports the data that was in the folder when the file was opened. Returns true if this data is
- * usable. */
+/* Reports the data that was in the folder `part` when the file was opened. Returns true if some of
+ * this data is usable. */
 static bool report_resuming(const subset_values *v, ebpo_file *file, const char *url,
                             const char *part)
 {
@@ -107,7 +107,7 @@ static bool report_resuming(const subset_values *v, ebpo_file *file, const char 
     return s.cache_held > 0;
 }
 
-enum { BOX_BLOCK = 8192 };
+enum { BOX_BLOCK = 8192 }; /* bytes of a fetched block with --box, which needs many short ranges */
 
 static int fetch_subset(subset_values *v, const char *url, const char *out, const char *part,
                         ebpo_subset_options *subset)
@@ -122,8 +122,7 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     v->remote.stop_user = &t;
     if (part) {
         v->remote.cache = part;
-        v->remote.cache_size = "1048576T";
-        /* a box takes many short ranges */
+        v->remote.cache_size = "1048576T"; /* no limit */
         v->remote.cache_block = v->box ? BOX_BLOCK : 0;
     }
     ebpo_status status = remote_open(&file, url, &v->remote, &error);
@@ -135,16 +134,17 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
         status = subset_set_parts(v, ebpo_file_info(file), remote_shown(url), subset, &error);
     if (status == EBPO_OK)
         status = ebpo_subset(file, out, subset, &error);
-    bool usage = status == EBPO_E_ARGUMENT;
+    bool has_wrong_option = status == EBPO_E_ARGUMENT;
     wipe_ticker(&t);
     if (status == EBPO_OK) {
-        traffic seen = traffic_of(file);
-        status = subset_report(v, out, ebpo_file_info(file), &seen, progress_now() - begun, &error);
+        traffic transfers = traffic_of(file);
+        status =
+            subset_report(v, out, ebpo_file_info(file), &transfers, progress_now() - begun, &error);
         if (status == EBPO_OK && !v->json)
-            remote_report(&seen, &v->remote, false);
+            remote_report(&transfers, &v->remote, false);
     }
     ebpo_close(file);
-    /* The blocks may be damaged; if kept, the next run would fail in the same way. */
+    /* The fetched data may be damaged; with this data, the next run would fail in the same way. */
     if (part && status == EBPO_E_FORMAT && access(part, F_OK) == 0) {
         remove_part(part);
         int code = command_failed("fetch", &error);
@@ -152,11 +152,12 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
                         "in transit; run the same command to start again\n");
         return code;
     }
-    /* After an error in an option, data is removed only if this run has fetched all of it. */
-    if (part && (status == EBPO_OK || (usage && !has_fetched_data)))
+    /* After an error in an option, data of earlier runs is kept. */
+    if (part && (status == EBPO_OK || (has_wrong_option && !has_fetched_data)))
         remove_part(part);
-    /* rmdir removes an empty folder, and fails if there is data. */
-    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 && rmdir(part) != 0) {
+    /* rmdir removes an empty folder, and fails if the folder contains data. */
+    if (part && status != EBPO_OK && !has_wrong_option && access(part, F_OK) == 0 &&
+        rmdir(part) != 0) {
         int code = command_failed("fetch", &error);
         fprintf(stderr,
                 "ebpo fetch: the fetched data is kept in %s; run the same command to resume\n",
@@ -166,8 +167,8 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     return status == EBPO_OK ? EXIT_OK : command_failed("fetch", &error);
 }
 
-/* Checks, before data is fetched, that the output can be written. Returns false after a report on
- * stderr. */
+/* Checks, before data is fetched, that neither the output is a folder nor `part` another file.
+ * Returns false after a report on standard error. */
 static bool out_fits(const char *out, const char *part)
 {
     struct stat s;
@@ -196,8 +197,8 @@ static int run_fetch(void *given, const char **operand)
         return code;
     if (!command_requires_hdf5("fetch", operand[0]))
         return EXIT_FAILED;
-    char *part = NULL; /* with --http-cache, the cache folder keeps the data, and there is no folder
-                          OUT.part */
+    /* NULL with --http-cache, whose folder keeps the data instead of OUT.part */
+    char *part = NULL;
     if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0)
         return command_no_memory("fetch");
     code = out_fits(operand[1], part) ? fetch_subset(v, operand[0], operand[1], part, &subset)

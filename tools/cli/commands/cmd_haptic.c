@@ -26,8 +26,8 @@
 
 /* --- haptic steps at a steady rate --- */
 
-/* Number of bins of times: bin 0 is less than 1 microsecond, bin n from 2^(n - 1) to 2^n
- * microseconds; the last bin also has all longer times. */
+/* Number of bins of the histogram of step times. Bin 0 counts times below 1 microsecond, bin n
+ * times from 2^(n - 1) to 2^n microseconds; the last bin also counts all longer times. */
 enum { HAPTIC_BINS = 16 };
 
 typedef struct haptic_times {
@@ -35,31 +35,33 @@ typedef struct haptic_times {
     uint64_t late;       /* steps not finished a period after their due times */
     double p50, p99, p99_9, p99_99, max_time; /* seconds from the start to the end of a step */
     double wake_p99_9, wake_max;              /* seconds from the due time of a step to its start */
-    double cpu_p99_9, cpu_max; /* processor time from the start to the end of a step */
-    uint64_t over_ms;          /* steps that took more than a millisecond from start to end */
-    uint64_t bins[HAPTIC_BINS];
-    uint64_t page_faults;         /* page faults of the thread of steps */
-    double width_mean, width_max; /* widths of the bounds of a probe */
+    double cpu_p99_9, cpu_max;    /* processor time from the start to the end of a step */
+    uint64_t over_ms;             /* steps that took more than a millisecond from start to end */
+    uint64_t bins[HAPTIC_BINS];   /* histogram of times from the start to the end of a step */
+    uint64_t page_faults;         /* page faults of the thread that plays the steps */
+    double width_mean, width_max; /* widths hi - lo of the bounds of a probe's distance */
 } haptic_times;
 
+/* What haptic_play_run plays. */
 typedef struct haptic_play {
-    double rate, seconds;
-    ebpo_haptic *haptic;         /* NULL: an empty loop */
+    double rate;                 /* steps per second */
+    double seconds;              /* duration if the device has no number of steps */
+    ebpo_haptic *haptic;         /* NULL: steps do nothing */
     const haptic_device *device; /* source of positions */
     ebpo_haptic_kind kind;
-    double range;        /* range of the colours, for probes */
-    haptic_pose *record; /* one for each step: positions of the device; or NULL */
+    double range;        /* for probes: the distance that has the last colour of the scale */
+    haptic_pose *record; /* [maximum number of steps], set to the device's positions; or NULL */
 } haptic_play;
 
 /* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
- * on what was granted. Threads created afterwards inherit the scheduling. */
+ * that says what the system granted. Threads created afterwards inherit the scheduling. */
 static const char *request_real_time(void)
 {
     bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 #ifdef EBPO_HAVE_SCHED_SETSCHEDULER
-    struct sched_param first = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
-    /* for this thread; the loading thread was created before and keeps its scheduling */
-    bool is_real_time = sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+    struct sched_param parameters = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
+    /* a loading thread that exists already keeps its scheduling */
+    bool is_real_time = sched_setscheduler(0, SCHED_FIFO, &parameters) == 0;
 #else
     bool is_real_time = false;
 #endif
@@ -95,32 +97,36 @@ static void sort_times(float *times, uint64_t count)
     qsort(times, count, sizeof *times, compare_times);
 }
 
-/* Times of each step. */
+/* Times of each step, in seconds, as in haptic_times. */
 typedef struct step_times {
-    float *took, *wake, *cpu;
+    float *duration; /* from the start to the end */
+    float *wake;     /* from the due time to the start */
+    float *cpu;      /* processor time from the start to the end */
 } step_times;
 
+/* Sets the histogram and the quantiles; sorts the times of `s`. */
 static void compute_times(const step_times *s, uint64_t count, haptic_times *out)
 {
     for (uint64_t i = 0; i < count; i++) {
-        int bin = s->took[i] < 1e-6F ? 0 : 1 + (int)log2(1e6 * (double)s->took[i]);
+        int bin = s->duration[i] < 1e-6F ? 0 : 1 + (int)log2(1e6 * (double)s->duration[i]);
         out->bins[bin < HAPTIC_BINS ? bin : HAPTIC_BINS - 1]++;
-        out->over_ms += s->took[i] > 1e-3F;
+        out->over_ms += s->duration[i] > 1e-3F;
     }
-    sort_times(s->took, count);
+    sort_times(s->duration, count);
     sort_times(s->wake, count);
     sort_times(s->cpu, count);
-    out->p50 = time_quantile(s->took, count, 0.5);
-    out->p99 = time_quantile(s->took, count, 0.99);
-    out->p99_9 = time_quantile(s->took, count, 0.999);
-    out->p99_99 = time_quantile(s->took, count, 0.9999);
-    out->max_time = s->took[count - 1];
+    out->p50 = time_quantile(s->duration, count, 0.5);
+    out->p99 = time_quantile(s->duration, count, 0.99);
+    out->p99_9 = time_quantile(s->duration, count, 0.999);
+    out->p99_99 = time_quantile(s->duration, count, 0.9999);
+    out->max_time = s->duration[count - 1];
     out->wake_p99_9 = time_quantile(s->wake, count, 0.999);
     out->wake_max = s->wake[count - 1];
     out->cpu_p99_9 = time_quantile(s->cpu, count, 0.999);
     out->cpu_max = s->cpu[count - 1];
 }
 
+/* Returns the number of page faults of this thread so far; 0: not known. */
 static uint64_t page_faults(void)
 {
     struct rusage r;
@@ -132,6 +138,7 @@ static uint64_t page_faults(void)
     return known ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
 }
 
+/* Returns the processor time of this thread in nanoseconds. */
 static uint64_t thread_clock(void)
 {
     struct timespec t;
@@ -203,13 +210,13 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
     return true;
 }
 
-/* Plays all steps. A late step is not omitted, and the due times of later steps do not change.
- * Returns the number of steps. */
+/* Plays up to `count` steps. A late step is not omitted, and the due times of later steps do not
+ * change. Returns the number of played steps, which is less than `count` if the device ends. */
 static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times *s,
                          haptic_times *out)
 {
     const double period = 1e9 / p->rate;
-    uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults = page_faults(), i = 0;
+    uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults_before = page_faults(), i = 0;
     for (; i < count; i++) {
         uint64_t due = begin + (uint64_t)((double)i * period);
         tool_wait_until(due);
@@ -218,11 +225,11 @@ static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times 
             break;
         uint64_t end_time = tool_clock();
         s->cpu[i] = 1e-9F * (float)(thread_clock() - cpu_begin);
-        s->took[i] = 1e-9F * (float)(end_time - begin_time);
+        s->duration[i] = 1e-9F * (float)(end_time - begin_time);
         s->wake[i] = 1e-9F * (float)(begin_time - due);
         out->late += (double)(end_time - due) > period;
     }
-    out->page_faults = page_faults() - faults;
+    out->page_faults = page_faults() - faults_before;
     return i;
 }
 
@@ -233,17 +240,16 @@ static uint64_t haptic_play_steps(const haptic_play *p)
     return count ? count : (uint64_t)ceil(p->rate * p->seconds);
 }
 
-/* Plays all steps and sets *out to their times. Returns false if there is not enough memory for the
- * times. */
+/* Plays all steps and sets *out to their times. Returns false if there is not enough memory for
+ * this. */
 static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 {
     uint64_t count = haptic_play_steps(p);
-    /* writes zeros, so that no step is the first to use a page */
     float *all = malloc(3 * count * sizeof *all);
     *out = (haptic_times){ .step_count = 0 };
     if (!all)
         return false;
-    memset(all, 0, 3 * count * sizeof *all);
+    memset(all, 0, 3 * count * sizeof *all); /* now, so that no step has a page fault for it */
     const step_times s = { all, all + count, all + 2 * count };
     out->step_count = play_all(p, count, &s, out);
     out->width_mean /= fmax(1, (double)out->step_count);
@@ -256,6 +262,7 @@ static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 /* --- the command --- */
 
 typedef struct values {
+    /* as text; NULL: not given */
     const char *path, *device, *record, *tool, *memory;
     double rate, seconds, radius, friction, stiffness, damping, skin, search_radius;
     int64_t faces;
@@ -267,19 +274,20 @@ typedef struct values {
 
 typedef struct job {
     const values *v;
-    const char *name; /* FILE */
+    const char *name; /* FILE, the operand */
     ebpo_file *file;
     ebpo_model *model;
     ebpo_haptic *haptic;
-    double *points; /* points of the tool */
+    double *points; /* points of the tool, 3 numbers each */
     uint64_t point_count;
     ebpo_haptic_kind kind;
     haptic_device device;
-    haptic_pose *record;
-    const char *scheduling;
-    haptic_times empty, times;
+    haptic_pose *record;    /* for --record; NULL: not requested */
+    const char *scheduling; /* text of request_real_time */
+    haptic_times empty;     /* times of steps that do nothing */
+    haptic_times times;
     ebpo_haptic_stats stats;
-    ebpo_error stopped; /* EBPO_OK, or the error that ended loading */
+    ebpo_error stopped; /* status EBPO_OK, or the error that ended loading */
     ebpo_model_stats memory;
 } job;
 
@@ -395,7 +403,7 @@ static void json_report(const job *j)
 
 /* --- running --- */
 
-/* Reads the points of the tool: vertices of a mesh file. */
+/* Sets the points of the tool to the vertices of a mesh file. Returns false after an error. */
 static bool read_mesh_tool(job *j)
 {
     ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
@@ -413,25 +421,26 @@ static bool read_mesh_tool(job *j)
     return j->points != NULL;
 }
 
-/* Reads the points of the tool from a file of points, as `ebpo inside` reads it. */
+/* Reads the points of the tool from a file of points, in the formats that `ebpo inside` reads.
+ * Returns false after an error. */
 static bool read_point_tool(job *j)
 {
     points p;
     double rows[3 * POINTS_BATCH];
     uint64_t point_count;
-    bool fine = points_open(&p, "haptic", j->v->tool, POINTS, false, INFINITY);
-    while (fine && (point_count = points_next(&p, rows)) > 0) {
+    bool complete = points_open(&p, "haptic", j->v->tool, POINTS, false, INFINITY);
+    while (complete && (point_count = points_next(&p, rows)) > 0) {
         double *more = realloc(j->points, (j->point_count + point_count) * 3 * sizeof *more);
-        fine = more != NULL;
-        if (!fine)
+        complete = more != NULL;
+        if (!complete)
             break;
         memcpy(more + 3 * j->point_count, rows, point_count * 3 * sizeof *more);
         j->points = more;
         j->point_count += point_count;
     }
-    fine = fine && !p.failed;
+    complete = complete && !p.failed;
     points_close(&p);
-    return fine;
+    return complete;
 }
 
 static bool read_tool(job *j)
@@ -450,6 +459,8 @@ static bool read_tool(job *j)
     return false;
 }
 
+/* Returns the radius of the ball, or the distance of the farthest point of the tool from the tool's
+ * origin. */
 static double tool_radius(const job *j)
 {
     double radius = j->v->radius;
@@ -504,8 +515,8 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
     return EBPO_E_MEMORY;
 }
 
-/* Plays an empty loop for a tenth of the time, to measure the delay of the machine itself. Call
- * before a device starts. */
+/* Plays steps that do nothing for a tenth of the time, to measure the delays that the machine
+ * itself causes. Call before the device starts. */
 static ebpo_status play_empty(job *j, ebpo_error *error)
 {
     const values *v = j->v;
@@ -514,9 +525,9 @@ static ebpo_status play_empty(job *j, ebpo_error *error)
                                 .seconds = step_count ? (double)step_count / v->rate / 10
                                                       : v->seconds / 10 };
     request_real_time();
-    bool fine = haptic_play_run(&empty, &j->empty);
-    end_real_time(); /* the loading thread, which is created next, has normal scheduling as well */
-    return fine ? EBPO_OK : no_memory(error, "the times of steps");
+    bool played = haptic_play_run(&empty, &j->empty);
+    end_real_time(); /* so that the loading thread, which is created next, has normal scheduling */
+    return played ? EBPO_OK : no_memory(error, "the times of steps");
 }
 
 static ebpo_status play_device(job *j, ebpo_error *error)
@@ -540,10 +551,11 @@ static ebpo_status play_device(job *j, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Writes the recorded positions in the format that --path reads, with all bits of each number. */
+/* Writes the recorded positions in the format that --path reads. Each number has enough digits to
+ * restore all its bits. */
 static ebpo_status write_record(const job *j, ebpo_error *error)
 {
-    enum { LINE = 7 * (NUMBER_CAPACITY + 1) };
+    enum { LINE = 7 * (NUMBER_CAPACITY + 1) }; /* maximum length of a line: 7 numbers */
     char *text = malloc(j->times.step_count * LINE + 1), *at = text;
     if (!text)
         return no_memory(error, "the text of the record");
@@ -631,10 +643,10 @@ static int run_haptic(void *given, const char **operand)
     int code = check_values(v, &memory);
     if (code != 0 || overwrites_input(v, operand[0]))
         return EXIT_USAGE;
-    bool fine = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
-                (!v->path || haptic_path_open(&j.device, v->path)) &&
-                (!v->device || haptic_udp_open(&j.device, v->device));
-    code = fine ? run_job(&j, memory) : EXIT_FAILED;
+    bool prepared = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
+                    (!v->path || haptic_path_open(&j.device, v->path)) &&
+                    (!v->device || haptic_udp_open(&j.device, v->device));
+    code = prepared ? run_job(&j, memory) : EXIT_FAILED;
     ebpo_haptic_free(j.haptic);
     ebpo_model_free(j.model);
     ebpo_close(j.file);

@@ -23,11 +23,11 @@ static const values standard = { .remote = REMOTE_VALUES_INIT };
 static ebpo_status plan_memory(const ebpo_file *file, const values *v, ebpo_model_plan *out,
                                ebpo_error *error)
 {
-    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
     if (!v->memory)
         return EBPO_OK;
-    (void)words_read_size(v->memory, &how.memory); /* run has checked it */
-    return ebpo_model_memory(file, &how, out, error);
+    (void)words_read_size(v->memory, &model_options.memory); /* run_info has checked the text */
+    return ebpo_model_memory(file, &model_options, out, error);
 }
 
 static void print_words(const values *v, const char *path, const ebpo_file *file,

@@ -11,10 +11,10 @@
 static ebpo_status compute_inside(const query_job *job, query_worker *w, const double *rows,
                                   uint64_t count, ebpo_error *error)
 {
-    ebpo_catalogue_query_options how = query_catalogue_options(job);
+    ebpo_catalogue_query_options catalogue_options = query_catalogue_options(job);
     return job->catalogue
-               ? ebpo_catalogue_inside(job->catalogue, job->models, rows, count, &how, w->results,
-                                       error)
+               ? ebpo_catalogue_inside(job->catalogue, job->models, rows, count, &catalogue_options,
+                                       w->results, error)
                : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
 }
 

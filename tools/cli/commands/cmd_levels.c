@@ -30,11 +30,12 @@ typedef struct values {
 typedef struct printer {
     const values *v;
     const ebpo_info *info;
-    double begin;
-    json j;
+    double begin; /* when the file was opened, see progress_now */
+    json j;       /* used with --json */
 } printer;
 
-/* Returns a volume divided by the volume of the last level, which is 0 for a flat surface. */
+/* Returns a volume in percent of the last level's volume, or 100 if the last level's volume is 0,
+ * as that of a flat surface. NAN: not known. */
 static double volume_share(const printer *p, double volume)
 {
     double last = facts_volume(p->info, p->info->level_count - 1);
@@ -114,10 +115,11 @@ static ebpo_status report_nodes(printer *p, ebpo_stream *stream, ebpo_error *err
 {
     ebpo_stream_node node;
     ebpo_status status;
-    bool more = true;
+    bool has_more = true;
     if (p->v->json)
         json_array(&p->j, "nodes");
-    while ((status = ebpo_stream_next_node(stream, &node, &more, error)) == EBPO_OK && more) {
+    while ((status = ebpo_stream_next_node(stream, &node, &has_more, error)) == EBPO_OK &&
+           has_more) {
         if (p->v->json)
             json_node(&p->j, &node);
         else
@@ -130,17 +132,17 @@ static ebpo_status report_nodes(printer *p, ebpo_stream *stream, ebpo_error *err
 
 /* --- all levels --- */
 
-/* Prints all levels, and flushes the output after each level. If the output has been closed, stops
- * and sets *arrived to false. */
-static ebpo_status report_levels(printer *p, ebpo_stream *stream, int last, bool *arrived,
+/* Prints all levels, and flushes the output after each level. If the output cannot be written,
+ * stops and sets *accepted to false. */
+static ebpo_status report_levels(printer *p, ebpo_stream *stream, int last, bool *accepted,
                                  ebpo_error *error)
 {
     ebpo_stream_level level;
     ebpo_status status = EBPO_OK;
-    bool more = true;
-    for (int i = 0; i <= last && status == EBPO_OK && *arrived; i++) {
-        status = ebpo_stream_next_level(stream, &level, &more, error);
-        if (status != EBPO_OK || !more)
+    bool has_more = true;
+    for (int i = 0; i <= last && status == EBPO_OK && *accepted; i++) {
+        status = ebpo_stream_next_level(stream, &level, &has_more, error);
+        if (status != EBPO_OK || !has_more)
             break;
         double ms = (progress_now() - p->begin) * 1e3;
         if (p->v->json)
@@ -151,7 +153,7 @@ static ebpo_status report_levels(printer *p, ebpo_stream *stream, int last, bool
             status = report_nodes(p, stream, error);
         if (p->v->json)
             json_end(&p->j);
-        *arrived = command_flush("levels");
+        *accepted = command_flush("levels");
     }
     return status;
 }
@@ -168,16 +170,18 @@ static void print_head(const char *path, const ebpo_info *info)
 static void print_legend(const ebpo_info *info)
 {
     table_legend(stdout);
-    printf("volume: of the envelopes, in the model's unit%s%s cubed; %% last: percent of the last "
-           "level's volume;\nbytes: read for the level and those above; ms: since opening\n",
-           info->unit[0] ? " " : "", info->unit);
+    printf(
+        "volume: of the envelopes, in the model's unit%s%s cubed; %% last: percent of the last "
+        "level's volume;\nbytes: read for the level and the levels above it; ms: since opening\n",
+        info->unit[0] ? " " : "", info->unit);
     if (!isfinite(facts_volume(info, 0)))
         table_beyond(stdout);
 }
 
 /* --- the simplified surface --- */
 
-/* Prints the patches that make the picture of a level, as ebpo_surface_select. */
+/* Prints the count, the triangles and the error bound of `patches`, which ebpo_surface_select chose
+ * for a level. */
 static void print_patches(printer *p, const ebpo_surface *s, int level, const uint64_t *patches,
                           uint64_t count)
 {
@@ -201,6 +205,7 @@ static void print_patches(printer *p, const ebpo_surface *s, int level, const ui
     }
 }
 
+/* Returns the level of a node. The root, on level 0, has octcode 1; each level adds three bits. */
 static int level_of(uint64_t octcode)
 {
     int level = 0;
@@ -209,7 +214,8 @@ static int level_of(uint64_t octcode)
     return level;
 }
 
-static ebpo_status print_surface(printer *p, const ebpo_file *file, int to, ebpo_error *error)
+static ebpo_status print_surface(printer *p, const ebpo_file *file, int last_level,
+                                 ebpo_error *error)
 {
     ebpo_surface s;
     ebpo_status status = ebpo_file_read_patches(file, &s, error);
@@ -221,7 +227,7 @@ static ebpo_status print_surface(printer *p, const ebpo_file *file, int to, ebpo
     else
         puts("simplified surface; error: largest distance from the model, in its unit\n"
              "level   patches triangles        error");
-    for (int level = 0; level <= last && level <= to && status == EBPO_OK; level++) {
+    for (int level = 0; level <= last && level <= last_level && status == EBPO_OK; level++) {
         uint64_t *patches = NULL, count = 0;
         status = ebpo_surface_select(&s, level, &patches, &count, error);
         if (status == EBPO_OK)
@@ -234,15 +240,15 @@ static ebpo_status print_surface(printer *p, const ebpo_file *file, int to, ebpo
     return status;
 }
 
-static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, bool *arrived,
+static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, bool *accepted,
                                  ebpo_error *error)
 {
     int last = p->info->level_count - 1;
-    ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream_options stream_options = EBPO_STREAM_OPTIONS_INIT;
     ebpo_stream *stream = NULL;
-    wanted.planes = p->v->nodes;
-    wanted.threads = (unsigned)p->v->threads;
-    ebpo_status status = ebpo_stream_new(file, &wanted, &stream, error);
+    stream_options.planes = p->v->nodes;
+    stream_options.threads = (unsigned)p->v->threads;
+    ebpo_status status = ebpo_stream_new(file, &stream_options, &stream, error);
     if (status != EBPO_OK)
         return status;
     if (p->v->json) {
@@ -253,15 +259,15 @@ static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, 
     } else {
         print_head(remote_shown(path), p->info);
     }
-    int to = p->v->max_level >= 0 ? (int)p->v->max_level : last;
-    ebpo_stream_prefetch(stream, to);
-    status = report_levels(p, stream, to, arrived, error);
+    int last_level = p->v->max_level >= 0 ? (int)p->v->max_level : last;
+    ebpo_stream_prefetch(stream, last_level);
+    status = report_levels(p, stream, last_level, accepted, error);
     if (p->v->json)
         json_end(&p->j);
-    else if (status == EBPO_OK && *arrived)
+    else if (status == EBPO_OK && *accepted)
         print_legend(p->info);
-    if (status == EBPO_OK && *arrived && !p->v->nodes && p->info->parts & EBPO_PART_SURFACE)
-        status = print_surface(p, file, to, error);
+    if (status == EBPO_OK && *accepted && !p->v->nodes && p->info->parts & EBPO_PART_SURFACE)
+        status = print_surface(p, file, last_level, error);
     traffic t = traffic_of(file);
     if (p->v->json) {
         remote_json(&p->j, &t, &p->v->remote);
@@ -288,13 +294,13 @@ static int run_levels(void *given, const char **operand)
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
-    bool has_level = command_has_level("levels", p.info, v->max_level), arrived = true;
+    bool has_level = command_has_level("levels", p.info, v->max_level), accepted = true;
     ebpo_status status =
-        has_level ? stream_levels(&p, file, operand[0], &arrived, &error) : EBPO_OK;
+        has_level ? stream_levels(&p, file, operand[0], &accepted, &error) : EBPO_OK;
     ebpo_close(file);
     if (!has_level)
         return EXIT_USAGE;
-    if (!arrived)
+    if (!accepted)
         return EXIT_FAILED;
     return status == EBPO_OK ? EXIT_OK : command_failed("levels", &error);
 }

@@ -21,6 +21,8 @@
 
 /* --- the points of a plane or grid --- */
 
+/* Default number of points along the longer edge of a plane; and maximum number of points of a grid
+ * along an axis. */
 enum { LONGER_EDGE_POINTS = 1000, GRID_MAX = 1 << 20 };
 
 static int refuse_value(const char *option, const char *value, const char *expected)
@@ -30,14 +32,16 @@ static int refuse_value(const char *option, const char *value, const char *expec
 
 bool map_read_size(const char *text, int *width, int *height)
 {
-    char rest;
-    if (sscanf(text, "%5dx%5d%c", width, height, &rest) == 2 && *width >= 2 && *width <= 8192 &&
+    char extra;
+    if (sscanf(text, "%5dx%5d%c", width, height, &extra) == 2 && *width >= 2 && *width <= 8192 &&
         *height >= 2 && *height <= 8192)
         return true;
     refuse_value("--size", text, "a width, an x and a height, each from 2 to 8192");
     return false;
 }
 
+/* Sets the corners of the box: --box, or the box of the model with --margin. Returns an exit code.
+ */
 static int find_box(const map_job *j, double low[3], double high[3])
 {
     const ebpo_info *info = ebpo_file_info(j->file);
@@ -70,7 +74,8 @@ typedef struct rectangle {
     double corner[3], edge[2][3];
 } rectangle;
 
-/* Reads "z=0.5", a coordinate, or "z=50%", a share of the bounding box of the model. */
+/* Reads a plane across an axis: "z=0.5", a coordinate, or "z=50%", a share of the model's box.
+ * Returns false for other text. */
 static bool read_plane(const map_job *j, const char *text, int *axis, double *at)
 {
     const ebpo_info *info = ebpo_file_info(j->file);
@@ -88,8 +93,8 @@ static bool read_plane(const map_job *j, const char *text, int *axis, double *at
     return isfinite(*at);
 }
 
-/* Finds the rectangle of --plane. For planes across an axis, the edges to the right and up are x
- * and y, x and z, or y and z. */
+/* Finds the rectangle of --plane. Edge 0 points to the right in the picture, edge 1 up. For a plane
+ * across an axis, these are the other two axes in the order x, y, z. Returns an exit code. */
 static int find_rectangle(const map_job *j, rectangle *r)
 {
     double all[9], low[3], high[3], at;
@@ -123,6 +128,7 @@ static int find_rectangle(const map_job *j, rectangle *r)
     return EXIT_OK;
 }
 
+/* Sets the numbers of points along the edges of a plane, whose lengths are a and b. */
 static void find_points(const map_job *j, double a, double b, uint64_t count[3])
 {
     double longer = fmax(a, b);
@@ -187,10 +193,12 @@ static int map_find_lattice(map_job *j)
     return j->plane ? lattice_of_plane(j) : lattice_of_grid(j);
 }
 
-/* Pictures of distances: the points of a plane as pixels, or a painted mesh, with a legend. */
+/* --- pictures of distances: the points of a plane as pixels, or a painted mesh, with a legend ---
+ */
 
 #if EBPO_HAVE_PNG
 
+/* Sizes in pixels. */
 enum { LEGEND_WIDTH = 120, BAR_WIDTH = 24, EDGE_WIDTH = 16, LINE_HEIGHT = 18 };
 static const uint8_t white[3] = { 255, 255, 255 }, ink[3] = { 40, 44, 52 };
 
@@ -209,7 +217,8 @@ static void put_pixel(picture *p, int x, int y, const uint8_t rgb[3])
         to[c] = rgb[c];
 }
 
-/* Draws a bar of all colours, with numbers at its ends and in the middle. */
+/* Draws a bar of all colours, with numbers at its ends and in the middle. has_signs: the bar begins
+ * with negative distances, not with 0. */
 static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_signs,
                                ebpo_error *error)
 {
@@ -235,9 +244,8 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
     return status;
 }
 
-/* Returns true if the surface is at this pixel: the value is 0, or the sign changes between
- * neighbours.
- */
+/* Returns true if the surface is at this pixel: its value is 0, or has another sign than the value
+ * of the next pixel in x or y. */
 static bool on_surface(const double *values, int width, int height, int x, int y)
 {
     double value = values[(size_t)y * (size_t)width + (size_t)x];
@@ -248,12 +256,13 @@ static bool on_surface(const double *values, int width, int height, int x, int y
     return y + 1 < height && value * values[(size_t)(y + 1) * (size_t)width + (size_t)x] < 0;
 }
 
+/* Returns true if the colours show the signs of distances. */
 static bool has_signs(const map_job *j)
 {
     return j->v->palette == EBPO_MAP_DIVERGING && j->stats.min < 0;
 }
 
-/* Draws values[height][width], row 0 at the bottom, with a legend. */
+/* Draws the values of a plane, [height][width], with row 0 at the bottom, and a legend. */
 static ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
                                   ebpo_error *error)
 {
@@ -334,12 +343,14 @@ static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const 
 
 static ebpo_status no_memory(ebpo_error *error)
 {
-    snprintf(error->message, sizeof error->message, "no memory for the map; make it coarser");
+    snprintf(error->message, sizeof error->message,
+             "no memory for the distances; choose fewer points");
     return error->status = EBPO_E_MEMORY;
 }
 
 /* --- planes and grids --- */
 
+/* Copies the values of a plane. user: pointers to the job's pointer and to the copy. */
 static ebpo_status keep_layer(void *user, const double *values, uint64_t first, uint64_t layers,
                               ebpo_error *error)
 {
@@ -411,7 +422,7 @@ static ebpo_status read_source(const map_job *j, ebpo_progress progress, ebpo_me
     return status;
 }
 
-/* Converts coordinates of a mesh, which may be floats. */
+/* Returns the vertices of a mesh as doubles; NULL: there is not enough memory. */
 static double *points_of(const ebpo_mesh *m)
 {
     double *points = malloc((m->vertex_count + 1) * 3 * sizeof *points);
@@ -422,9 +433,9 @@ static double *points_of(const ebpo_mesh *m)
 
 static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, ebpo_error *error)
 {
-    if (j->range == 0)
+    if (j->range == 0) /* no --range: few distances are beyond this percentile */
         j->range = j->stats.percentile_unsigned[5];
-    if (!(j->range > 0)) /* only zeros */
+    if (!(j->range > 0))
         j->range = j->stats.farthest > 0 ? j->stats.farthest : 1;
     ebpo_status status =
         ebpo_map_paint(m, distances, (ebpo_map_palette)j->v->palette, j->range, error);
@@ -538,6 +549,7 @@ static int check_values(const map_values *v)
     return check_output(v);
 }
 
+/* Checks that outputs overwrite neither inputs nor each other. Returns an exit code. */
 static int check_outputs(const char *path, const map_values *v)
 {
     const char *outs[] = { v->out, v->picture }, *ins[] = { path, v->from };
@@ -650,14 +662,15 @@ static void report_map(const map_job *j)
 
 /* --- running --- */
 
-static ebpo_status open_model(map_job *j, uint64_t memory, bool given, ebpo_progress progress,
-                              ebpo_error *error)
+/* memory_given: `memory` is the value of --memory; otherwise a default is chosen. */
+static ebpo_status open_model(map_job *j, uint64_t memory, bool memory_given,
+                              ebpo_progress progress, ebpo_error *error)
 {
     ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
     o.memory = memory;
     o.threads = (unsigned)j->v->threads;
     o.progress = progress;
-    if (!given)
+    if (!memory_given)
         model_memory_default("map", j->file, j->path, &o);
     return ebpo_model_new(j->file, &o, &j->model, error);
 }

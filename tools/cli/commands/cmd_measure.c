@@ -27,12 +27,13 @@ typedef struct values {
 
 /* --- words --- */
 
-/* Requested measurements of levels; [level_count], or NULL. */
+/* Requested measurements. Arrays have an entry for each level; NULL: not requested. */
 typedef struct measures {
-    ebpo_solid_volume solid;
-    const double *derived; /* not NULL if `limit` is not NULL */
-    const ebpo_error_bound *error_bound;
-    const ebpo_limit *limit;
+    ebpo_solid_volume solid;             /* volume of the model */
+    const double *derived;               /* envelopes' volumes with derived planes of leaves; not
+                                          * NULL if `limit` is not NULL */
+    const ebpo_error_bound *error_bound; /* largest distances of envelopes from the model */
+    const ebpo_limit *limit;             /* volumes of convex hulls, the limit of envelopes */
 } measures;
 
 static void print_limit(const ebpo_info *info, const ebpo_solid_volume *solid, double volume,
@@ -123,13 +124,14 @@ static void print_volume(const ebpo_info *info, const ebpo_mass *mass)
                  "2-manifold");
 }
 
-/* Returns true if the file has an inside, so also a volume. */
+/* Returns true if the file defines which points are inside the model, and thus a volume. */
 static bool has_inside(const ebpo_info *info)
 {
     return info->solid || info->parts & EBPO_PART_BORDER;
 }
 
-/* Prints how much the integral and the centroid depend on the caps of a surface. */
+/* Prints how much the integral and the centroid depend on the caps: faces that close the holes of a
+ * surface, whose shape is a choice. */
 static void print_caps(const ebpo_info *info, const ebpo_mass *mass)
 {
     char unit[TABLE_CELL], share[TABLE_CELL];
@@ -249,21 +251,22 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
     json_end(j);
 }
 
-static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progress progress,
-                                  ebpo_error_bound *out, ebpo_error *error)
+/* Computes out[i], the error bound of level i. */
+static ebpo_status bound_levels(ebpo_file *file, const values *v, ebpo_progress progress,
+                                ebpo_error_bound *out, ebpo_error *error)
 {
     ebpo_model *model = NULL;
-    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_error_bound_options wanted = EBPO_ERROR_BOUND_OPTIONS_INIT;
-    opening.threads = wanted.threads = (unsigned)v->threads;
-    wanted.tolerance = v->tolerance;
-    wanted.queries = (uint64_t)v->queries;
-    wanted.progress = opening.progress = progress;
-    ebpo_status status = ebpo_model_new(file, &opening, &model, error);
+    ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_error_bound_options bound_options = EBPO_ERROR_BOUND_OPTIONS_INIT;
+    model_options.threads = bound_options.threads = (unsigned)v->threads;
+    bound_options.tolerance = v->tolerance;
+    bound_options.queries = (uint64_t)v->queries;
+    bound_options.progress = model_options.progress = progress;
+    ebpo_status status = ebpo_model_new(file, &model_options, &model, error);
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
         out[i] = (ebpo_error_bound)EBPO_ERROR_BOUND_INIT;
-        status = ebpo_level_error_bound(model, file, i, &wanted, &out[i], error);
-        wanted.at_most = out[i].hi;
+        status = ebpo_level_error_bound(model, file, i, &bound_options, &out[i], error);
+        bound_options.at_most = out[i].hi; /* envelopes of the next level lie within these */
     }
     ebpo_model_free(model);
     return status;
@@ -272,13 +275,13 @@ static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progres
 static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress progress,
                                 ebpo_limit *out, ebpo_error *error)
 {
-    ebpo_limit_options wanted = EBPO_LIMIT_OPTIONS_INIT;
-    wanted.threads = (unsigned)v->threads;
-    wanted.progress = progress;
+    ebpo_limit_options limit_options = EBPO_LIMIT_OPTIONS_INIT;
+    limit_options.threads = (unsigned)v->threads;
+    limit_options.progress = progress;
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
         out[i] = (ebpo_limit)EBPO_LIMIT_INIT;
-        status = ebpo_limit_level(file, i, &wanted, &out[i], error);
+        status = ebpo_limit_level(file, i, &limit_options, &out[i], error);
     }
     return status;
 }
@@ -294,12 +297,12 @@ static ebpo_status derive_levels(ebpo_file *file, const values *v, ebpo_progress
 
 static int measure_file(const char *path, const values *v)
 {
-    ebpo_error_bound levels[EBPO_LEVELS_MAX];
+    ebpo_error_bound bounds[EBPO_LEVELS_MAX];
     ebpo_limit limits[EBPO_LEVELS_MAX];
     double volumes[EBPO_LEVELS_MAX];
     bool derived = v->derived || v->limit;
     measures m = { .derived = derived ? volumes : NULL,
-                   .error_bound = v->error_bound ? levels : NULL,
+                   .error_bound = v->error_bound ? bounds : NULL,
                    .limit = v->limit ? limits : NULL };
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -319,7 +322,7 @@ static int measure_file(const char *path, const values *v)
     m.solid = facts_measured(ebpo_file_info(file), &mass);
     ebpo_progress progress = progress_start(&line, "measure", v->json);
     if (status == EBPO_OK && v->error_bound)
-        status = measure_levels(file, v, progress, levels, &error);
+        status = bound_levels(file, v, progress, bounds, &error);
     if (status == EBPO_OK && derived)
         status = derive_levels(file, v, progress, volumes, &error);
     if (status == EBPO_OK && v->limit)

@@ -62,8 +62,8 @@ static bool fail_line(const paint_values *v, uint64_t line, const char *what)
     return false;
 }
 
-/* Sets *out to the position of the pen in a line. Returns NULL, or an error. number: index of the
- * position. */
+/* Sets *out to the position of the pen in a line of `count` numbers. Returns NULL, or a text that
+ * says what is wrong. number: index of the position. */
 static const char *set_input(const paint_values *v, const double *row, int count, uint64_t number,
                              ebpo_paint_input *out)
 {
@@ -79,14 +79,15 @@ static const char *set_input(const paint_values *v, const double *row, int count
                : "the time is not from 0 to 2^32 - 1 milliseconds, which are 49 days";
 }
 
+/* Reads a path from `in`. Returns false after an error, which was reported. */
 static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **input, uint64_t *count)
 {
     char *line = NULL;
     size_t space = 0;
     uint64_t number = 0, capacity = 0;
-    const char *wrong = NULL;
+    const char *problem = NULL;
     ssize_t length;
-    while (!wrong && (length = getline(&line, &space, in)) >= 0) {
+    while (!problem && (length = getline(&line, &space, in)) >= 0) {
         double row[5];
         const char *text = number++ ? line : number_skip_mark(line);
         int found = strlen(line) == (size_t)length ? read_numbers(text, row, 5) : -1;
@@ -95,16 +96,16 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **input
         if (*count == capacity) {
             capacity = capacity ? 2 * capacity : 1024;
             ebpo_paint_input *more = realloc(*input, capacity * sizeof *more);
-            wrong = more ? NULL : "not enough memory";
+            problem = more ? NULL : "not enough memory";
             *input = more ? more : *input;
         }
-        if (!wrong)
-            wrong = set_input(v, row, found, *count, &(*input)[*count]);
-        *count += !wrong;
+        if (!problem)
+            problem = set_input(v, row, found, *count, &(*input)[*count]);
+        *count += !problem;
     }
     free(line);
-    if (wrong)
-        return fail_line(v, number, wrong);
+    if (problem)
+        return fail_line(v, number, problem);
     if (ferror(in))
         return fail_line(v, number + 1, strerror(errno));
     if (*count == 0)
@@ -124,10 +125,10 @@ static bool paint_read_path(const paint_values *v, ebpo_paint_input **input, uin
         fprintf(stderr, "ebpo paint: %s: cannot be opened: %s\n", v->path, strerror(errno));
         return false;
     }
-    bool fine = read_lines(v, in, input, count);
+    bool complete = read_lines(v, in, input, count);
     if (!standard)
         fclose(in);
-    return fine;
+    return complete;
 }
 
 /* --- changes --- */
@@ -268,8 +269,8 @@ static ebpo_status draw_stroke(paint_job *j, const ebpo_paint_input *input, uint
                ? status
                : fail_paint(
                      error, EBPO_E_ARGUMENT,
-                     "the pen was nowhere on the surface: give a greater --within or a path that "
-                     "is closer");
+                     "the pen was nowhere on the surface: give a greater --within, or a path that "
+                     "is closer to the surface");
 }
 
 static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
@@ -288,7 +289,8 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
     return status;
 }
 
-/* Applies the requested change, and saves the paint. */
+/* Applies the requested change, and saves the paint. input: positions of --path; NULL: no --path.
+ */
 static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uint64_t count,
                                 ebpo_error *error)
 {
@@ -297,7 +299,7 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uin
     if (v->new_layer)
         status = add_layer(j, error);
     else if (input || v->note)
-        ;
+        ; /* below, because a stroke can be combined with --new-layer */
     else if (v->undo)
         status = undo_strokes(j, error);
     else if (v->remove_stroke >= 0)
@@ -318,8 +320,8 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uin
 
 /* --- baking --- */
 
-/* Returns [vertex_count][4]: the colours of the model or, if it has none, the colour of --base.
- * Returns NULL if there is not enough memory. */
+/* Returns the colours of vertices before painting, [vertex_count][4]: the colours of the model or,
+ * if it has none, the colour of --base. Returns NULL after an error. */
 static uint8_t *base_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_colours colours;
@@ -331,7 +333,7 @@ static uint8_t *base_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *er
     uint8_t *rgba = colours.vertex;
     colours.vertex = NULL;
     ebpo_colours_free(&colours);
-    j->colours_of_own = rgba != NULL;
+    j->has_own_colours = rgba != NULL;
     if (rgba)
         return rgba;
     rgba = malloc(4 * mesh->vertex_count);
@@ -354,7 +356,7 @@ static ebpo_status write_baked(paint_job *j, ebpo_mesh *mesh, const uint8_t *rgb
     o.threads = (unsigned)j->v->threads;
     o.progress = j->progress;
     o.vertex_colours = rgba;
-    ebpo_mesh_free(mesh); /* the export reads it again */
+    ebpo_mesh_free(mesh); /* ebpo_export reads the mesh again */
     return ebpo_export(j->file, out,
                        words_end_with(out, ".glb")    ? EBPO_EXPORT_GLB
                        : words_end_with(out, ".gltf") ? EBPO_EXPORT_GLTF
@@ -411,7 +413,7 @@ static bool gives_layer_facts(const paint_values *v)
     return v->description || v->opacity >= 0 || v->show || v->hide;
 }
 
-/* Returns true if options set only facts of an existing layer. */
+/* Returns true if the command sets facts of an existing layer. */
 static bool sets_layer(const paint_values *v)
 {
     return !v->new_layer && !v->path && !v->note &&
@@ -502,6 +504,7 @@ static int check_values(const paint_values *v)
     return code == EXIT_OK ? check_texts(v) : code;
 }
 
+/* Returns true if the command computes positions on the model. */
 static bool needs_model(const paint_values *v) { return v->path || v->note || v->bake || v->area; }
 
 static int check_outputs(const paint_job *j)
@@ -522,16 +525,16 @@ static int check_outputs(const paint_job *j)
 /* Seconds to wait for other commands that change the same paint. */
 static const double LOCK_SECONDS = 600;
 
-/* Opens the paint; creates it if it does not exist and --new-layer is given. If the paint will be
- * changed, waits until other commands have changed it. */
+/* Opens the paint; makes a new paint if the file does not exist and --new-layer is given. If this
+ * command will change the file, waits until other commands that change it have ended. */
 static ebpo_status open_paint(paint_job *j, ebpo_error *error)
 {
     const paint_values *v = j->v;
     bool absent = access(j->paint_path, F_OK) != 0 && errno == ENOENT,
-         make = v->new_layer && j->file,
+         may_make = v->new_layer && j->file,
          in_place = changes_paint(v) && (!v->out || strcmp(v->out, j->paint_path) == 0 ||
                                          command_same_file(v->out, j->paint_path));
-    if (absent && !make) {
+    if (absent && !may_make) {
         *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
         snprintf(
             error->message, sizeof error->message,
@@ -541,7 +544,7 @@ static ebpo_status open_paint(paint_job *j, ebpo_error *error)
         return error->status;
     }
     if (in_place)
-        return ebpo_paint_open_to_change(j->paint_path, make ? j->file : NULL, LOCK_SECONDS,
+        return ebpo_paint_open_to_change(j->paint_path, may_make ? j->file : NULL, LOCK_SECONDS,
                                          &j->progress, &j->paint, error);
     return absent ? ebpo_paint_new(j->file, &j->paint, error)
                   : ebpo_paint_open(j->paint_path, &j->paint, error);
@@ -575,11 +578,11 @@ static ebpo_status run_steps(paint_job *j, const ebpo_paint_input *input, uint64
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
     j->changed = changes_paint(j->v);
     ebpo_paint_get_info(j->paint, &info);
-    bool check =
+    bool has_points_to_check =
         j->file && (info.point_count || info.note_count) && (j->changed || needs_model(j->v));
-    if (needs_model(j->v) || check)
+    if (needs_model(j->v) || has_points_to_check)
         status = open_model(j, memory, error);
-    if (status == EBPO_OK && check) /* checks all points, whatever is requested */
+    if (status == EBPO_OK && has_points_to_check)
         status = ebpo_paint_check_points(j->paint, j->context, &j->progress, error);
     if (status == EBPO_OK && j->changed)
         status = paint_change(j, input, count, error);

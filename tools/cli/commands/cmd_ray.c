@@ -9,23 +9,25 @@
 
 #include "cli/options/ray.inc"
 
-/* Rows are rays. */
-_Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "as points_parse fills them");
+/* The functions below read the rows of numbers from points_parse as structs. */
+_Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "a row is an ebpo_ray");
 
 static ebpo_status compute_all_hits(const query_job *job, query_worker *w, const ebpo_ray *rays,
-                                    uint64_t count, const ebpo_ray_options *how, ebpo_error *error)
+                                    uint64_t count, const ebpo_ray_options *ray_options,
+                                    ebpo_error *error)
 {
     const ebpo_ray_hit *hits;
     const uint64_t *begin;
-    ebpo_status status = ebpo_ray_all_many(w->context, rays, count, how, &hits, &begin, error);
+    ebpo_status status =
+        ebpo_ray_all_many(w->context, rays, count, ray_options, &hits, &begin, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK && !result_text_is_over(w->text); i++)
         results_ray_all(w->text, job->form, &rays[i], hits + begin[i], begin[i + 1] - begin[i],
                         job->sampler);
     return status;
 }
 
-/* Returns the indices of models in a catalogue; they are stored in w->results after the `count`
- * hits. */
+/* Returns where the index of the hit model is stored for each of `count` rays of a query in a
+ * catalogue: in w->results, after the hits. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_ray_hit *)w->results + count);
@@ -35,19 +37,19 @@ static ebpo_status compute_rays(const query_job *job, query_worker *w, const dou
                                 uint64_t count, ebpo_error *error)
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
-    ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
-    how.sides = (ebpo_ray_sides)job->values->ray_sides;
-    how.threads = 1; /* other threads query other rays */
+    ebpo_ray_options ray_options = EBPO_RAY_OPTIONS_INIT;
+    ray_options.sides = (ebpo_ray_sides)job->values->ray_sides;
+    ray_options.threads = 1; /* other threads query other rays */
     if (job->catalogue) {
-        ebpo_catalogue_query_options all = query_catalogue_options(job);
-        return ebpo_catalogue_ray(job->catalogue, job->models, rays, count, &all, w->results,
-                                  models_of(w, count), error);
+        ebpo_catalogue_query_options catalogue_options = query_catalogue_options(job);
+        return ebpo_catalogue_ray(job->catalogue, job->models, rays, count, &catalogue_options,
+                                  w->results, models_of(w, count), error);
     }
     if (job->values->all)
-        return compute_all_hits(job, w, rays, count, &how, error);
+        return compute_all_hits(job, w, rays, count, &ray_options, error);
     if (job->values->any)
-        return ebpo_ray_any_many(w->context, rays, count, &how, w->results, error);
-    return ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
+        return ebpo_ray_any_many(w->context, rays, count, &ray_options, w->results, error);
+    return ebpo_ray_first_many(w->context, rays, count, &ray_options, w->results, error);
 }
 
 static void print_rays(const query_job *job, query_worker *w, const double *rows, uint64_t count)

@@ -23,11 +23,11 @@
 /* --- readable parts of the file --- */
 
 typedef enum part_state {
-    NONE,
-    KEPT,
-    REBUILT,
-    LOST
-} part_state; /* NONE: the file has no such part */
+    NONE,    /* the file has no such part */
+    KEPT,    /* can be read, and is in the new file */
+    REBUILT, /* cannot be read, and is made again from the mesh or its source */
+    LOST     /* cannot be read, and is not in the new file */
+} part_state;
 
 typedef enum file_part { MESH, MAPS, ATTRIBUTES, LEVELS, CHECKSUMS, FILE_PARTS } file_part;
 
@@ -41,9 +41,8 @@ typedef struct recovery {
     ebpo_workspace *workspace;
     ebpo_progress progress;
     part_state part_state[FILE_PARTS];
-    char why[FILE_PARTS][sizeof((ebpo_error *)NULL)->message]; /* errors; "": none */
-    bool content_equal;                                        /* the new content equals the content
-                                                                * of the file */
+    char why[FILE_PARTS][sizeof((ebpo_error *)NULL)->message]; /* errors of reading; "": none */
+    bool content_equal; /* the content of the new file equals that of the damaged file */
 } recovery;
 
 /* Returns the options for reading parts. */
@@ -62,7 +61,8 @@ static bool is_damage(ebpo_status status)
            status == EBPO_E_ABSENT;
 }
 
-/* Records the result of reading a part. */
+/* Records the result of reading a part, with the error in `reported`. Fails with this error if the
+ * cause is not damage of the file. */
 static ebpo_status record_result(recovery *p, file_part which, ebpo_status status,
                                  const ebpo_error *reported, ebpo_error *error)
 {
@@ -94,8 +94,8 @@ static ebpo_status inspect_mesh(recovery *p, ebpo_error *error)
     return record_result(p, MAPS, status, &reported, error);
 }
 
-/* Checks that all attributes can be read with the mesh, which also reads the header that they
- * share. */
+/* Checks that the mesh can be read with its attributes, which also reads the header of all
+ * attributes. */
 static ebpo_status inspect_header(recovery *p, ebpo_error *error)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
@@ -138,10 +138,10 @@ static ebpo_status inspect_levels(recovery *p, ebpo_error *error)
     for (int l = 0; l < p->info->level_count && status == EBPO_OK; l++) {
         ebpo_level level;
         status = ebpo_file_read_level(p->file, l, &read, &level, &reported);
-        bool good = status == EBPO_OK;
-        if (good)
+        if (status == EBPO_OK)
             ebpo_level_free(&level);
-        status = good ? EBPO_OK : record_result(p, LEVELS, status, &reported, error);
+        else
+            status = record_result(p, LEVELS, status, &reported, error);
     }
     return status;
 }
@@ -161,8 +161,8 @@ static ebpo_status inspect_all(recovery *p, ebpo_error *error)
     return status == EBPO_OK ? inspect_levels(p, error) : status;
 }
 
-/* Opens the file without its list of chunk ends. Fails if its content does not match the checksum
- * in the header. */
+/* Opens the file without its lists of chunks, see unlisted.h. Fails if its content does not match
+ * the checksum in the header. */
 static ebpo_status open_unlisted(const recovery *p, ebpo_file **out, ebpo_error *error)
 {
     ebpo_read_options read = part_options(p);
@@ -170,9 +170,9 @@ static ebpo_status open_unlisted(const recovery *p, ebpo_file **out, ebpo_error 
     return status == EBPO_OK ? ebpo_file_check_content(*out, &read, error) : status;
 }
 
-/* Finds the readable parts. Without the list of chunk ends nothing can be read. If only this list
- * is damaged, the content that is read without the list matches the checksum in the header. This
- * proves that all content is intact, so all of it is kept. */
+/* Finds the readable parts. If the list of chunk checksums is damaged, nothing can be read with the
+ * list. Then reads the file without the list; if its content matches the checksum in the header,
+ * all content is intact, and is kept. */
 static ebpo_status inspect_file(recovery *p, ebpo_error *error)
 {
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
@@ -218,7 +218,7 @@ static const char *const state_words[] = { "none", "kept", "rebuilt", "lost" };
 static const char *const file_part_words[] = { "mesh", "maps", "attributes", "levels",
                                                "checksums" };
 
-/* --- the mesh to build from --- */
+/* --- the mesh from which the new file is built --- */
 
 typedef struct rebuilt_mesh {
     ebpo_mesh mesh;
@@ -234,8 +234,8 @@ static int compare_indices(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the source indices of a map, ascending. */
-static uint32_t *sorted_numbers(const uint32_t *map, uint64_t count)
+/* Returns the source indices of a map, ascending; NULL: there is not enough memory. */
+static uint32_t *sorted_indices(const uint32_t *map, uint64_t count)
 {
     uint32_t *out = malloc(count * sizeof *out);
     if (!out)
@@ -245,8 +245,8 @@ static uint32_t *sorted_numbers(const uint32_t *map, uint64_t count)
     return out;
 }
 
-/* Sets the source indices if vertices were welded or faces dropped: then there are gaps in the
- * source indices, which the mesh does not show. */
+/* Sets the source indices if vertices were welded or faces dropped when the file was made: source
+ * indices then have gaps, which the mesh alone does not show. */
 static ebpo_status set_source_indices(const recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
     const ebpo_repair_record *m = &p->info->repair_record;
@@ -257,8 +257,8 @@ static ebpo_status set_source_indices(const recovery *p, rebuilt_mesh *r, ebpo_e
     ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
     if (status != EBPO_OK)
         return status;
-    r->vertex_source = sorted_numbers(maps.vertex_source, p->info->vertex_count);
-    r->face_source = sorted_numbers(maps.face_source, p->info->face_count);
+    r->vertex_source = sorted_indices(maps.vertex_source, p->info->vertex_count);
+    r->face_source = sorted_indices(maps.face_source, p->info->face_count);
     ebpo_maps_free(&maps);
     if (r->vertex_source && r->face_source)
         return EBPO_OK;
@@ -375,6 +375,7 @@ static ebpo_status make_file(const recovery *p, rebuilt_mesh *r, ebpo_error *err
     return status;
 }
 
+/* Compares the new file with the damaged file, and corrects the states of its parts. */
 static ebpo_status compare_content(recovery *p, ebpo_error *error)
 {
     ebpo_file *made;
@@ -383,7 +384,7 @@ static ebpo_status compare_content(recovery *p, ebpo_error *error)
         return status;
     p->content_equal = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
                               sizeof p->info->content_sha256) == 0;
-    /* levels that were read without an error are kept only if the new content equals the old one */
+    /* readable levels count as kept only if the new content equals the old content */
     if (p->part_state[LEVELS] == LOST || !p->content_equal)
         p->part_state[LEVELS] = REBUILT;
     if (p->v->source && !textures_same(p->file, made)) {
@@ -395,10 +396,9 @@ static ebpo_status compare_content(recovery *p, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status refuse_repair(const recovery *p, const char *why, ebpo_error *error)
+static ebpo_status refuse_repair(const char *why, ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message, "%s", why);
-    (void)p;
     return error->status = EBPO_E_ABSENT;
 }
 
@@ -410,29 +410,25 @@ static ebpo_status refuse_mesh(const recovery *p, ebpo_error *error)
              "the mesh of the file cannot be read, and all other data is built from it; give the "
              "mesh that the file was made from with --source (%.300s)",
              p->why[MESH]);
-    return refuse_repair(p, why, error);
+    return refuse_repair(why, error);
 }
 
 static ebpo_status repair_file(recovery *p, ebpo_error *error)
 {
     rebuilt_mesh r = { .vertex_source = NULL };
     if (p->info->pruned)
-        return refuse_repair(
-            p,
-            "the file is a subset: omitted parts cannot be rebuilt; make another subset of the "
-            "original",
-            error);
+        return refuse_repair("the file is a subset: omitted parts cannot be rebuilt; make another "
+                             "subset of the original file",
+                             error);
     ebpo_status status = inspect_file(p, error);
     if (status != EBPO_OK)
         return status;
     if (!p->v->source && p->part_state[MESH] == LOST)
         return refuse_mesh(p, error);
     if (!p->v->source && p->part_state[MESH] != KEPT)
-        return refuse_repair(
-            p,
-            "the file has no mesh to rebuild from; give the mesh that the file was made from "
-            "with --source",
-            error);
+        return refuse_repair("the file has no mesh to rebuild from; give the mesh that the file "
+                             "was made from with --source",
+                             error);
     status = p->v->source ? read_source_mesh(p, &r, error) : read_file_mesh(p, &r, error);
     if (status == EBPO_OK)
         status = make_file(p, &r, error);
@@ -479,8 +475,8 @@ static void print_json(const recovery *p, const char *in)
     json_finish(&j);
 }
 
-/* Returns the exit code. If the maps of the file are lost, the content always differs, which is no
- * error. */
+/* Returns the exit code. If the maps (source indices) of the file are lost, the content always
+ * differs, which is no error. */
 static int exit_code_of(const recovery *p)
 {
     return p->content_equal || p->part_state[MAPS] == LOST ? EXIT_OK : EXIT_DIFFERS;
@@ -496,8 +492,8 @@ static int run_recover(void *given, const char **operand)
                    .path = operand[0],
                    .threads = (unsigned)v->threads,
                    .max_expansion = (uint64_t)v->max_expansion };
-    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
-    how.max_expansion = (uint64_t)v->max_expansion;
+    ebpo_open_options open_options = EBPO_OPEN_OPTIONS_INIT;
+    open_options.max_expansion = (uint64_t)v->max_expansion;
     ebpo_error error = EBPO_ERROR_INIT;
     if (!v->out)
         return command_usage("recover", "name the new file with --output");
@@ -510,7 +506,7 @@ static int run_recover(void *given, const char **operand)
     if (status == EBPO_OK)
         status = memory_new(&p.workspace, &v->memory, &error);
     if (status == EBPO_OK)
-        status = ebpo_open_with(operand[0], &how, &p.file, &error);
+        status = ebpo_open_with(operand[0], &open_options, &p.file, &error);
     if (status == EBPO_OK) {
         p.info = ebpo_file_info(p.file);
         status = repair_file(&p, &error);

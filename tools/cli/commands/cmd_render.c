@@ -24,6 +24,8 @@
 #include "cli/render/picture.h"
 #include "cli/render/raster.h"
 
+/* TILES_MAX: pictures side by side. MESH: stands for the mesh instead of a level. SIDE_MAX: maximum
+ * width and height in pixels. */
 enum { TILES_MAX = 24, MESH = -1, SIDE_MAX = 8192 };
 
 typedef struct values {
@@ -40,27 +42,28 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 
 #if EBPO_HAVE_PNG
 
+/* One of the pictures side by side. */
 typedef struct tile {
-    int level; /* or MESH */
-    bool optional;
-    uint64_t face_count;
+    int level;           /* or MESH */
+    bool optional;       /* omit the tile if the file does not have the level */
+    uint64_t face_count; /* set when the mesh is freed */
     ebpo_mesh mesh;
-    ebpo_colours colours; /* colours of the model, if any */
-    float *normals;       /* normals of a level for lighting, by triangle */
-    float *vertex_normals;
-    bool closed;
+    ebpo_colours colours;  /* colours of the model, if it has colours */
+    float *normals;        /* of the triangles of a level, for lighting; or NULL */
+    float *vertex_normals; /* or NULL */
+    bool closed;           /* only front sides of faces are visible */
     char caption[64];
 } tile;
 
 typedef struct job {
     values v;
     const char *in, *out;
-    double azimuth, elevation;
-    int width, height;
+    double azimuth, elevation; /* degrees */
+    int width, height;         /* pixels */
     tile tiles[TILES_MAX];
     int tile_count;
-    bool from_file; /* an .ebpo.h5 file, not a mesh */
-    traffic read;   /* traffic of the file */
+    bool from_file; /* the input is an .ebpo.h5 file, not a mesh */
+    traffic read;   /* if from_file: traffic of the file */
 } job;
 
 /* --- arguments --- */
@@ -70,6 +73,7 @@ static int usage_error(const char *what, const char *value, const char *expected
     return command_usage("render", "%s: '%s' is not %s", what, value, expected);
 }
 
+/* Returns false if there are too many tiles. */
 static bool add_tile(job *j, int level, bool optional)
 {
     if (j->tile_count < TILES_MAX) {
@@ -92,7 +96,7 @@ static bool add_levels(job *j, const char *text)
     return true;
 }
 
-/* Adds levels in the order of the command line. */
+/* Adds the tiles of --levels, in its order. Returns false for invalid text. */
 static bool parse_levels(job *j)
 {
     for (const char *at = j->v.levels;; at++) {
@@ -112,15 +116,15 @@ static bool parse_levels(job *j)
 
 static int parse_values(job *j)
 {
-    char rest;
+    char extra;
     const values *v = &j->v;
     if ((v->level >= 0) + v->mesh + (v->levels != NULL) > 1)
         return command_usage("render", "--level, --levels and --mesh cannot be used together");
-    if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 ||
+    if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &extra) != 2 ||
         !(j->azimuth >= -360 && j->azimuth <= 360) || !(j->elevation >= -90 && j->elevation <= 90))
         return usage_error("--view", v->view,
                            "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
-    if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &rest) != 2 || j->width < 16 ||
+    if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &extra) != 2 || j->width < 16 ||
         j->width > SIDE_MAX || j->height < 16 || j->height > SIDE_MAX)
         return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
     if (v->levels && !parse_levels(j))
@@ -175,9 +179,8 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     }
     if (j->v.surface)
         return load_surface(t, file, error);
-    ebpo_lod_options lod =
-        /* with cell faces, which close the envelopes; cell faces inside the model are invisible */
-        EBPO_LOD_OPTIONS_INIT;
+    /* the defaults include cell faces, which close the envelopes */
+    ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
     lod.threads = threads;
     lod.progress = progress;
     t->closed = true;
@@ -263,11 +266,11 @@ static void paint_background(picture *p)
  * into the picture. */
 static const tile *coarsest_tile(const job *j)
 {
-    const tile *best = &j->tiles[0];
+    const tile *coarsest = &j->tiles[0];
     for (int i = 1; i < j->tile_count; i++)
-        if ((unsigned)j->tiles[i].level < (unsigned)best->level)
-            best = &j->tiles[i];
-    return best;
+        if ((unsigned)j->tiles[i].level < (unsigned)coarsest->level) /* MESH is the last */
+            coarsest = &j->tiles[i];
+    return coarsest;
 }
 
 static unsigned thread_count(const job *j)
@@ -280,6 +283,7 @@ static int caption_height(const job *j, int width)
     return j->v.levels && picture_has_captions() ? 14 * (1 + width / 240) : 0;
 }
 
+/* Draws a tile into the rectangle at[] of the picture: left, top, width, height. */
 static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view,
                              const int at[4], ebpo_error *error)
 {
@@ -311,7 +315,7 @@ static ebpo_status draw_tiles(const job *j, picture *p, ebpo_error *error)
     int caption = caption_height(j, width);
     ebpo_status status = EBPO_OK;
     camera view;
-    const tile *first = coarsest_tile(j);
+    const tile *coarsest = coarsest_tile(j);
     if (height <= caption) {
         snprintf(error->message, sizeof error->message,
                  "--size %s is too small for %d tiles; choose a larger size", j->v.size,
@@ -319,8 +323,9 @@ static ebpo_status draw_tiles(const job *j, picture *p, ebpo_error *error)
         return error->status = EBPO_E_ARGUMENT;
     }
     paint_background(p);
-    if (first->mesh.face_count)
-        camera_fit(&view, &first->mesh, j->azimuth, j->elevation, j->v.up, width, height - caption);
+    if (coarsest->mesh.face_count)
+        camera_fit(&view, &coarsest->mesh, j->azimuth, j->elevation, j->v.up, width,
+                   height - caption);
     for (int i = 0; i < j->tile_count && status == EBPO_OK; i++) {
         int at[4] = { i % columns * width, i / columns * height, width, height };
         if (j->tiles[i].mesh.face_count)

@@ -15,7 +15,7 @@
 
 typedef struct values {
     const char *subtree_faces, *parts;
-    int codec; /* -1: none given */
+    int codec; /* -1: not given */
     int face_coding;
     int64_t zstd_level, threads;
     memory_values memory;
@@ -40,7 +40,9 @@ static int check_values(const values *v, ebpo_write_options *write)
     return EXIT_OK;
 }
 
-/* Chooses the codec when the codec of the file is kept. */
+/* Sets the codec: that of --codec, otherwise that of the file. Fails if --zstd-level does not
+ * apply.
+ */
 static ebpo_status choose_codec(const values *v, const ebpo_info *info, ebpo_write_options *write,
                                 ebpo_error *error)
 {
@@ -142,7 +144,8 @@ static int run_repack(void *given, const char **operand)
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
     code = status == EBPO_OK ? EXIT_OK : command_failed("repack", &error);
-    /* an error that names the output file: this build cannot write the file at all */
+    /* EBPO_E_UNSUPPORTED: the content would differ. But if the error names the output file, this
+     * build cannot write such a file at all. */
     bool differs = written == EBPO_E_UNSUPPORTED && strcmp(error.file, operand[1]) != 0;
     return differs ? EXIT_DIFFERS : code;
 }

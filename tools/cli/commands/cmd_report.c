@@ -25,8 +25,8 @@ static int refuse_value(const char *option, const char *value, const char *expec
 
 /* --- options --- */
 
-/* Reads the next item of a comma-separated list; returns false when there is none, or it is too
- * long. */
+/* Reads the next item of a comma-separated list. Returns false if the list has ended or the item is
+ * too long. */
 static bool next_word(const char **at, char *word, size_t capacity)
 {
     size_t length = strcspn(*at, ",");
@@ -38,6 +38,7 @@ static bool next_word(const char **at, char *word, size_t capacity)
     return true;
 }
 
+/* Adds a setting: an item of --percent or --k-root. Returns an exit code. */
 static int add_setting(comparison *c, const report_values *v, const char *word)
 {
     char *end;
@@ -48,8 +49,8 @@ static int add_setting(comparison *c, const report_values *v, const char *word)
     if (!v->percent)
         snprintf(s->k_root, sizeof s->k_root, "%s", word);
     snprintf(s->word, sizeof s->word, v->percent ? "-%s%%" : "-K%s", word);
-    for (const plane_setting *other = c->setting; other < s; other++)
-        if (strcmp(other->word, s->word) == 0)
+    for (const plane_setting *earlier = c->setting; earlier < s; earlier++)
+        if (strcmp(earlier->word, s->word) == 0)
             return command_usage("report", "%s: '%s' is given twice; give each number once",
                                  v->percent ? "--percent" : "--k-root", word);
     selection_options chosen = { v->select,  v->percent ? s->percent : -1,
@@ -58,7 +59,8 @@ static int add_setting(comparison *c, const report_values *v, const char *word)
     return selection_check("report", &chosen);
 }
 
-/* Reads --percent or --k-root, the numbers of planes for the selections of the theses. */
+/* Reads --percent or --k-root, the numbers of planes for the selections of the theses. Returns an
+ * exit code. */
 static int read_settings(comparison *c, const report_values *v)
 {
     const char *list = v->percent ? v->percent : v->k_root;
@@ -79,21 +81,21 @@ static int read_settings(comparison *c, const report_values *v)
     }
     if (c->settings == 0)
         return refuse_value(v->percent ? "--percent" : "--k-root", list, "a number");
-    if (c->settings == 1)
+    if (c->settings == 1) /* names of methods do not need the only number */
         c->setting[0].word[0] = 0;
     return code;
 }
 
 static int read_options(comparison *c, report_values *v, bool mesh)
 {
-    char rest;
+    char extra;
     word_levels levels = { .last = EBPO_LEVELS_MAX - 1, .is_contiguous = true };
     if (v->levels && (!words_read_levels(v->levels, &levels) || !levels.is_contiguous))
         return refuse_value("--levels", v->levels,
                             "one level or a first and a last one, such as 0-6 or 3-");
     c->first = levels.first;
     c->last = levels.last;
-    if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 ||
+    if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &extra) != 2 ||
         !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
         return refuse_value(
             "--view", v->view,
@@ -124,6 +126,7 @@ static int read_options(comparison *c, report_values *v, bool mesh)
 
 /* --- output --- */
 
+/* Writes a file to the temporary folder. */
 static ebpo_status write_one(const comparison *c, const char *name,
                              void (*write)(FILE *, const comparison *), ebpo_error *error)
 {
@@ -158,6 +161,7 @@ static ebpo_status write_all(const comparison *c, ebpo_error *error)
     return status;
 }
 
+/* Removes the .ebpo.h5 files that this command has built, unless --keep was given. */
 static void remove_built(const comparison *c)
 {
     for (int i = 0; i < c->count && !c->v->keep; i++)
@@ -165,13 +169,13 @@ static void remove_built(const comparison *c)
             remove(c->methods[i].path);
 }
 
-static void print_summary(const comparison *c, const char *place)
+static void print_summary(const comparison *c, const char *folder)
 {
-    printf("%s: ", place);
+    printf("%s: ", folder);
     for (int i = 0; i < c->count; i++)
         printf("%s%s", i ? ", " : "", c->methods[i].name);
     printf("; levels %d to %d; %s/%sreport.csv, report.json in %.0f s\n", c->first,
-           comparison_last(c), place, report_page_missing() ? "" : "report.html, ", c->seconds);
+           comparison_last(c), folder, report_page_missing() ? "" : "report.html, ", c->seconds);
     for (int i = 0; i < c->count; i++)
         for (int k = 0; k < c->methods[i].note_count; k++)
             printf("  %s: %s\n", c->methods[i].name, c->methods[i].note[k]);
@@ -196,7 +200,7 @@ static ebpo_status measure_methods(comparison *c, ebpo_error *error)
     return status;
 }
 
-static int make_report(comparison *c, const char *const *operand, const char *place,
+static int make_report(comparison *c, const char *const *operand, const char *folder,
                        progress_line *line)
 {
     double begun = progress_now();
@@ -212,7 +216,7 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
     if (status != EBPO_OK)
         return command_failed("report", &error);
     remove_built(c);
-    if (!output_commit(place, c->folder))
+    if (!output_commit(folder, c->folder))
         return EXIT_FAILED;
     c->folder[0] = 0;
     if (report_page_missing())
@@ -221,7 +225,7 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
     if (c->v->json)
         report_to_json(stdout, c, false);
     else if (!c->v->quiet)
-        print_summary(c, place);
+        print_summary(c, folder);
     return EXIT_OK;
 }
 
@@ -256,15 +260,15 @@ static int run_report(void *given, const char **operand)
     if (code != EXIT_OK)
         return code;
     default_folder(operand[0], named_after_input, sizeof named_after_input);
-    const char *place = v->out ? v->out : named_after_input;
-    code = output_begin(place, operand, c.folder, sizeof c.folder);
+    const char *folder = v->out ? v->out : named_after_input;
+    code = output_begin(folder, operand, c.folder, sizeof c.folder);
     if (code != EXIT_OK)
         return code;
     progress_line line;
     c.progress = progress_start(&line, "report", v->quiet);
     c.methods = calloc(METHODS_MAX, sizeof *c.methods);
     if (c.methods) {
-        code = make_report(&c, operand, place, &line);
+        code = make_report(&c, operand, folder, &line);
     } else {
         code = command_no_memory("report");
     }

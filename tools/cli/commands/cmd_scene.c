@@ -15,9 +15,10 @@
 
 /* --- contents, boxes and pairs --- */
 
-/* Totals: bytes and faces of files, each file once; and faces of all instances. */
+/* Totals of a scene. */
 typedef struct scene_sums {
-    uint64_t bytes, faces, posed_faces;
+    uint64_t bytes, faces; /* of the files; a file that several models use counts once */
+    uint64_t posed_faces;  /* of all instances */
 } scene_sums;
 
 static scene_sums sum_models(const ebpo_scene *scene, uint64_t models)
@@ -27,11 +28,11 @@ static scene_sums sum_models(const ebpo_scene *scene, uint64_t models)
         ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
         const ebpo_file *file = ebpo_scene_file(scene, i);
         (void)ebpo_scene_get_model_facts(scene, i, &m);
-        bool first = true;
-        for (uint64_t k = 0; k < i && first; k++)
-            first = ebpo_scene_file(scene, k) != file;
-        s.bytes += first ? ebpo_file_info(file)->file_bytes : 0;
-        s.faces += first ? ebpo_file_info(file)->face_count : 0;
+        bool is_new_file = true;
+        for (uint64_t k = 0; k < i && is_new_file; k++)
+            is_new_file = ebpo_scene_file(scene, k) != file;
+        s.bytes += is_new_file ? ebpo_file_info(file)->file_bytes : 0;
+        s.faces += is_new_file ? ebpo_file_info(file)->face_count : 0;
         s.posed_faces += ebpo_file_info(file)->face_count * m.instances;
     }
     return s;
@@ -125,8 +126,8 @@ static ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scen
     return status;
 }
 
-/* Checks the checksums of all models, and reports that the scene is valid. Its other properties
- * were checked when it was opened. */
+/* Checks the checksums of all models, and reports that the scene is valid. Other properties were
+ * checked when the scene was opened. */
 static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
                                ebpo_error *error)
 {
@@ -226,14 +227,17 @@ static ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_sce
 
 /* --- approaches: times when instances first come near each other, or least distances --- */
 
-typedef struct listing {
+/* State while pairs of instances are printed. */
+typedef struct pair_list {
     const scene_values *v;
     const ebpo_scene *scene;
-    json j;
-    uint64_t reached, undecided, evaluations, approaches;
-} listing;
+    json j;                      /* used with --json */
+    uint64_t reached, undecided; /* numbers of pairs that come near, and of undecided pairs */
+    uint64_t evaluations;        /* number of times at which distances were computed */
+    uint64_t approaches;         /* number of pairs */
+} pair_list;
 
-static const char *name_of(const listing *l, uint64_t instance)
+static const char *name_of(const pair_list *l, uint64_t instance)
 {
     ebpo_scene_instance i = EBPO_SCENE_INSTANCE_INIT;
     (void)ebpo_scene_get_instance(l->scene, instance, &i);
@@ -245,7 +249,7 @@ static const char *word_of(const ebpo_scene_approach_result *result)
     return result->reached > 0 ? "reached" : result->reached == 0 ? "apart" : "undecided";
 }
 
-static void approach_json(listing *l, const ebpo_scene_approach_result *result)
+static void approach_json(pair_list *l, const ebpo_scene_approach_result *result)
 {
     json *j = &l->j;
     json_object(j, NULL);
@@ -261,7 +265,7 @@ static void approach_json(listing *l, const ebpo_scene_approach_result *result)
 }
 
 /* Prints an approach in one line, with all digits of the bounds. */
-static void print_approach(const listing *l, const ebpo_scene_approach_result *result)
+static void print_approach(const pair_list *l, const ebpo_scene_approach_result *result)
 {
     char time[32], lo[32], hi[32];
     printf("%s\t%s\t%s\t%s\t", words_real(result->time, time), word_of(result),
@@ -274,7 +278,7 @@ static void print_approach(const listing *l, const ebpo_scene_approach_result *r
 static bool print_approaches(void *user, const ebpo_scene_approach_result *approaches,
                              uint64_t count)
 {
-    listing *l = user;
+    pair_list *l = user;
     l->approaches += count;
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_scene_approach_result *result = &approaches[i];
@@ -291,12 +295,12 @@ static bool print_approaches(void *user, const ebpo_scene_approach_result *appro
 
 /* Returns true if the interval is wider than requested, because of the limit of evaluations or of
  * missing data of files. */
-static bool is_undecided(const listing *l, const ebpo_scene_least *result)
+static bool is_undecided(const pair_list *l, const ebpo_scene_least *result)
 {
     return result->hi - result->lo > l->v->tolerance;
 }
 
-static void least_json(listing *l, const ebpo_scene_least *result)
+static void least_json(pair_list *l, const ebpo_scene_least *result)
 {
     json *j = &l->j;
     json_object(j, NULL);
@@ -311,28 +315,28 @@ static void least_json(listing *l, const ebpo_scene_least *result)
     json_end(j);
 }
 
-static void print_least(const listing *l, const ebpo_scene_least *result, bool open)
+static void print_least(const pair_list *l, const ebpo_scene_least *result, bool undecided)
 {
     char time[32], lo[32], hi[32];
     printf("%s\tleast\t%s\t%s\t%s to %s%s\n", words_real(result->time, time), name_of(l, result->a),
            name_of(l, result->b), words_real(result->lo, lo), words_real(result->hi, hi),
-           open ? "\topen" : "");
+           undecided ? "\tundecided" : "");
 }
 
 static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
 {
-    listing *l = user;
+    pair_list *l = user;
     l->approaches += count;
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_scene_least *result = &list[i];
         l->reached += result->lo <= result->clearance;
-        bool open = is_undecided(l, result);
-        l->undecided += open;
+        bool undecided = is_undecided(l, result);
+        l->undecided += undecided;
         l->evaluations += result->evaluations;
         if (l->v->json)
             least_json(l, result);
         else
-            print_least(l, result, open);
+            print_least(l, result, undecided);
     }
     return true;
 }
@@ -340,22 +344,24 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
 static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *scene,
                                   ebpo_error *error)
 {
-    listing l = { .v = v, .scene = scene };
-    ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
+    pair_list l = { .v = v, .scene = scene };
+    ebpo_scene_approach_options approach_options = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     progress_line line;
     double begun = progress_now();
     (void)path;
-    how.tolerance = v->tolerance;
-    how.threads = (unsigned)v->threads;
-    how.progress = progress_start(&line, "scene", v->quiet);
+    approach_options.tolerance = v->tolerance;
+    approach_options.threads = (unsigned)v->threads;
+    approach_options.progress = progress_start(&line, "scene", v->quiet);
     json_begin(&l.j, stdout);
     if (v->json) {
         json_object(&l.j, NULL);
         json_array(&l.j, v->least ? "least" : "approaches");
     }
-    ebpo_status status =
-        v->least ? ebpo_scene_least_distances(scene, v->from, v->to, &how, print_leasts, &l, error)
-                 : ebpo_scene_approach(scene, v->from, v->to, &how, print_approaches, &l, error);
+    ebpo_status status = v->least
+                             ? ebpo_scene_least_distances(scene, v->from, v->to, &approach_options,
+                                                          print_leasts, &l, error)
+                             : ebpo_scene_approach(scene, v->from, v->to, &approach_options,
+                                                   print_approaches, &l, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
@@ -375,18 +381,18 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Sets v->from and v->to. With --from, --to or --step: to these times; a missing --from is the
+/* Sets v->from and v->to. With --from, --to or --step: to the given times; a missing --from is the
  * first time of the scene, and a missing --to the last time. With --time: both to this time.
- * Without these options: to the first and the last time of the scene if `spans`, else both to the
- * first time. Returns NULL, or an error. */
+ * Without these options: to the first and the last time of the scene if `spans`, otherwise both to
+ * the first time. Returns NULL, or a text that says what is wrong. */
 static const char *set_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
     (void)ebpo_scene_get_counts(scene, &c);
-    bool span = !isnan(v->from) || !isnan(v->to) || v->step > 0;
-    if (span && !isnan(v->time))
+    bool span_given = !isnan(v->from) || !isnan(v->to) || v->step > 0;
+    if (span_given && !isnan(v->time))
         return "--time cannot be used with --from, --to or --step";
-    if (!span && !(spans && isnan(v->time))) {
+    if (!span_given && !(spans && isnan(v->time))) {
         v->from = v->to = isnan(v->time) ? c.begin : v->time;
     } else {
         v->from = isnan(v->from) ? c.begin : v->from;
@@ -397,7 +403,7 @@ static const char *set_times(scene_values *v, bool spans, const ebpo_scene *scen
 
 enum { FRAMES_MAX = 10000000 };
 
-/* Returns NULL, or an error in the options of a report. */
+/* Checks the options of a report. Returns NULL, or a text that says what is wrong. */
 static const char *check_report(const scene_values *v)
 {
     if (v->json && v->csv)
@@ -423,14 +429,15 @@ static const struct {
 };
 enum { SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
 
+/* Returns true if the subcommand covers all times of the scene by default, not one time. */
 static bool needs_span(int subcommand)
 {
     return subcommands[subcommand].run == scene_approach ||
            subcommands[subcommand].run == scene_plan || subcommands[subcommand].run == scene_pack;
 }
 
-/* Sets the purpose of a plan: --solids and --depth, options of a report, mean --for solids. Returns
- * NULL, or an error. */
+/* Sets the purpose of a plan: with --solids or --depth, which are options of a report, --for
+ * solids. Returns NULL, or a text that says what is wrong. */
 static const char *set_purpose(scene_values *v)
 {
     if (!v->solids && !(v->depth > 0))
@@ -441,7 +448,8 @@ static const char *set_purpose(scene_values *v)
     return NULL;
 }
 
-/* Returns NULL, or an error in the options of this command. */
+/* Checks the options of the subcommand, and sets the options for loading. Returns NULL, or a text
+ * that says what is wrong. */
 static const char *check_options(int subcommand, scene_values *v, ebpo_load_options *load)
 {
     uint64_t target;
@@ -470,20 +478,20 @@ static int run_scene(void *given, const char **operand)
         return command_usage(
             "scene", "'%s' is not one of info, check, boxes, pairs, report, approach, plan, pack",
             operand[0]);
-    ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
+    ebpo_scene_options scene_options = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
     load.max_expansion = (uint64_t)v->max_expansion;
-    how.allow_outside = v->outside;
-    how.remote = v->remote;
-    const char *wrong = NULL;
-    ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
+    scene_options.allow_outside = v->outside;
+    scene_options.remote = v->remote;
+    const char *problem = NULL;
+    ebpo_status status = ebpo_scene_open(operand[1], &scene_options, &scene, &error);
     if (status == EBPO_OK)
-        wrong = set_times(v, needs_span(subcommand), scene);
-    if (status == EBPO_OK && !wrong)
-        wrong = check_options(subcommand, v, &load);
-    if (wrong) {
+        problem = set_times(v, needs_span(subcommand), scene);
+    if (status == EBPO_OK && !problem)
+        problem = check_options(subcommand, v, &load);
+    if (problem) {
         ebpo_scene_free(scene);
-        return command_usage("scene", "%s", wrong);
+        return command_usage("scene", "%s", problem);
     }
     progress_line line;
     load.progress = progress_start(&line, "scene", v->quiet);

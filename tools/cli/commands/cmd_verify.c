@@ -20,16 +20,20 @@ typedef struct values {
 
 #include "cli/options/verify.inc"
 
+/* Kinds of checks. */
 static const struct kind {
-    size_t offset;
-    const char *name, *what;
+    size_t offset; /* of the kind's ebpo_verify_count in ebpo_verify_report */
+    const char *name;
+    const char *meaning; /* what is true without violations */
 } kinds[] = {
-    { offsetof(ebpo_verify_report, structure), "structure", "head, shapes, counts, order" },
-    { offsetof(ebpo_verify_report, content), "content", "checksum of all arrays" },
+    { offsetof(ebpo_verify_report, structure), "structure",
+      "the header, shapes, counts and order are valid" },
+    { offsetof(ebpo_verify_report, content), "content", "all arrays match the checksum" },
     { offsetof(ebpo_verify_report, containment), "containment",
       "the solid lies in every half-space" },
     { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
-    { offsetof(ebpo_verify_report, labels), "labels", "white, black, winding numbers" },
+    { offsetof(ebpo_verify_report, labels), "labels",
+      "white and black nodes and winding numbers are right" },
     { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
     { offsetof(ebpo_verify_report, source), "source", "data of the file equals the source's" },
 };
@@ -40,9 +44,9 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
     return (const ebpo_verify_count *)(const void *)((const char *)report + kinds[i].offset);
 }
 
-/* Data of the source that could not be compared, as the file does not have the data. */
+/* Data of the source that was not compared, because the file does not have the data. */
 typedef struct not_compared {
-    char words[900]; /* "": nothing */
+    char words[900]; /* what was not compared, and why; "": everything was compared */
 } not_compared;
 
 static not_compared list_not_compared(const ebpo_file *file, const ebpo_mesh *source)
@@ -50,11 +54,11 @@ static not_compared list_not_compared(const ebpo_file *file, const ebpo_mesh *so
     uint64_t parts = ebpo_file_info(file)->parts;
     not_compared u = { "" };
     const char *lost = ebpo_mesh_attributes_lost(source), *unread = ebpo_mesh_ignored(source);
-    bool has = ebpo_mesh_has_attributes(source);
-    if (has && !(parts & EBPO_PART_ATTRIBUTES))
+    bool has_attributes = ebpo_mesh_has_attributes(source);
+    if (has_attributes && !(parts & EBPO_PART_ATTRIBUTES))
         snprintf(u.words, sizeof u.words,
                  "its attributes, such as colours and normals: the file has none");
-    else if (has && !(parts & EBPO_PART_MAPS))
+    else if (has_attributes && !(parts & EBPO_PART_MAPS))
         snprintf(u.words, sizeof u.words,
                  "its attributes, such as colours and normals: the file has no source indices");
     else if (lost || unread)
@@ -71,9 +75,9 @@ static void print_words(const ebpo_verify_report *report, const char *path, cons
         const ebpo_verify_count *c = count_of(report, i);
         if (c->checks || c->violations)
             printf("%-12s %14llu %11llu   %s\n", kinds[i].name, (unsigned long long)c->checks,
-                   (unsigned long long)c->violations, kinds[i].what);
+                   (unsigned long long)c->violations, kinds[i].meaning);
         else
-            printf("%-12s %14s %11s   %s\n", kinds[i].name, "not made", "-", kinds[i].what);
+            printf("%-12s %14s %11s   %s\n", kinds[i].name, "not made", "-", kinds[i].meaning);
     }
     if (u->words[0])
         printf("%s: not compared: %s\n", against, u->words);

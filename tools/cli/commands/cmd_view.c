@@ -29,12 +29,12 @@ static const char *const order_words[] = { "level", "distance", "pixels", "front
 
 #include "cli/options/view.inc"
 
-static const char *const end_names[] = { "", "done", "bytes", "nodes" };
+static const char *const end_names[] = { "", "done", "bytes", "nodes" }; /* by ebpo_view_end */
 
 typedef struct printer {
     const values *v;
-    double begin;
-    json j;
+    double begin; /* when the command began, see progress_now */
+    json j;       /* used with --json */
 } printer;
 
 /* --- options --- */
@@ -54,8 +54,8 @@ static int check_values(const values *v)
 
 static bool read_triple(const char *name, const char *text, double out[3])
 {
-    char rest;
-    if (sscanf(text, "%lf,%lf,%lf%c", &out[0], &out[1], &out[2], &rest) == 3 && isfinite(out[0]) &&
+    char extra;
+    if (sscanf(text, "%lf,%lf,%lf%c", &out[0], &out[1], &out[2], &extra) == 3 && isfinite(out[0]) &&
         isfinite(out[1]) && isfinite(out[2]))
         return true;
     command_usage("view", "--%s: '%s' is not three numbers separated by commas", name, text);
@@ -73,7 +73,7 @@ static bool read_budget(const char *name, const char *text, uint64_t *out)
 static bool read_observer(const values *v, ebpo_observer *o)
 {
     double look[3];
-    char rest;
+    char extra;
     if (!read_triple("eye", v->eye, o->eye) || (v->look && !read_triple("look", v->look, look)) ||
         (v->up && !read_triple("up", v->up, o->up)))
         return false;
@@ -86,7 +86,7 @@ static bool read_observer(const values *v, ebpo_observer *o)
     if (v->fov > 0)
         o->fov = v->fov;
     if (v->size &&
-        (sscanf(v->size, "%9" SCNu32 "x%9" SCNu32 "%c", &o->width, &o->height, &rest) != 2 ||
+        (sscanf(v->size, "%9" SCNu32 "x%9" SCNu32 "%c", &o->width, &o->height, &extra) != 2 ||
          !o->width || !o->height)) {
         command_usage("view", "--size: '%s' is not a width, an x, and a height, each from 1",
                       v->size);
@@ -114,6 +114,7 @@ static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *o
 
 /* --- printing --- */
 
+/* Prints the statistics of the stream so far. key: of the JSON object; NULL in an array. */
 static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
 {
     ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
@@ -184,41 +185,45 @@ static void print_node(printer *p, const ebpo_view_node *v)
 static void print_legend(void)
 {
     table_legend(stdout);
-    puts("waiting: gray nodes to divide next; pixels: size of the largest of these, - without "
-         "--eye;\n"
-         "bytes: read from the file; ms: since opening");
+    puts(
+        "waiting: gray nodes to divide next; pixels: size of the largest of these nodes, - without "
+        "--eye;\n"
+        "bytes: read from the file; ms: since opening");
 }
 
 /* --- streaming --- */
 
+/* Takes nodes from the stream until it ends, and prints them or a row each time their number has
+ * doubled. If the output cannot be written, stops and sets *accepted to false. */
 static ebpo_status report_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
-                                bool *arrived, ebpo_error *error)
+                                bool *accepted, ebpo_error *error)
 {
     ebpo_view_node node;
     ebpo_status status;
-    uint64_t count = 0, next = 1;
-    while (*arrived && (status = ebpo_view_stream_next(stream, &node, end, error)) == EBPO_OK &&
+    uint64_t count = 0, next_row = 1;
+    while (*accepted && (status = ebpo_view_stream_next(stream, &node, end, error)) == EBPO_OK &&
            *end == EBPO_VIEW_NODE) {
         count++;
         if (p->v->nodes)
             print_node(p, &node);
-        if (!node.complete || count < next)
+        if (!node.complete || count < next_row)
             continue;
         if (!p->v->nodes)
             print_row(p, stream, NULL);
-        next = 2 * count;
-        *arrived = command_flush("view");
+        next_row = 2 * count;
+        *accepted = command_flush("view");
     }
-    return *arrived ? status : EBPO_OK;
+    return *accepted ? status : EBPO_OK;
 }
 
 static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
-                                const ebpo_view_options *wanted, bool *arrived, ebpo_error *error)
+                                const ebpo_view_options *view_options, bool *accepted,
+                                ebpo_error *error)
 {
     ebpo_view_stream *stream = NULL;
     ebpo_view_end end = EBPO_VIEW_NODE;
-    const char *order = order_words[wanted->priority];
-    ebpo_status status = ebpo_view_stream_new(file, wanted, &stream, error);
+    const char *order = order_words[view_options->priority];
+    ebpo_status status = ebpo_view_stream_new(file, view_options, &stream, error);
     if (status != EBPO_OK)
         return status;
     if (p->v->json) {
@@ -231,7 +236,7 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
         printf("%s: by %s\n%12s %10s %9s %9s %9s %9s %9s %10s %9s\n", remote_shown(path), order,
                "bytes", "nodes", "gray", "leaf", "white", "black", "waiting", "pixels", "ms");
     }
-    status = report_nodes(p, stream, &end, arrived, error);
+    status = report_nodes(p, stream, &end, accepted, error);
     if (p->v->json)
         json_end(&p->j);
     print_row(p, stream, "last");
@@ -241,9 +246,9 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
         remote_json(&p->j, &t, &p->v->remote);
         json_finish(&p->j);
     } else {
-        if (status == EBPO_OK && *arrived)
+        if (status == EBPO_OK && *accepted)
             print_legend();
-        if (status == EBPO_OK && *arrived)
+        if (status == EBPO_OK && *accepted)
             printf("%s\n", end == EBPO_VIEW_DONE    ? "all requested data has arrived"
                            : end == EBPO_VIEW_BYTES ? "stopped by --bytes"
                                                     : "stopped by --count");
@@ -252,13 +257,13 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
     }
     ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_get_stats(stream, &stats);
-    if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
+    if (status == EBPO_OK && *accepted && p->v->out && stats.nodes == 0) {
         fprintf(stderr,
                 "ebpo view: %s: not written: the budget is too small even for the root; give "
                 "larger --bytes\n",
                 p->v->out);
-        *arrived = false;
-    } else if (status == EBPO_OK && *arrived && p->v->out)
+        *accepted = false;
+    } else if (status == EBPO_OK && *accepted && p->v->out)
         status = cut_mesh_write(stream, p->v->out, error);
     ebpo_view_stream_free(stream);
     return status;
@@ -278,12 +283,12 @@ static int run_view(void *given, const char **operand)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
-    ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_view_options view_options = EBPO_VIEW_OPTIONS_INIT;
     printer p = { .v = v, .begin = progress_now() };
     int code = check_values(v);
     if (code != EXIT_OK)
         return code;
-    if (!read_options(v, &wanted, &observer))
+    if (!read_options(v, &view_options, &observer))
         return EXIT_USAGE;
     if (v->out && command_overwrites("view", operand[0], v->out))
         return EXIT_USAGE;
@@ -291,13 +296,13 @@ static int run_view(void *given, const char **operand)
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("view", &error);
-    bool has_level = command_has_level("view", ebpo_file_info(file), v->max_level), arrived = true;
+    bool has_level = command_has_level("view", ebpo_file_info(file), v->max_level), accepted = true;
     ebpo_status status =
-        has_level ? stream_nodes(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
+        has_level ? stream_nodes(&p, file, operand[0], &view_options, &accepted, &error) : EBPO_OK;
     ebpo_close(file);
     if (!has_level)
         return EXIT_USAGE;
-    if (!arrived)
+    if (!accepted)
         return EXIT_FAILED;
     return status == EBPO_OK ? EXIT_OK : command_failed("view", &error);
 }

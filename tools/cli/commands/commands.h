@@ -1,5 +1,6 @@
-/* Lists the commands. Each command is in a file cmd_NAME.c; the table of commands is in
- * options/meson.build. */
+/* Lists the commands. Each command is in a file cmd_NAME.c. The file includes
+ * cli/options/NAME.inc, which make_options.py generates from NAME.options; it defines `spec`. The
+ * table of commands is in options/meson.build. */
 #ifndef EBPO_TOOLS_COMMANDS_H
 #define EBPO_TOOLS_COMMANDS_H
 
@@ -8,9 +9,10 @@
 
 typedef struct command {
     const arg_spec *spec;
-    size_t size;          /* size of the struct that spec->options fills */
-    const void *standard; /* the defaults of that struct */
-    /* operand[ARGS_OPERANDS_MAX], NULL where none was given; returns the exit code */
+    size_t size;          /* size of the struct `values` that spec->options fills */
+    const void *standard; /* a struct of that type with the defaults */
+    /* values: the struct with defaults and given options; operand[ARGS_OPERANDS_MAX]: NULL for
+     * operands that were not given. Returns the exit code. */
     int (*run)(void *values, const char **operand);
 } command;
 

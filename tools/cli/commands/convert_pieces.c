@@ -1,6 +1,6 @@
 /* Implements ebpo convert --split-components and --split-groups. The pieces of the mesh are its
- * components or groups. The output is a folder with one model for each piece, and a scene of these
- * models. */
+ * components (faces connected by common vertices) or its groups (of an OBJ file). The output is a
+ * folder with one model for each piece, and a scene of these models. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,8 +22,11 @@
 
 /* --- names of pieces --- */
 
+/* Sizes of names in bytes, with the final 0: in file names, and in the scene. */
 enum { NAME_SIZE = 96, SHOWN_SIZE = 256 };
 
+/* Lengths of the part of a name that comes from the group: in file names, and in derived names in
+ * the scene, which end in a number. */
 enum { OWN_NAME_MAX = 40, SPELT_MAX = 220 };
 
 static bool is_safe(char c)
@@ -47,7 +50,7 @@ static void piece_file_name(char out[NAME_SIZE], const char *kind, int digits, u
     out[size] = 0;
 }
 
-/* Returns true for words that select many instances. */
+/* Returns true if scene files use the name to select many instances. */
 static bool is_selector(const char *own_name)
 {
     return strcmp(own_name, "*") == 0 || strncmp(own_name, "layer:", 6) == 0 ||
@@ -61,8 +64,8 @@ static int plain_length(const char *s)
     return c < 0x20 || c == 0x7f ? 0 : json_utf8_length(s);
 }
 
-/* Returns true if a scene can have this name: 1 to 255 bytes of UTF-8 without control characters
- * and no selector. */
+/* Returns true if an instance can have this name: 1 to 255 bytes of UTF-8 without control
+ * characters, and no selector (see is_selector). */
 static bool is_scene_name(const char *own_name)
 {
     size_t size = strnlen(own_name, SHOWN_SIZE);
@@ -83,14 +86,14 @@ static int compare_names(const void *a, const void *b)
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* Writes the name, with \xNN for each byte that is not allowed; truncates the name if it is too
- * long. Returns the length. */
+/* Writes the name, with \xNN for each byte that is not allowed and for the first byte of a
+ * selector. Truncates a long name. Returns the length. */
 static size_t spell_name(char *out, const char *own_name)
 {
     size_t size = 0;
-    bool first = is_selector(own_name);
-    for (const char *s = own_name; *s && size + 4 <= SPELT_MAX; first = false) {
-        int length = first ? 0 : plain_length(s);
+    bool escapes_next = is_selector(own_name);
+    for (const char *s = own_name; *s && size + 4 <= SPELT_MAX; escapes_next = false) {
+        int length = escapes_next ? 0 : plain_length(s);
         if (length)
             memcpy(out + size, s, (size_t)length);
         else
@@ -101,8 +104,9 @@ static size_t spell_name(char *out, const char *own_name)
     return size;
 }
 
-/* Writes the name of a group in the scene: the group's own name if a scene can have it, else a
- * derived name with a number. `taken`: sorted names that are used unchanged. */
+/* Writes the name of a group in the scene: the group's own name if a scene can have it, otherwise a
+ * derived name with a number that equals no name in `taken`, the sorted names of groups that are
+ * used unchanged. */
 static void write_shown_name(char out[SHOWN_SIZE], const char *own_name, uint64_t number,
                              const char *const *taken, uint64_t taken_count)
 {
@@ -121,7 +125,10 @@ static void write_shown_name(char out[SHOWN_SIZE], const char *own_name, uint64_
 
 /* Words for a kind of pieces. */
 typedef struct piece_kind {
-    const char *singular, *plural, *scene, *building, *hint;
+    const char *singular, *plural;
+    const char *scene;    /* file name of the scene */
+    const char *building; /* name of the stage for the progress line */
+    const char *hint;     /* ends the message on too many pieces */
 } piece_kind;
 
 static const piece_kind components = { "component", "components", "components.scene.json",
@@ -129,55 +136,58 @@ static const piece_kind components = { "component", "components", "components.sc
                                        "; merge vertices at the same position with --weld" },
                         groups = { "group", "groups", "groups.scene.json", "building groups", "" };
 
-enum { PIECES_MAX = 100000, ENDING_SIZE = 16 };
+enum { PIECES_MAX = 100000, ENDING_SIZE = 16 }; /* the ending: ".ebpo.h5" */
 
-/* Facts of a piece, as in its file. */
+/* A piece and its file. */
 typedef struct piece {
     char name[NAME_SIZE], file[NAME_SIZE + ENDING_SIZE];
-    char *shown; /* in the scene: the name of the group; NULL: `name` */
+    char *shown; /* the name of the group in the scene; NULL: `name` is the name in the scene */
     ebpo_component facts;
+    /* facts of the file */
     bool solid;
     int levels;
     uint64_t bytes;
-    char digest[65];
+    char digest[65]; /* content_sha256 as hexadecimal digits */
 } piece;
 
 typedef struct piece_writer {
     const pieces_run *run;
     const piece_kind *kind;
-    mesh_input *whole;
+    mesh_input *whole; /* the mesh that is split */
     ebpo_components *components;
-    piece *pieces;
-    uint64_t count, faces_done;
+    piece *pieces;       /* [count] */
+    uint64_t count;      /* 0 until the pieces are named */
+    uint64_t faces_done; /* number of faces of written pieces */
 } piece_writer;
 
 /* ---- the folder ---- */
 
-/* The temporary folder, which a signal handler may also remove. */
-static char *making_folder;
-static int making_fd = -1;
-static piece *volatile made_pieces;
-static volatile uint64_t made_count;
-static const char *scene_name; /* scene that is being made */
+/* The temporary folder and the files that it may contain. These are static because a signal handler
+ * removes the folder. */
+static char *temporary_folder; /* path; NULL: there is no temporary folder */
+static int temporary_fd = -1;  /* the open folder; -1: none */
+static piece *volatile temporary_pieces;
+static volatile uint64_t temporary_count; /* number of pieces */
+static const char *scene_name;            /* file name of the scene */
 
 /* Removes the temporary folder, unless it has its final name. Uses only async-signal-safe calls. */
 static void remove_folder(void)
 {
-    if (!making_folder || access(making_folder, F_OK) != 0)
+    if (!temporary_folder || access(temporary_folder, F_OK) != 0)
         return;
-    for (uint64_t i = 0; i < made_count; i++)
-        unlinkat(making_fd, made_pieces[i].file, 0);
-    unlinkat(making_fd, scene_name, 0);
-    rmdir(making_folder);
+    for (uint64_t i = 0; i < temporary_count; i++)
+        unlinkat(temporary_fd, temporary_pieces[i].file, 0);
+    unlinkat(temporary_fd, scene_name, 0);
+    rmdir(temporary_folder);
 }
 
 ebpo_status pieces_begin(const char *folder, bool of_groups, ebpo_error *error)
 {
     scene_name = (of_groups ? &groups : &components)->scene;
-    ebpo_status status = ebpo_folder_begin(folder, &making_folder, error);
+    ebpo_status status = ebpo_folder_begin(folder, &temporary_folder, error);
     if (status != EBPO_OK)
         return status;
-    making_fd = open(making_folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    temporary_fd = open(temporary_folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     signals_set_cleanup(remove_folder);
     return EBPO_OK;
 }
@@ -186,14 +196,14 @@ void pieces_end(void)
 {
     remove_folder();
     signals_set_cleanup(NULL);
-    if (making_fd >= 0)
-        close(making_fd);
-    free(making_folder);
-    making_folder = NULL;
-    making_fd = -1;
-    free(made_pieces);
-    made_pieces = NULL;
-    made_count = 0;
+    if (temporary_fd >= 0)
+        close(temporary_fd);
+    free(temporary_folder);
+    temporary_folder = NULL;
+    temporary_fd = -1;
+    free(temporary_pieces);
+    temporary_pieces = NULL;
+    temporary_count = 0;
 }
 
 static void free_names(const piece_writer *w)
@@ -209,12 +219,13 @@ static ebpo_status no_memory(ebpo_error *error)
     return EBPO_E_MEMORY;
 }
 
+/* Returns the path of a file in the temporary folder; NULL: there is not enough memory. */
 static char *path_of(const char *name)
 {
-    size_t size = strlen(making_folder) + strlen(name) + 2;
+    size_t size = strlen(temporary_folder) + strlen(name) + 2;
     char *path = malloc(size);
     if (path)
-        snprintf(path, size, "%s/%s", making_folder, name);
+        snprintf(path, size, "%s/%s", temporary_folder, name);
     return path;
 }
 
@@ -288,8 +299,8 @@ static ebpo_status name_pieces(piece_writer *w, ebpo_error *error)
             w->pieces[i].facts.face_count > max_faces ? w->pieces[i].facts.face_count : max_faces;
     }
     w->count = count;
-    made_pieces = w->pieces;
-    made_count = count;
+    temporary_pieces = w->pieces;
+    temporary_count = count;
     if (status == EBPO_OK && w->run->groups)
         status = show_names(w, error);
     return status == EBPO_OK ? w->run->fits(w->run->user, max_faces, error) : status;
@@ -324,7 +335,8 @@ static ebpo_status inspect_piece(piece *p, const char *path, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Gets the mesh of a piece, and checks it. The whole mesh was repaired before. */
+/* Sets *out to the mesh of a piece, and checks it. No repair is needed, as the whole mesh was
+ * repaired. */
 static ebpo_status take_mesh(const piece_writer *w, uint64_t number, mesh_input *out,
                              ebpo_error *error)
 {
@@ -350,7 +362,7 @@ static ebpo_status write_piece(piece_writer *w, uint64_t number, ebpo_error *err
     if (!path)
         return no_memory(error);
     ebpo_status status = take_mesh(w, number, &piece_mesh, error);
-    if (status == EBPO_OK && w->run->groups) { /* the whole mesh was reported, not its groups */
+    if (status == EBPO_OK && w->run->groups) { /* there was no warning on the whole mesh */
         progress_wipe(w->run->line);
         advice_warn(stderr, "convert", shown_name(&w->pieces[number]), &piece_mesh);
     }
@@ -399,11 +411,11 @@ static ebpo_status write_scene(const piece_writer *w, ebpo_error *error)
     ebpo_status status = out && path ? EBPO_OK : no_memory(error);
     if (status == EBPO_OK)
         print_scene(w, out);
-    bool whole = out && !ferror(out);
+    bool complete = out && !ferror(out);
     if (out && fclose(out) != 0)
-        whole = false;
+        complete = false;
     if (status == EBPO_OK)
-        status = whole ? ebpo_write_file(path, text, size, error) : no_memory(error);
+        status = complete ? ebpo_write_file(path, text, size, error) : no_memory(error);
     free(text);
     free(path);
     return status;
@@ -471,7 +483,7 @@ static void print_json(const piece_writer *w, double seconds)
 
 /* ---- all of it ---- */
 
-/* Reports groups without faces, which have no model. */
+/* Reports groups without faces, for which no model is written. They follow all other groups. */
 static ebpo_status report_empty(const piece_writer *w, ebpo_error *error)
 {
     uint64_t count = ebpo_mesh_groups_count(w->run->groups);
@@ -485,9 +497,10 @@ static ebpo_status report_empty(const piece_writer *w, ebpo_error *error)
     write_shown_name(first, group.name, w->count, NULL, 0);
     progress_wipe(w->run->line);
     fprintf(stderr,
-            "ebpo convert: %s: note: %llu of %llu groups have no faces, and no model: '%s'%s\n",
+            "ebpo convert: %s: note: %llu of %llu groups %s no faces, and no model: '%s'%s\n",
             w->whole->as_read.source_name, (unsigned long long)(count - w->count),
-            (unsigned long long)count, first, count - w->count > 1 ? " and others" : "");
+            (unsigned long long)count, count - w->count > 1 ? "have" : "has", first,
+            count - w->count > 1 ? " and others" : "");
     return EBPO_OK;
 }
 
@@ -513,7 +526,7 @@ static ebpo_status write_all(piece_writer *w, ebpo_error *error)
     if (status == EBPO_OK)
         status = write_scene(w, error);
     if (status == EBPO_OK)
-        status = ebpo_folder_publish(making_folder, run->folder, error);
+        status = ebpo_folder_publish(temporary_folder, run->folder, error);
     return status;
 }
 
@@ -524,9 +537,9 @@ ebpo_status pieces_write(const pieces_run *run, mesh_input *whole, double begun,
     ebpo_components_free(w.components);
     ebpo_mesh_free(&whole->mesh);
     if (status == EBPO_OK) {
-        made_count = 0; /* the folder is complete, and is kept */
-        free(making_folder);
-        making_folder = NULL;
+        temporary_count = 0; /* the folder is complete, and is kept */
+        free(temporary_folder);
+        temporary_folder = NULL;
         progress_wipe(run->line);
         if (run->json)
             print_json(&w, progress_now() - begun);

@@ -16,14 +16,15 @@ static bool is_model_name(const char *name)
            !words_end_with(name, ".paint.h5");
 }
 
-/* Takes ownership of `path`, also on failure. */
+/* Adds a path, and owns it from now on. Returns false if there is not enough memory; also frees
+ * `path` then. path: NULL: there was not enough memory for the path. */
 static bool add_path(folder_files *f, char *path)
 {
     if (path && f->count == f->capacity) {
         size_t capacity = f->capacity ? 2 * f->capacity : 256;
-        char **wider = realloc(f->path, capacity * sizeof *wider);
-        if (wider) {
-            f->path = wider;
+        char **larger = realloc(f->path, capacity * sizeof *larger);
+        if (larger) {
+            f->path = larger;
             f->capacity = capacity;
         }
     }
@@ -54,7 +55,7 @@ char *folder_files_shown(const char *path)
 }
 
 /* Reports that folder/below/name could not be read; `below` and `name` may be empty. The reason is
- * in errno. Returns false on `no_memory`. */
+ * in errno. Returns false if there is not enough memory. */
 static bool report_unread(folder_files *f, const char *folder, const char *below, const char *name)
 {
     const char *why = strerror(errno);
@@ -73,24 +74,27 @@ static bool report_unread(folder_files *f, const char *folder, const char *below
 
 static bool search_folder(folder_files *f, const char *folder, const char *below);
 
-/* Does not follow links to folders, which may form cycles. */
+/* Adds the entry `name` of folder/below if it is a model, or searches it if it is a folder. Does
+ * not follow links to folders, which may form cycles. Returns false after an error that ends the
+ * search.
+ */
 static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const char *below,
                           const char *name)
 {
     struct stat st;
     bool has_stat = fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) == 0;
     if (!has_stat && errno == ENOENT)
-        return true; /* it was removed meanwhile */
-    bool enter = has_stat && S_ISDIR(st.st_mode);
-    if (!has_stat && !is_model_name(name)) /* it may be a folder */
+        return true; /* the entry was removed meanwhile */
+    bool is_folder = has_stat && S_ISDIR(st.st_mode);
+    if (!has_stat && !is_model_name(name)) /* the entry may be a folder */
         return report_unread(f, folder, below, name);
-    if (!enter && !is_model_name(name))
+    if (!is_folder && !is_model_name(name))
         return true;
-    /* a dangling link is reported when it is opened; a link to a folder is skipped */
-    if (!enter && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
+    /* Skips a link to a folder. A link to a missing file is reported when the file is opened. */
+    if (!is_folder && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
         return true;
     char *path = join_path(below, name);
-    if (!path || !enter)
+    if (!path || !is_folder)
         return add_path(f, path);
     bool ok = search_folder(f, folder, path);
     free(path);

@@ -8,33 +8,38 @@
 
 #include <ebpo/haptic.h>
 
-/* Unit quaternions x, y, z, w; 0 0 0 1: not rotated. */
 typedef struct haptic_pose {
-    double position[3], rotation[4];
+    double position[3];
+    double rotation[4]; /* a unit quaternion x, y, z, w; 0 0 0 1: not rotated */
 } haptic_pose;
 
-/* Feedback. A probe uses distance, lo, hi and where; other tools use the other members. */
+/* Feedback for a device. Only a probe sets lo, hi, rgb and `where`; only other tools set the
+ * force and torque. */
 typedef struct haptic_result {
-    haptic_pose proxy;
+    haptic_pose proxy; /* the pose of the tool on the surface, see ebpo_haptic_ball_result */
     double force[3], torque[3], normal[3];
-    double depth; /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
-    double lo, hi;
+    double depth;  /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
+    double lo, hi; /* bounds of the distance */
     uint64_t face;
     uint32_t flags;
-    uint8_t rgb[3], where; /* the colour of the distance; an ebpo_where */
+    uint8_t rgb[3]; /* colour of the distance */
+    uint8_t where;  /* an ebpo_where */
 } haptic_result;
 
 typedef struct haptic_device {
     /* Waits at most `seconds` for the first position. Returns false after an error, reported on
      * stderr. */
     bool (*begin)(void *self, double seconds, haptic_pose *first);
-    /* Called in a haptic step: never waits. Returns false at the end. */
-    bool (*read)(void *self, uint64_t step_seconds, haptic_pose *out);
+    /* Sets *out to the pose in a haptic step, 0, 1, ...; never waits. Returns false if the device
+     * has ended. */
+    bool (*read)(void *self, uint64_t step, haptic_pose *out);
+    /* Takes the feedback of the step. */
     void (*write)(void *self, const haptic_result *result);
-    /* Returns the number of steps of the device; 0: as many as requested. */
+    /* Returns the number of steps of the device; 0: the device has steps for any time. */
     uint64_t (*step_count)(void *self);
+    /* Ends the device, and frees `self`. */
     void (*end)(void *self);
-    void *self;
+    void *self; /* the first argument of these functions */
 } haptic_device;
 
 /* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
@@ -47,8 +52,9 @@ bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
 /* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
- * out again. */
+ * out of it. rate: steps per second. clearance: radius of the tool, which remains outside where the
+ * device's position is outside. */
 ebpo_status haptic_builtin_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
-                                double rate, double clear, ebpo_error *error);
+                                double rate, double clearance, ebpo_error *error);
 
 #endif

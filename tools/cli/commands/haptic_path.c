@@ -20,7 +20,8 @@ static const char *skip_blanks(const char *at)
     return at;
 }
 
-/* Returns how many numbers a line has; -1: other text. */
+/* Reads the numbers of a line, up to '#'. Returns their count; -1: other text, or more than seven
+ * numbers. */
 static int read_numbers(const char *line, size_t length, double out[7])
 {
     const char *at = skip_blanks(line), *end = line + length;
@@ -36,6 +37,7 @@ static int read_numbers(const char *line, size_t length, double out[7])
     return count;
 }
 
+/* Divides a quaternion by its length. Returns false if the length is nearly 0. */
 static bool make_unit(double q[4])
 {
     double length = hypot(hypot(q[0], q[1]), hypot(q[2], q[3]));
@@ -44,6 +46,8 @@ static bool make_unit(double q[4])
     return length >= 0x1p-200;
 }
 
+/* Adds a pose of `count` numbers: three of the position, or seven with the rotation. Returns false
+ * if there is not enough memory or the rotation is not valid. */
 static bool add_pose(path *p, const double v[7], int count)
 {
     if (p->count == p->capacity) {
@@ -54,10 +58,11 @@ static bool add_pose(path *p, const double v[7], int count)
         p->pose = pose;
         p->capacity = more;
     }
-    haptic_pose *t = &p->pose[p->count++];
-    memcpy(t->position, v, sizeof t->position);
-    memcpy(t->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 }, sizeof t->rotation);
-    return make_unit(t->rotation);
+    haptic_pose *added = &p->pose[p->count++];
+    memcpy(added->position, v, sizeof added->position);
+    memcpy(added->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 },
+           sizeof added->rotation);
+    return make_unit(added->rotation);
 }
 
 static bool read_lines(path *p, FILE *in, const char *name)
@@ -97,12 +102,12 @@ static bool begin_path(void *self, double seconds, haptic_pose *first)
     return true;
 }
 
-static bool read_pose(void *self, uint64_t step_seconds, haptic_pose *out)
+static bool read_pose(void *self, uint64_t step, haptic_pose *out)
 {
     path *p = self;
-    if (step_seconds >= p->count)
+    if (step >= p->count)
         return false;
-    *out = p->pose[step_seconds];
+    *out = p->pose[step];
     return true;
 }
 

@@ -6,20 +6,24 @@
 
 #include "cli/commands/haptic_device.h"
 
+/* Numbers of angles and of heights at which rays measure the surface. */
 enum { ANGLES = 64, HEIGHTS = 17 };
 
 static const double pi = 3.141592653589793;
 
 typedef struct builtin_path {
-    double rate, clearance; /* radius of the tool, as a share of the model */
-    double origin[3], size[3];
-    int up;
-    double hit[HEIGHTS][ANGLES]; /* distances of the surface from the axis, in sizes of the box; 0.1
-                                    without a hit */
+    double rate;               /* steps per second */
+    double clearance;          /* radius of the tool, as a share of the shortest side of the box */
+    double origin[3], size[3]; /* the box of the model */
+    int up;                    /* the longest axis of the box */
+    /* distance of the surface from the middle axis of the box, as a share of the box's sides; 0.1
+     * if the ray hits nothing */
+    double hit[HEIGHTS][ANGLES];
 } builtin_path;
 
-/* Computes a point in box coordinates from an angle, a height from -0.5 and a distance from the
- * axis. */
+/* Computes the point at an angle around the middle axis of the box, a height from -0.5 to 0.5 along
+ * the axis, and a distance `radius` from the axis; height and radius are shares of the box's sides.
+ */
 static void box_point(const builtin_path *p, double angle, double height, double radius,
                       double out[3])
 {
@@ -29,6 +33,7 @@ static void box_point(const builtin_path *p, double angle, double height, double
     out[p->up] = p->origin[p->up] + p->size[p->up] * (0.5 + height);
 }
 
+/* Sets p->hit: rays from outside the box to its axis find the surface. */
 static ebpo_status measure_radii(builtin_path *p, ebpo_context *context, ebpo_error *error)
 {
     for (int h = 0; h < HEIGHTS; h++)
@@ -49,6 +54,7 @@ static ebpo_status measure_radii(builtin_path *p, ebpo_context *context, ebpo_er
     return EBPO_OK;
 }
 
+/* Returns the distance of the surface from the axis, interpolated from p->hit. */
 static double surface_distance(const builtin_path *p, double angle, double height)
 {
     double a = angle / (2 * pi) * ANGLES, h = (height / 0.9 + 0.5) * (HEIGHTS - 1);
@@ -59,12 +65,12 @@ static double surface_distance(const builtin_path *p, double angle, double heigh
            t * ((1 - s) * p->hit[j + 1][i0] + s * p->hit[j + 1][i1]);
 }
 
-static bool pose_at(void *self, uint64_t step_seconds, haptic_pose *out)
+static bool pose_at(void *self, uint64_t step, haptic_pose *out)
 {
     const builtin_path *p = self;
-    double seconds = (double)step_seconds / p->rate, angle = 2 * pi * seconds / 8;
+    double seconds = (double)step / p->rate, angle = 2 * pi * seconds / 8;
     double height = 0.4 * sin(0.31 * angle), nod = 0.06 * cos(3.7 * angle);
-    double approach = fmax(0, 1 - seconds); /* from outside the model */
+    double approach = fmax(0, 1 - seconds); /* in the first second, from outside the model */
     double radius = surface_distance(p, angle, height) + p->clearance + nod - 0.01;
     box_point(p, angle, height, radius + approach * (0.9 + p->clearance - radius), out->position);
     for (int k = 0; k < 4; k++)

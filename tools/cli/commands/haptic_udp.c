@@ -16,21 +16,23 @@
 #include "cli/commands/haptic_device.h"
 
 enum {
-    VERSION = 1,
-    POSITION = 1, /* kinds */
+    VERSION = 1,  /* of the layout of packets */
+    POSITION = 1, /* kinds of packets */
     FEEDBACK = 2,
     END = 3,
-    POSITION_BYTES = 80,
+    POSITION_BYTES = 80, /* sizes of packets */
     FEEDBACK_BYTES = 192,
-    PACKETS_MAX = 32 /* maximum taken in a step */
+    PACKETS_MAX = 32 /* maximum number of packets taken in a step */
 };
 
 typedef struct udp {
     int socket;
-    struct sockaddr_in device;
-    bool known, ended;
-    uint64_t sequence, tag, ignored;
-    haptic_pose pose;
+    bool known;                /* a valid packet has arrived; `device` is its sender */
+    bool ended;                /* the device has sent a packet END */
+    struct sockaddr_in device; /* address of the device */
+    uint64_t sequence, tag;    /* of the last valid packet; feedback repeats both */
+    uint64_t ignored;          /* number of invalid packets */
+    haptic_pose pose;          /* the last position */
 } udp;
 
 /* --- bytes: little-endian on all machines --- */
@@ -70,6 +72,8 @@ static uint8_t *put_reals(uint8_t *at, const double *v, int count)
 
 /* --- packets --- */
 
+/* Reads the pose from a packet. Returns false if a coordinate is too large or the rotation is not a
+ * quaternion of about unit length. */
 static bool read_pose(const uint8_t *p, haptic_pose *out)
 {
     double square = 0;
@@ -87,7 +91,8 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
     return square >= 0.25 && square <= 4;
 }
 
-/* Receives a packet. Returns false if it is not from the device, or is older than another one. */
+/* Processes a packet. Returns false if it is not valid, is not from the device, or is older than a
+ * packet processed before. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;
@@ -110,6 +115,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
     return true;
 }
 
+/* Processes the packets that have arrived; does not wait. */
 static void take_all(udp *u)
 {
     uint8_t bytes[POSITION_BYTES + 1];
@@ -118,7 +124,8 @@ static void take_all(udp *u)
         socklen_t length = sizeof from;
         ssize_t size = recvfrom(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_TRUNC,
                                 (struct sockaddr *)&from, &length);
-        if (size < 0 && errno != ECONNREFUSED) /* refused: the device is away, and may return */
+        /* ECONNREFUSED: an earlier feedback did not reach the device, which may return */
+        if (size < 0 && errno != ECONNREFUSED)
             return;
         if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))
             u->ignored++;
@@ -154,10 +161,10 @@ static bool begin_udp(void *self, double seconds, haptic_pose *first)
     return u->known;
 }
 
-static bool read_position(void *self, uint64_t step_seconds, haptic_pose *out)
+static bool read_position(void *self, uint64_t step, haptic_pose *out)
 {
     udp *u = self;
-    (void)step_seconds;
+    (void)step;
     take_all(u);
     *out = u->pose;
     return !u->ended;
@@ -202,8 +209,8 @@ static void end_udp(void *self)
     free(u);
 }
 
-/* Reads a name 'udp:PORT', which stands for an address of this machine only, or 'udp:ADDRESS:PORT'.
- */
+/* Reads a name 'udp:PORT' or 'udp:ADDRESS:PORT'. Without an address, only programs on this machine
+ * can connect. Returns false for other names. */
 static bool read_name(const char *name, struct sockaddr_in *out)
 {
     char address[64] = "127.0.0.1", *after;

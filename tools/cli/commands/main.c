@@ -18,8 +18,8 @@
 /* The commands of one part of `ebpo help`. Builds without extras lack some of the commands. */
 typedef struct command_group {
     const char *title;
-    const command *const *commands; /* NULL ends it */
-    const char *extras;             /* names of commands that this build lacks; NULL: none */
+    const command *const *commands; /* NULL after the last command; or NULL, if there are none */
+    const char *extras; /* names of commands that this build lacks, separated by blanks; or NULL */
 } command_group;
 
 #define COMMAND_GROUP(title, list) { title, (const command *const[]){ list NULL }, NULL },
@@ -62,8 +62,8 @@ static void print_usage(FILE *out)
           "  1  bad data, or an input or output error\n"
           "  2  wrong usage\n"
           "  3  not a solid where one is required\n"
-          "  4  repack, recover: the content would differ, or differs; paint: the paint\n"
-          "     belongs to another model; catalogue: files were omitted\n",
+          "  4  repack: the content would differ; recover: the content differs; paint: the\n"
+          "     paint belongs to another model; catalogue: files were omitted\n",
           out);
 }
 
@@ -79,9 +79,10 @@ static bool is_among(const char *names, const char *name)
 
 static int unknown_command(const char *name)
 {
-    const char *now = renamed_command(name);
-    if (now) {
-        fprintf(stderr, "ebpo: the command '%s' is now '%s'; try 'ebpo help %s'\n", name, now, now);
+    const char *new_name = renamed_command(name);
+    if (new_name) {
+        fprintf(stderr, "ebpo: the command '%s' is now '%s'; try 'ebpo help %s'\n", name, new_name,
+                new_name);
         return EXIT_USAGE;
     }
     for (int g = 0; g < GROUPS; g++)
@@ -142,13 +143,14 @@ static void *run_command(void *user)
     return NULL;
 }
 
-/* Runs the command on a thread with enough stack when RLIMIT_STACK gives the main thread less. */
+/* Runs the command; on another thread if RLIMIT_STACK gives the main thread a stack smaller than
+ * COMMAND_STACK. Returns the exit code. */
 static int run_with_stack(command_call *call)
 {
     struct rlimit stack;
     pthread_t thread;
-    bool little = getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < COMMAND_STACK;
-    if (little && command_thread(&thread, run_command, call) == 0)
+    bool has_small_stack = getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < COMMAND_STACK;
+    if (has_small_stack && command_thread(&thread, run_command, call) == 0)
         pthread_join(thread, NULL);
     else
         run_command(call);
@@ -190,7 +192,8 @@ int main(int argc, char **argv)
 {
     if (!standard_files_occupy())
         return EXIT_FAILED;
-    /* undoes changes by a preloaded library, as the command itself parses and prints numbers */
+    /* A preloaded library may have changed the floating-point environment, in which this program
+     * parses and prints numbers. */
     fesetenv(FE_DFL_ENV);
     signals_install();
     words_init();

@@ -6,8 +6,11 @@
 
 #include "cli/remote_args.h"
 
-#define MAP_MARGIN 0.1 /* default */
+#define MAP_MARGIN                                                                \
+    0.1 /* default of --margin, as a share of the longest edge of the model's box \
+         */
 
+/* Values of the options. */
 typedef struct map_values {
     const char *plane, *grid, *from, *out, *picture, *size, *box, *memory;
     double margin, max_distance, range;
@@ -19,19 +22,16 @@ typedef struct map_values {
 
 typedef struct map_job {
     const map_values *v;
-    const char *path; /* FILE */
+    const char *path; /* FILE, the operand */
     ebpo_file *file;
     ebpo_model *model;
     ebpo_map_options options;
-    /* points of a plane or grid */
-    bool plane;
-    ebpo_lattice lattice;
-    /* map of vertices */
-    int width, height; /* size of their picture */
-    /* results */
-    double range; /* range of the colours */
-    ebpo_map_stats stats;
-    ebpo_map_hausdorff hausdorff;
+    bool plane;           /* --plane was given, not --grid or --from */
+    ebpo_lattice lattice; /* points of a plane or grid */
+    int width, height;    /* size of the picture in pixels; 0: follows from the plane */
+    double range;         /* distance with the last colour of the palette; 0: not yet known */
+    ebpo_map_stats stats; /* results */
+    ebpo_map_hausdorff hausdorff; /* result of --bounds */
 } map_job;
 
 /* Reads "800x600" into two numbers of 2 to 8192 each. Returns false after an error, which was

@@ -6,6 +6,7 @@
 
 #include "cli/remote_args.h"
 
+/* Values of the options. */
 typedef struct paint_values {
     const char *new_layer, *title, *author, *date, *description, *colour, *path, *note, *at, *out,
         *bake, *base, *memory;
@@ -18,17 +19,18 @@ typedef struct paint_values {
 
 typedef struct paint_job {
     const paint_values *v;
-    const char *paint_path, *model_path; /* model_path NULL: not given */
+    const char *paint_path;
+    const char *model_path; /* NULL: not given; then `file`, `model` and `context` are NULL, too */
     ebpo_paint *paint;
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
     ebpo_progress progress;
-    bool changed;            /* the paint in memory differs from the file */
-    ebpo_paint_drawn drawn;  /* by --path */
-    ebpo_paint_baked baked;  /* by --bake */
-    ebpo_paint_areas areas;  /* by --area */
-    uint64_t colours_of_own; /* by --bake: the model has colours of vertices */
+    bool changed;           /* the command changes the paint */
+    ebpo_paint_drawn drawn; /* result of --path */
+    ebpo_paint_baked baked; /* result of --bake */
+    ebpo_paint_areas areas; /* result of --area */
+    bool has_own_colours;   /* with --bake: the model has colours of vertices */
 } paint_job;
 
 /* Prints the layers and notes of the paint, and the results of the command. */

@@ -7,7 +7,7 @@
 #include "cli/words.h"
 #include "cli/commands/paint_job.h"
 
-/* "#rrggbbaa" */
+/* Writes a colour as "#rrggbbaa"; returns `out`. */
 static const char *colour_text(uint32_t colour, char out[12])
 {
     snprintf(out, 12, "#%08x", colour);
@@ -36,7 +36,7 @@ static counts *count_layers(const ebpo_paint *p, const ebpo_paint_info *info)
 
 /* --- words --- */
 
-/* Prints the lines of a text, each after some blanks. */
+/* Prints the lines of a text, indented. Lines are separated by U+2028. */
 static void print_lines(const char *text)
 {
     while (*text) {
@@ -136,13 +136,14 @@ static void print_changes(const paint_job *j)
 {
     const ebpo_paint_drawn *drawn = &j->drawn;
     const ebpo_paint_baked *b = &j->baked;
-    char points[40], strokes[40], steps[40], vertices[40];
+    char points[40], strokes[40], steps[40], vertices[40], lifted[40], strayed[40];
     if (j->v->path)
-        printf("  drawn      %s in %s, at %s; lifted at %llu, strayed %llu\n",
+        printf("  drawn      %s in %s, at %s; lifted at %s; %s discarded\n",
                words_plural(points, sizeof points, drawn->points, "point", "points"),
                words_plural(strokes, sizeof strokes, drawn->strokes, "stroke", "strokes"),
                words_plural(steps, sizeof steps, drawn->steps, "step", "steps"),
-               (unsigned long long)drawn->lifted, (unsigned long long)drawn->strayed);
+               words_plural(lifted, sizeof lifted, drawn->lifted, "step", "steps"),
+               words_plural(strayed, sizeof strayed, drawn->strayed, "point", "points"));
     if (j->v->bake)
         printf("  baked      %s of %llu; of %s, %llu cover no vertex\n",
                words_plural(vertices, sizeof vertices, b->vertices, "vertex", "vertices"),
@@ -328,7 +329,7 @@ static void json_changes(const paint_job *j, json *out)
         json_uint(out, "points", j->baked.points);
         json_uint(out, "points_outside_subset", j->baked.points_outside_subset);
         json_uint(out, "points_without_vertex", j->baked.points_without_vertex);
-        json_bool(out, "own_colours", j->colours_of_own);
+        json_bool(out, "own_colours", j->has_own_colours);
         json_end(out);
     }
 }

@@ -20,7 +20,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* --- which faces are red --- */
+/* --- red faces: faces that intersect the other instance --- */
 
 static bool take_red(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
@@ -50,8 +50,9 @@ ebpo_status painted_find_red(ebpo_scene *scene, uint64_t a, uint64_t b, double t
     return ebpo_scene_collide(scene, a, b, time, threads, take_red, red, error);
 }
 
-/* --- what is drawn --- */
+/* --- the mesh to draw --- */
 
+/* Reserves space for more vertices and faces. Returns false if there is not enough memory. */
 static bool reserve_space(painted_mesh *p, uint64_t vertices, uint64_t faces)
 {
     ebpo_mesh *m = &p->mesh;
@@ -73,6 +74,7 @@ static void add_vertex(ebpo_mesh *m, const ebpo_pose *pose, const double x[3])
     }
 }
 
+/* first: index of the vertex that corner index 0 stands for */
 static void add_face(painted_mesh *p, uint32_t first, const uint32_t corner[3], uint8_t paint)
 {
     ebpo_mesh *m = &p->mesh;
@@ -141,6 +143,7 @@ ebpo_status painted_add_box(painted_mesh *p, const ebpo_scene *scene, uint64_t i
     return EBPO_OK;
 }
 
+/* Returns true if the box of the face intersects the cube of painted_crop. */
 static bool is_near(const ebpo_mesh *m, uint64_t face, const double middle[3], double half_side)
 {
     for (uint64_t k = 0; k < 3; k++) {

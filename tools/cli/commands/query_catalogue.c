@@ -10,7 +10,7 @@
 #include "cli/model_stats.h"
 #include "cli/words.h"
 
-/* Options that a catalogue does not support, in the order of reports. */
+/* Returns the first given option, or the command, that a catalogue does not support; NULL: none. */
 static const char *refused_option(const query_job *job)
 {
     const query_values *v = job->values;
@@ -45,8 +45,8 @@ bool query_catalogue_fits(const query_job *job)
     return !what;
 }
 
-static ebpo_status open_as_reported(void *user, const char *path, ebpo_file **out,
-                                    ebpo_error *error)
+/* Opens a model of the catalogue with the options for URLs. user: a remote_values. */
+static ebpo_status open_model(void *user, const char *path, ebpo_file **out, ebpo_error *error)
 {
     return remote_open(out, path, user, error);
 }
@@ -55,15 +55,15 @@ int query_catalogue_open(query_job *job, const char *path, const ebpo_model_opti
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const query_values *v = job->values;
-    ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
-    ebpo_catalogue_models_options o = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    how.open_file = open_as_reported;
-    how.user = (void *)&v->remote;
-    o.memory = v->memory ? options->memory : ebpo_free_memory() / 2;
-    o.threads = options->threads;
-    ebpo_status status = ebpo_catalogue_open(path, &how, &job->catalogue, &error);
+    ebpo_catalogue_options catalogue_options = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue_models_options models_options = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    catalogue_options.open_file = open_model;
+    catalogue_options.user = (void *)&v->remote;
+    models_options.memory = v->memory ? options->memory : ebpo_free_memory() / 2;
+    models_options.threads = options->threads;
+    ebpo_status status = ebpo_catalogue_open(path, &catalogue_options, &job->catalogue, &error);
     if (status == EBPO_OK)
-        status = ebpo_catalogue_models_new(&o, &job->models, &error);
+        status = ebpo_catalogue_models_new(&models_options, &job->models, &error);
     return status == EBPO_OK ? EXIT_OK : command_failed(job->command, &error);
 }
 
@@ -126,7 +126,7 @@ int query_catalogue_facts(json *j, const char *command, const char *path)
     snprintf(hash, sizeof hash, "%016" PRIx64, facts.file_hash);
     json_object(j, "catalogue");
     json_uint(j, "bytes", facts.file_bytes);
-    json_text(j, "fnv1a", hash); /* it contains the digest of each model */
+    json_text(j, "fnv1a", hash); /* of the file, which contains the digest of each model */
     json_array(j, "numbers");
     for (uint64_t i = 0; i < facts.count; i++) {
         const char *numbers = ebpo_catalogue_get_entry(c, i)->numbers;

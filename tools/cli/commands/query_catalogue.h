@@ -10,8 +10,8 @@ bool query_catalogue_named(const char *name);
 /* Returns true if a catalogue supports the query; otherwise reports it on stderr (exit with
  * EXIT_USAGE). */
 bool query_catalogue_fits(const query_job *job);
-/* Opens the catalogue without opening models, as job->catalogue. The memory in `options`, if given,
- * is for all models. Returns an exit code; call query_catalogue_close in any case. */
+/* Opens the catalogue as job->catalogue; opens no models. With --memory, options->memory is the
+ * limit for all models together. Returns an exit code. Call query_catalogue_close in any case. */
 int query_catalogue_open(query_job *job, const char *path, const ebpo_model_options *options);
 void query_catalogue_close(query_job *job);
 /* Returns the options of the job, with one thread. */
@@ -19,8 +19,9 @@ ebpo_catalogue_query_options query_catalogue_options(const query_job *job);
 /* Prints statistics for --stats. */
 void query_catalogue_report(const query_job *job);
 
-/* Writes, as members of the note of a shard, the data of the catalogue that results depend on: the
- * file, and the sizes and times of files with numbers. Returns an exit code. */
+/* Writes the facts of the catalogue on which results depend, as members of the note of a shard (see
+ * query_shard.h): the size and hash of the catalogue file, and the sizes and times of files that
+ * have the source indices of models ("numbers"). Returns an exit code. */
 int query_catalogue_facts(json *j, const char *command, const char *path);
 
 #endif

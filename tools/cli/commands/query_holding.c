@@ -7,17 +7,20 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
-/* A model of at most this size is always loaded completely, which takes some milliseconds. */
+/* A model of at most this size in bytes is always loaded as a whole, which takes some milliseconds.
+ */
 enum { SMALL_MODEL = 16 << 20 };
 
-/* Minimum number of loads for a mean of their times; and the factor by which the estimated number
- * of loads must exceed the number of subtrees. */
+/* LOADS_MIN: number of loads from which their mean time is reliable. SAFETY_FACTOR: the whole model
+ * is loaded early only if the estimated number of loads exceeds the number of subtrees by this
+ * factor. */
 enum { LOADS_MIN = 8, SAFETY_FACTOR = 4 };
 
 /* --- opening --- */
 
-/* Sets the options for loading in parts: cuts a file with subtrees at their roots, so that each
- * part is one read, and another file as if the whole model did not fit. */
+/* Sets the options for loading in parts. A file with a subtree level (whose data is stored subtree
+ * by subtree) is cut there, so that each part is one read. Any other file is cut at the level that
+ * the library would choose if the whole model did not fit in memory. */
 static void cut_at_subtrees(query_holding *h)
 {
     ebpo_model_options *o = &h->options;
@@ -35,7 +38,8 @@ static void cut_at_subtrees(query_holding *h)
         h->subtrees = parts.subtrees;
 }
 
-/* Uses at most half of the free memory, or the minimum. */
+/* Sets the memory limit: half of the free memory, or what the model needs at least if that is more.
+ * Decides whether to load the model in parts at first. */
 static void decide_memory(query_holding *h)
 {
     uint64_t half = (h->free_memory = ebpo_free_memory()) / 2;
@@ -50,6 +54,7 @@ static void decide_memory(query_holding *h)
     h->may_load_all = h->plan.resident && h->subtrees;
 }
 
+/* Returns true if no option limits or fixes what is loaded. */
 static bool is_unlimited(const query_values *v, const ebpo_model_options *o)
 {
     return !v->memory && o->cut_level < 0 && o->loading == EBPO_LOAD_CACHE && !v->prefetch;
@@ -112,7 +117,7 @@ static ebpo_status make_context(query_holding *h, ebpo_context **context, ebpo_e
     return status;
 }
 
-/* Needs exclusive access. */
+/* Frees the contexts of all threads. The caller must have exclusive access. */
 static void free_contexts(query_holding *h)
 {
     for (unsigned i = 0; i < h->contexts; i++) {
@@ -135,25 +140,26 @@ void query_holding_drop_context(query_holding *h, ebpo_context **context)
     *context = NULL;
 }
 
-/* --- all of the model --- */
+/* --- the whole model --- */
 
-/* Returns true if the whole model should be loaded now. Loading it costs as much as loading each
- * subtree once. Parts cost more if subtrees are loaded again, and because queries that change
- * between subtrees are slower. The whole model is loaded when this extra cost equals the cost of
- * loading, so that the total is at most twice the optimum; or at the beginning, if the remaining
- * queries will clearly need all subtrees. */
+/* Returns true if the whole model should be loaded now. Loading the whole model costs as much as
+ * loading each subtree once. Loading parts costs more, because subtrees are loaded again, and
+ * because queries that change between subtrees are slower. The whole model is loaded when this
+ * extra cost equals the cost of loading the whole model, so that the total is at most twice the
+ * optimum. It is loaded earlier if the remaining queries will clearly need all subtrees. total:
+ * number of queries; 0: not known. */
 static bool loading_pays(query_holding *h, double total)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
     if (ebpo_model_get_stats(h->session.model, &s) != EBPO_OK || s.loads < LOADS_MIN)
         return false;
     pthread_mutex_lock(&h->counts_lock);
-    double each = s.load_seconds / (double)s.loads, queries = (double)h->queries,
-           again = (double)(s.evicted < s.loads ? s.evicted : s.loads) * each,
+    double seconds_per_load = s.load_seconds / (double)s.loads, queries = (double)h->queries,
+           reload_seconds = (double)(s.evicted < s.loads ? s.evicted : s.loads) * seconds_per_load,
            query_time = h->query_seconds > s.load_seconds ? h->query_seconds - s.load_seconds : 0,
            expected_loads = queries > 0 ? (double)s.loads / queries * (total - queries) : 0;
-    h->whole_seconds = each * (double)h->subtrees;
-    h->extra_seconds = again + h->subtree_overhead * query_time;
+    h->whole_seconds = seconds_per_load * (double)h->subtrees;
+    h->extra_seconds = reload_seconds + h->subtree_overhead * query_time;
     h->queries_before = h->queries;
     h->loads_before = s.loads;
     bool pays = h->extra_seconds >= h->whole_seconds ||
@@ -163,8 +169,8 @@ static bool loading_pays(query_holding *h, double total)
     return pays;
 }
 
-/* Loads the whole model. Needs exclusive access. Frees the loaded parts first, so that the budget
- * is never exceeded. */
+/* Loads the whole model. The caller must have exclusive access. Frees the loaded parts first, so
+ * that the memory limit is never exceeded. */
 static ebpo_status load_all(query_holding *h, ebpo_error *error)
 {
     ebpo_model_options all = h->options;
@@ -180,7 +186,7 @@ static ebpo_status load_all(query_holding *h, ebpo_error *error)
     return status;
 }
 
-/* Loads the whole model on the first thread that calls this; other threads wait. */
+/* Loads the whole model, unless another thread has done so meanwhile. */
 static ebpo_status load_all_once(query_holding *h, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -238,11 +244,11 @@ void query_holding_leave(query_holding *h, uint64_t queries, double seconds)
 
 void query_holding_report(const query_holding *h)
 {
-    char half[32];
+    char limit[32];
     if (!h->automatic)
         return;
-    words_bytes(half, sizeof half, h->options.memory);
-    fprintf(stderr, "memory: at most %s, %s; ", half,
+    words_bytes(limit, sizeof limit, h->options.memory);
+    fprintf(stderr, "memory: at most %s, %s; ", limit,
             h->options.memory > h->free_memory / 2
                 ? "the minimum, which is more than half of the free memory"
                 : "half of the free memory");

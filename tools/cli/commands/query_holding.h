@@ -1,5 +1,5 @@
-/* Opens the model of a query command for all threads. Without --memory and similar options it
- * adapts: it begins with the upper levels and the subtrees that queries need, and loads the whole
+/* Opens the model of a query command for all threads. Without --memory and similar options, the
+ * command begins with the upper levels and the subtrees that queries need, and loads the whole
  * model when loading parts has cost as much as loading the whole model would. */
 #ifndef EBPO_TOOLS_QUERY_HOLDING_H
 #define EBPO_TOOLS_QUERY_HOLDING_H
@@ -16,27 +16,26 @@ typedef struct query_holding {
     query_session session;
     const char *command;
     ebpo_model_options options;
-    pthread_rwlock_t lock;                     /* held during queries; exclusive: to change the
-                                                * model */
-    ebpo_context **context[QUERY_THREADS_MAX]; /* existing contexts; protected by counts_lock */
-    unsigned contexts;
+    /* The lock of the model: shared during queries, exclusive while the model is changed. */
+    pthread_rwlock_t lock;
+    ebpo_context **context[QUERY_THREADS_MAX]; /* [contexts] contexts of all threads */
+    unsigned contexts;                         /* protected by counts_lock, as `context` */
     pthread_mutex_t counts_lock;
-    bool external; /* the job has other data, such as a catalogue; these functions do nothing */
+    bool external; /* the job queries a catalogue; `session` has no model */
     /* policy */
     bool automatic;           /* no memory limit was given */
-    atomic_bool may_load_all; /* the whole model may still be loaded */
-    bool loaded_all;          /* the whole model was loaded, for these two costs: */
-    uint64_t queries_before, loads_before;
-    /* cost of parts beyond loading each part once; estimated cost of loading everything */
-    double extra_seconds, whole_seconds;
+    atomic_bool may_load_all; /* the model is loaded in parts, and may be loaded as a whole later */
+    bool loaded_all;          /* the whole model was loaded after parts; the reasons: */
+    uint64_t queries_before, loads_before; /* numbers of queries and of loaded subtrees before */
+    double extra_seconds;    /* cost of parts beyond loading each part once, in seconds */
+    double whole_seconds;    /* estimated time to load the whole model */
     double subtree_overhead; /* extra share of the time of a query in parts, compared with the whole
                               * model */
     ebpo_model_plan plan;    /* for half of the free memory */
     uint64_t free_memory;    /* bytes, before the model was made */
-    uint64_t subtrees;       /* number of subtrees at first; 0: in one piece */
-    uint64_t queries;        /* number of queries and their time, including loads; protected by
-                              * counts_lock */
-    double query_seconds;    /* sum of all threads */
+    uint64_t subtrees;       /* number of subtrees; 0: the whole model was loaded at first */
+    uint64_t queries;        /* number of queries so far; protected by counts_lock */
+    double query_seconds; /* their time, including loads; sum of all threads; protected as well */
 } query_holding;
 
 /* Opens the model. Returns an exit code; errors have been reported. Call query_holding_close in any
@@ -53,10 +52,11 @@ void query_holding_close(query_holding *h);
  * number of queries done and their time. */
 EBPO_MUST_USE ebpo_status query_holding_enter(query_holding *h, ebpo_context **context,
                                               double total, ebpo_error *error);
-/* Enters as query_holding_enter does, but with exclusive access to the model, and never loads the
+/* Does the same as query_holding_enter, but with exclusive access to the model, and never loads the
  * whole model. Returns false after a failure. */
 bool query_holding_enter_alone(query_holding *h, ebpo_context **context);
 void query_holding_leave(query_holding *h, uint64_t queries, double seconds);
+/* Frees *context, and sets it to NULL. */
 void query_holding_drop_context(query_holding *h, ebpo_context **context);
 
 /* Print, for --stats, which parts of the model were in memory: a line of words on stderr, or a

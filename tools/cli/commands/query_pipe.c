@@ -9,21 +9,23 @@
 #include "cli/command.h"
 #include "cli/points_parse.h"
 
-/* Number of blocks in progress for each thread, and this number for large blocks: while the oldest
- * block is pending, other blocks are evaluated. FIRST_ROWS: rows of the first piece of a block. */
-enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_ROWS = 16 };
-/* Bytes of results that a block keeps, for each of its rows. */
+/* Number of blocks in progress for each thread; LARGE_EACH is for large blocks. With more than one,
+ * a thread can go on while the oldest block is not finished. */
+enum { BLOCKS_EACH = 4, LARGE_EACH = 2 };
+/* Number of rows of the first piece of the first block, see compute_block. */
+enum { FIRST_ROWS = 16 };
+/* Bytes of results for each row that a large block keeps in memory before they are written. */
 enum { KEPT_BYTES = 128 };
 
 /* A block of queries, and its results. */
 typedef struct slot {
     struct pipe_line *pipe;
     points_block block;
-    result_text text;
-    uint64_t number;
-    bool holds_model; /* its thread holds the lock of the model */
-    bool done;
-    ebpo_status status;
+    result_text text;   /* the results */
+    uint64_t number;    /* of the block, from 0 */
+    bool holds_model;   /* the thread of the block holds the lock of the model */
+    bool done;          /* the block is evaluated, and not yet written */
+    ebpo_status status; /* of the evaluation */
     ebpo_error error;
 } slot;
 
@@ -33,31 +35,32 @@ typedef struct pipe_thread {
     pthread_t thread;
 } pipe_thread;
 
-/* There are two locks: the lock of the model (query_holding.h), which is held while rows are
- * evaluated, and `lock`. No thread waits for `changed` while it holds the lock of the model, and no
- * thread takes another lock while it holds `lock`. So each thread that holds the lock of the model
- * releases it, and the oldest block waits for nothing else. */
+/* The state of all threads. There are two locks: `lock`, and the lock of the model
+ * (query_holding.h), which a thread holds while it evaluates rows. No thread waits for `changed`
+ * while it holds the lock of the model, and no thread takes another lock while it holds `lock`. So
+ * each thread that holds the lock of the model will release it, and there is no deadlock. */
 typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
     points *in;
     int wake_pipe; /* writing a byte here ends the wait of the reading thread; -1: unsupported */
     progress_line *progress;
-    unsigned threads; /* maximum */
-    uint64_t slots;
+    unsigned threads;         /* maximum number of threads */
+    uint64_t slots;           /* maximum number of blocks in progress */
     slot *slot;               /* [slots] block i is in slot i % slots */
     pipe_thread *pipe_thread; /* [threads] the first `started` threads have started */
     atomic_uint started;      /* changed by the thread that is taking a block */
     pthread_mutex_t lock;     /* protects all members below */
-    pthread_cond_t changed;   /* signals that any of these has changed */
+    pthread_cond_t changed;   /* signals that one of the members below has changed */
     bool taking;              /* a thread is taking a block; only one at a time */
     uint64_t taken;           /* number of blocks that were taken */
     uint64_t written;         /* number of blocks whose results have been written */
     bool writing;             /* a thread is writing block `written`; only one at a time */
-    bool stopped;
-    /* used only by the thread that writes blocks */
-    uint64_t rows_written, bytes_written;
-    int code;
+    bool stopped;             /* an error has occurred; no more blocks are taken or written */
+    /* only the thread that writes blocks uses these */
+    uint64_t rows_written;  /* number of rows in written blocks */
+    uint64_t bytes_written; /* bytes of their input */
+    int code;               /* exit code */
 } pipe_line;
 
 /* --- writing results in order --- */
@@ -70,8 +73,8 @@ static void stop_pipe(pipe_line *p)
     pthread_cond_broadcast(&p->changed);
 }
 
-/* Returns true if all earlier blocks have been written; waits for that unless the thread holds the
- * lock of the model. */
+/* Returns true if all earlier blocks have been written. Waits until they are, unless the thread
+ * holds the lock of the model. */
 static bool has_turn(slot *s)
 {
     pipe_line *p = s->pipe;
@@ -85,8 +88,9 @@ static bool has_turn(slot *s)
     return turn;
 }
 
-/* Writes long results if all earlier blocks have been written. Otherwise evaluation stops at a row,
- * and continues after the lock of the model has been released. */
+/* Called when the results of a block have become long. Writes them if all earlier blocks have been
+ * written. Otherwise marks the text as full: evaluation then stops after a row, and continues when
+ * this thread has released the lock of the model and its turn to write has come. */
 static void spill_results(result_text *t, void *user)
 {
     slot *s = user;
@@ -108,7 +112,7 @@ static void report_progress(pipe_line *p, const slot *s)
     progress_report(p->progress, "queries", p->rows_written, total);
 }
 
-/* Writes the results of a block, then reports the error after them, if any. Returns false if no
+/* Writes the results of a block, and then reports its error, if there is one. Returns false if no
  * further results may be written. */
 static bool write_block(pipe_line *p, slot *s)
 {
@@ -150,17 +154,19 @@ static void finish_block(pipe_line *p, slot *s)
 
 /* --- one block --- */
 
-static bool alloc_results(query_worker *w, size_t each, uint64_t rows)
+/* Ensures that w->results has space for `rows` rows of `row_bytes` each. Returns false if there is
+ * not enough memory. */
+static bool alloc_results(query_worker *w, size_t row_bytes, uint64_t rows)
 {
-    if (each && w->row_capacity < rows) {
+    if (row_bytes && w->row_capacity < rows) {
         free(w->results);
-        w->results = malloc(rows * each);
+        w->results = malloc(rows * row_bytes);
         w->row_capacity = w->results ? rows : 0;
     }
-    return !each || w->row_capacity >= rows;
+    return !row_bytes || w->row_capacity >= rows;
 }
 
-/* Estimates the number of queries; 0: not known. */
+/* Estimates the number of queries in the input; 0: not known. */
 static double estimate_total(const points *in, const points_block *b)
 {
     if (in->rows_known)
@@ -168,8 +174,10 @@ static double estimate_total(const points *in, const points_block *b)
     return (double)in->bytes_total * (double)b->row_count / (double)(b->count ? b->count : 1);
 }
 
-/* Evaluates the rows from text->rows on, with the current model. */
-static void compute_rest(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count)
+/* Evaluates the rows from number s->text.rows on. Call after query_holding_enter; leaves the model.
+ */
+static void compute_from_row(pipe_line *p, query_worker *w, slot *s, const double *rows,
+                             uint64_t count)
 {
     uint64_t done = s->text.rows, width = (uint64_t)points_width(p->job->kind);
     double begin = progress_now();
@@ -179,9 +187,10 @@ static void compute_rest(pipe_line *p, query_worker *w, slot *s, const double *r
     query_holding_leave(p->holding, count - done, progress_now() - begin);
 }
 
-/* Evaluates rows of a block, or only the first text->rows of them. If other threads use memory that
- * these rows need, evaluates them while no other thread uses the model. Returns false if no further
- * rows may be evaluated. */
+/* Evaluates and prints rows of a block. After the call, s->text.rows is the number of evaluated
+ * rows, which may be less than `count`. If the rows need memory that other threads use, evaluates
+ * them again while no other thread uses the model. Returns false if no further rows may be
+ * evaluated. */
 static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
                          double total)
 {
@@ -189,14 +198,14 @@ static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *r
     s->status = query_holding_enter(p->holding, &w->context, total, &s->error);
     if (s->status != EBPO_OK)
         return false;
-    compute_rest(p, w, s, rows, count);
+    compute_from_row(p, w, s, rows, count);
     if (s->status == EBPO_E_LIMIT && p->started > 1 &&
         query_holding_enter_alone(p->holding, &w->context)) {
         result_text_retry(&s->text);
-        compute_rest(p, w, s, rows, count);
+        compute_from_row(p, w, s, rows, count);
     }
     if (s->status != EBPO_OK)
-        return count > 1 && s->text.rows == 0; /* rows before the failing one are evaluated */
+        return count > 1 && s->text.rows == 0; /* true: compute_block tries the rows one by one */
     if (p->job->print)
         p->job->print(p->job, w, rows, count);
     if (s->text.full) {
@@ -206,9 +215,10 @@ static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *r
     return !result_text_is_over(&s->text);
 }
 
-/* Evaluates all rows of a block, in pieces. The first block has small pieces, each as large as all
- * pieces before it: after each piece the whole model may be loaded. Queries that fail together are
- * evaluated one by one. */
+/* Evaluates all rows of a block. The first block is evaluated in pieces, because the whole model
+ * may be loaded before each piece: the first piece is small, and each other piece is as large as
+ * all pieces before it. If a piece fails, its rows are evaluated one by one, so that the results
+ * before the failing row are printed. */
 static void compute_block(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;
@@ -223,8 +233,8 @@ static void compute_block(pipe_line *p, query_worker *w, slot *s)
         return;
     }
     for (uint64_t at = 0; at < b->row_count; at += s->text.rows) {
-        bool first = s->number == 0 && p->holding->may_load_all;
-        uint64_t piece = !first ? most : at ? at : FIRST_ROWS;
+        bool in_pieces = s->number == 0 && p->holding->may_load_all;
+        uint64_t piece = !in_pieces ? most : at ? at : FIRST_ROWS;
         most = s->status == EBPO_OK ? most : 1;
         piece = piece < most ? piece : most;
         piece = piece < b->row_count - at ? piece : b->row_count - at;
@@ -245,8 +255,8 @@ static void start_thread(pipe_line *p)
         p->started++;
 }
 
-/* Waits until this thread may take a block and a slot is free. Returns false if no more blocks are
- * taken. */
+/* Waits until no other thread is taking a block and a slot is free. Returns false if no more blocks
+ * are taken. */
 static bool begin_to_take(pipe_line *p)
 {
     pthread_mutex_lock(&p->lock);
@@ -350,9 +360,8 @@ static void free_slots(pipe_line *p)
     free(p->pipe_thread);
 }
 
-/* Runs the query on no rows, which reports unsupported queries, and writes the line of column
- * names.
- */
+/* Runs the query without rows, which reports unsupported queries, and prints the line of column
+ * names. Returns an exit code. */
 static int query_no_rows(pipe_line *p, query_worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -388,11 +397,12 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
     if (p.code == EXIT_OK) {
         p.started = 1;
         work_on_blocks(&p.pipe_thread[0]);
-        /* threads are started by earlier ones, which have ended here */
+        /* Only threads that take blocks start threads; thread 0 has ended, and a joined thread
+         * starts no more, so that `started` is final when the loop ends. */
         for (unsigned i = 1; i < p.started; i++)
             pthread_join(p.pipe_thread[i].thread, NULL);
         if (p.code == EXIT_OK && !result_text_write(&p.slot[0].text, job->command))
-            p.code = EXIT_FAILED; /* only the line of column names was written, without results */
+            p.code = EXIT_FAILED; /* there were no results, only the line of column names */
         if (p.code == EXIT_OK && in->failed)
             p.code = EXIT_FAILED;
     }

@@ -1,5 +1,6 @@
-/* Reads, evaluates and prints concurrently on all cores: each thread takes the next block of
- * queries, parses its numbers, evaluates, and prints to memory; blocks are written in order. */
+/* Reads, evaluates and prints queries on all cores. Each thread takes the next block of input,
+ * parses its numbers, evaluates its queries, and prints the results to memory. The results of
+ * blocks are written in the order of the input. */
 #ifndef EBPO_TOOLS_QUERY_PIPE_H
 #define EBPO_TOOLS_QUERY_PIPE_H
 
@@ -7,8 +8,8 @@
 #include "cli/commands/query_holding.h"
 #include "cli/commands/query_job.h"
 
-/* Evaluates all queries of `in`. Returns an exit code. threads: maximum number of threads, at least
- * 1; few queries use fewer threads. */
+/* Evaluates all queries of `in`. threads: maximum number of threads, at least 1; a small input uses
+ * fewer threads. Returns an exit code. */
 int query_pipe_run(const query_job *job, query_holding *holding, points *in, unsigned threads,
                    progress_line *progress);
 

@@ -37,14 +37,14 @@ static void report_stats(const query_job *job, const query_holding *holding)
 /* Returns the given number of threads or, if none was given, the number of cores that this process
  * may use. Loading modes that keep no data use one thread: each thread would drop the data of the
  * others. */
-static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
+static unsigned threads_for(const query_values *v, const ebpo_model_options *model_options)
 {
-    unsigned wanted = v->threads ? (unsigned)v->threads : command_cores();
-    wanted = wanted < QUERY_THREADS_MAX ? wanted : QUERY_THREADS_MAX;
-    return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
+    unsigned count = v->threads ? (unsigned)v->threads : command_cores();
+    count = count < QUERY_THREADS_MAX ? count : QUERY_THREADS_MAX;
+    return model_options->loading == EBPO_LOAD_CACHE && count ? count : 1;
 }
 
-/* Opens the requested attributes. */
+/* Opens the attributes of --attribute. Returns an exit code. */
 static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampler **out)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -61,7 +61,7 @@ static int query_all(query_job *job, query_holding *holding, points *in,
                      const ebpo_model_options *options)
 {
     progress_line line;
-    /* no line if the results go to the terminal */
+    /* no progress line if results are printed on the terminal */
     (void)progress_start(&line, job->command, isatty(STDOUT_FILENO));
     npy_results npy = { .command = job->command };
     bool as_npy = job->values->npy;
@@ -74,8 +74,9 @@ static int query_all(query_job *job, query_holding *holding, points *in,
     return as_npy && !npy_end(&npy) ? EXIT_FAILED : code;
 }
 
-/* Output formats exclude each other; --raw, which also describes the input, has the lowest
- * priority. */
+/* Checks that only one output format is given. --raw, which also describes the input, may be
+ * combined with another format, which then has priority. Returns false after a report on standard
+ * error. */
 static bool form_fits(const query_job *job)
 {
     const query_values *v = job->values;
@@ -107,16 +108,18 @@ static result_form form_of(const query_values *v)
                     : RESULTS_TEXT;
 }
 
-/* Number of points evaluated together, in the order of subtrees, if output goes to a file and only
- * parts of the model are in memory: so many that few subtrees are loaded again. */
+/* Number of rows evaluated together if output goes to a file and only parts of the model are in
+ * memory. The rows are evaluated in the order of subtrees, so that few subtrees are loaded again.
+ */
 enum { TOGETHER_IN_PARTS = 1 << 20 };
-/* Maximum number of values kept in one array. */
+/* Assumed maximum of the bytes that a row and its results need. */
 enum { TOGETHER_BYTES = 1024 };
 
-static uint64_t bytes_together(const query_values *v, const query_holding *holding)
+/* Returns the number of rows to evaluate together. */
+static uint64_t rows_together(const query_values *v, const query_holding *holding)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
-    const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on 32-bit machines */
+    const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* matters on 32-bit machines only */
     if (v->together)
         return (uint64_t)v->together < most ? (uint64_t)v->together : most;
     bool parts =
@@ -137,7 +140,7 @@ static int open_model(query_job *job, const char *model, const ebpo_model_option
     return query_catalogue_open(job, model, options);
 }
 
-/* Runs the query with the model on the points of `in`. */
+/* Opens the model or catalogue, and runs the query on the points of `in`. Returns an exit code. */
 static int run_query(query_job *job, const char *model, points *in,
                      const ebpo_model_options *options, query_shard *shard)
 {
@@ -149,7 +152,7 @@ static int run_query(query_job *job, const char *model, points *in,
     if (code == EXIT_OK)
         code = query_shard_begin(shard);
     if (code == EXIT_OK) {
-        in->rows_per_block = bytes_together(job->values, &holding);
+        in->rows_per_block = rows_together(job->values, &holding);
         code = query_all(job, &holding, in, options);
         code = query_shard_end(shard, job, code);
     }
@@ -172,10 +175,10 @@ static int open_and_run(query_job *job, const char *model, const char *path,
     if (query_shard_done(shard, job, &code))
         return code;
     bool ok = points_open_shard(&in, job->command, path, job->kind, v->raw, v->tmax, shard->number,
-                                shard->of ? shard->of : 1);
+                                shard->shards ? shard->shards : 1);
     in.header = v->header;
-    if (ok && shard->of)
-        ok = points_cut(&in, shard->number, shard->of);
+    if (ok && shard->shards)
+        ok = points_cut(&in, shard->number, shard->shards);
     code = ok ? run_query(job, model, &in, options, shard) : EXIT_FAILED;
     points_close(&in);
     return code;
@@ -192,7 +195,7 @@ int query_run(query_job *job, const char *model, const char *path)
     job->form = form_of(job->values);
     int code = EXIT_USAGE;
     if (query_shard_fits(&shard, job, model, path)) {
-        job->continues = shard.of && shard.number > 0;
+        job->continues = shard.shards && shard.number > 0;
         code = open_and_run(job, model, path, &options, &shard);
     }
     query_shard_free(&shard);

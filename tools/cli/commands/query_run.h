@@ -5,7 +5,8 @@
 
 #include "cli/commands/query_job.h"
 
-/* Returns an exit code. `points` may be NULL. */
+/* Runs the command. model: path of a model or a catalogue. points: path of a file of points; NULL:
+ * standard input. Returns an exit code. */
 int query_run(query_job *job, const char *model, const char *points);
 
 #endif

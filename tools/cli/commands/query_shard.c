@@ -33,10 +33,10 @@ static bool read_number(const char **at, uint64_t *out)
 static bool read_shard(query_shard *s, const char *text)
 {
     const char *at = text;
-    if (read_number(&at, &s->number) && *at == '/' && (at++, read_number(&at, &s->of)) && !*at &&
-        s->of > 0 && s->number < s->of)
+    if (read_number(&at, &s->number) && *at == '/' && (at++, read_number(&at, &s->shards)) &&
+        !*at && s->shards > 0 && s->number < s->shards)
         return true;
-    s->of = 0;
+    s->shards = 0;
     command_usage(s->command,
                   "--shard: '%s' is not I/N, shard I of N; the first is 0, the last is N - 1",
                   text);
@@ -87,7 +87,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
     return false;
 }
 
-/* --- inputs of the results --- */
+/* --- facts of the inputs and options --- */
 
 static void report_query(json *j, const query_job *job)
 {
@@ -155,7 +155,7 @@ static int report_facts(const query_shard *s, const query_job *job, const struct
     json_text(&j, "ebpo", ebpo_version());
     json_text(&j, "command", s->command);
     json_uint(&j, "shard", s->number);
-    json_uint(&j, "of", s->of);
+    json_uint(&j, "of", s->shards);
     int code = report_model(&j, s);
     report_file(&j, "points", st);
     json_text(&j, "dataset", dataset);
@@ -189,8 +189,9 @@ static int inspect_inputs(const query_shard *s, const query_job *job, char **fac
 
 /* --- the note --- */
 
-/* Returns the text of the note: the facts, and the length and the time of the results. So the note
- * of one of two commands does not match the results of the other. */
+/* Returns the text of the note: the facts, and the length and time of the file of results, so that
+ * the note does not match results that another command wrote at the same time. NULL: there is not
+ * enough memory. */
 static char *note_text(const char *facts, const struct stat *results)
 {
     char *text = NULL;
@@ -206,25 +207,26 @@ static bool file_equals(const char *path, const char *text)
     size_t size = strlen(text);
     char *contents = malloc(size + 1);
     FILE *in = contents ? fopen(path, "re") : NULL;
-    bool same = in && fread(contents, 1, size + 1, in) == size && memcmp(contents, text, size) == 0;
+    bool equal =
+        in && fread(contents, 1, size + 1, in) == size && memcmp(contents, text, size) == 0;
     if (in)
         fclose(in);
     free(contents);
-    return same;
+    return equal;
 }
 
-/* Returns false if a file that is not a note, such as an input, has the name of the note. The file
- * is not changed, and is reported before the work begins. */
+/* Returns false, with a report on standard error, if a file that is not a note has the name of the
+ * note. */
 static bool check_note(const query_shard *s)
 {
-    static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
+    static const char beginning[] = "{\n  \"format\": \"ebpo-shard\",\n";
     struct stat st;
-    char contents[sizeof begins - 1];
+    char contents[sizeof beginning - 1];
     if (lstat(s->note, &st) != 0)
         return true; /* other errors are reported for the results, which are in the same folder */
     FILE *in = S_ISREG(st.st_mode) ? fopen(s->note, "re") : NULL;
     bool is_note = in && fread(contents, 1, sizeof contents, in) == sizeof contents &&
-                   memcmp(contents, begins, sizeof contents) == 0;
+                   memcmp(contents, beginning, sizeof contents) == 0;
     if (in)
         fclose(in);
     if (!is_note)
@@ -235,15 +237,16 @@ static bool check_note(const query_shard *s)
     return is_note;
 }
 
-/* Returns true if the results of these inputs exist. */
+/* Returns true if the results of these inputs exist. Reports why the command does nothing, or why
+ * it replaces existing results. */
 static bool results_exist(const query_shard *s)
 {
     struct stat st, note;
     bool out = stat(s->v->out, &st) == 0 && S_ISREG(st.st_mode);
     char *text = out ? note_text(s->facts, &st) : NULL;
-    bool same = text && file_equals(s->note, text);
+    bool exist = text && file_equals(s->note, text);
     free(text);
-    if (same)
+    if (exist)
         fprintf(stderr,
                 "ebpo %s: %s: exists, from the same model, points and options; nothing to do "
                 "(--force writes it again)\n",
@@ -253,13 +256,13 @@ static bool results_exist(const query_shard *s)
                 "ebpo %s: %s: is from another model, other points or options, or was changed, "
                 "according to %s; writing it again\n",
                 s->command, s->v->out, s->note);
-    return same;
+    return exist;
 }
 
 bool query_shard_done(query_shard *s, const query_job *job, int *code)
 {
     *code = EXIT_OK;
-    if (!s->of)
+    if (!s->shards)
         return false;
     *code = inspect_inputs(s, job, &s->facts);
     if (*code == EXIT_OK && asprintf(&s->note, "%s.shard", s->v->out) < 0) {
@@ -294,16 +297,16 @@ int query_shard_begin(query_shard *s)
 /* Checks that the inputs have not changed since the first check. */
 static int check_unchanged(const query_shard *s, const query_job *job)
 {
-    char *now = NULL;
-    int code = inspect_inputs(s, job, &now);
-    if (code == EXIT_OK && strcmp(now, s->facts) != 0) {
+    char *new_facts = NULL;
+    int code = inspect_inputs(s, job, &new_facts);
+    if (code == EXIT_OK && strcmp(new_facts, s->facts) != 0) {
         fprintf(stderr,
                 "ebpo %s: the model or the points were changed while they were read; nothing was "
                 "written, start again\n",
                 s->command);
         code = EXIT_FAILED;
     }
-    free(now);
+    free(new_facts);
     return code;
 }
 
@@ -324,14 +327,15 @@ static int write_note(const query_shard *s, const struct stat *results)
     return status == EBPO_OK ? EXIT_OK : command_failed(s->command, &error);
 }
 
-/* Removes the old note first, and writes the new note last: if the process is killed at any time,
- * the note is never beside other results. `results` is the descriptor of the results: another
- * command may have replaced the file. */
+/* Moves the results to their place. Removes the old note before and writes the new note afterwards,
+ * so that a note is never beside other results, even if the process is killed. results: the open
+ * file of the results, because another command may replace the file at the path. Returns an exit
+ * code. */
 static int put_in_place(query_shard *s, int results)
 {
     struct stat st;
     ebpo_error error = EBPO_ERROR_INIT;
-    if (s->of && unlink(s->note) != 0 && errno != ENOENT) {
+    if (s->shards && unlink(s->note) != 0 && errno != ENOENT) {
         fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->note, strerror(errno));
         return EXIT_FAILED;
     }
@@ -339,7 +343,7 @@ static int put_in_place(query_shard *s, int results)
     s->out = NULL;
     if (status != EBPO_OK)
         return command_failed(s->command, &error);
-    if (!s->of)
+    if (!s->shards)
         return EXIT_OK;
     return fstat(results, &st) == 0 ? write_note(s, &st) : fail_results(s);
 }
@@ -354,7 +358,7 @@ int query_shard_end(query_shard *s, const query_job *job, int code)
     dup2(s->saved_stdout, STDOUT_FILENO);
     close(s->saved_stdout);
     s->saved_stdout = -1;
-    if (code == EXIT_OK && s->of)
+    if (code == EXIT_OK && s->shards)
         code = check_unchanged(s, job);
     if (code == EXIT_OK)
         code = put_in_place(s, results);

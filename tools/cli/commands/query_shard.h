@@ -1,6 +1,6 @@
-/* Writes results to a file atomically, for all queries or a shard of them. Beside the results of a
- * shard it writes a file with facts of their inputs, the note: a later run that finds the note of
- * the same inputs has nothing to do. */
+/* Writes results to a file atomically, for all queries or for a shard (one of N parts of the input,
+ * --shard). Beside the results of a shard, writes a file with facts of the inputs, called the note:
+ * a later run that finds a note with the same facts has nothing to do. */
 #ifndef EBPO_TOOLS_QUERY_SHARD_H
 #define EBPO_TOOLS_QUERY_SHARD_H
 
@@ -10,10 +10,10 @@ typedef struct query_shard {
     const char *command;
     const query_values *v;
     const char *model, *points; /* paths */
-    uint64_t number, of;        /* shard `number` of `of` shards; `of` 0: no shard */
-    char *facts;                /* all inputs of the results, as in the note */
+    uint64_t number, shards;    /* shard `number` of `shards` shards; `shards` 0: no shard */
+    char *facts;                /* facts of the inputs and options, as in the note */
     char *note;                 /* path of the note */
-    ebpo_output *out;
+    ebpo_output *out;           /* file of the results while it is written; NULL: none */
     int saved_stdout; /* original standard output, while the file replaces it; -1: not replaced */
 } query_shard;
 

@@ -6,11 +6,13 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
+/* State while the needs of models are printed. */
 typedef struct plan {
     const scene_values *v;
     const ebpo_scene *scene;
-    json j;
-    uint64_t bytes, file_bytes;
+    json j;              /* used with --json */
+    uint64_t bytes;      /* needed bytes of all files */
+    uint64_t file_bytes; /* sizes of all files */
 } plan;
 
 static const char *name_of(const ebpo_scene *scene, uint64_t model)
@@ -20,8 +22,7 @@ static const char *name_of(const ebpo_scene *scene, uint64_t model)
     return m.name;
 }
 
-/* Returns true for the first of the models that use one file, so that its bytes are counted once.
- */
+/* Returns true for the first of the models that use a file, so that its bytes are counted once. */
 static bool is_first(const ebpo_scene *scene, uint64_t model)
 {
     for (uint64_t i = 0; i < model; i++)
@@ -90,12 +91,12 @@ ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scen
                        ebpo_error *error)
 {
     plan p = { .v = v, .scene = scene };
-    ebpo_plan_options how = EBPO_PLAN_OPTIONS_INIT;
+    ebpo_plan_options plan_options = EBPO_PLAN_OPTIONS_INIT;
     progress_line line;
     (void)path;
-    how.margin = v->margin;
-    how.purpose = v->purpose;
-    how.progress = progress_start(&line, "scene", v->quiet);
+    plan_options.margin = v->margin;
+    plan_options.purpose = v->purpose;
+    plan_options.progress = progress_start(&line, "scene", v->quiet);
     json_begin(&p.j, stdout);
     if (v->json) {
         json_object(&p.j, NULL);
@@ -103,7 +104,8 @@ ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scen
         json_real(&p.j, "to", v->to);
         json_array(&p.j, "models");
     }
-    ebpo_status status = ebpo_scene_plan(scene, v->from, v->to, &how, print_needs, &p, error);
+    ebpo_status status =
+        ebpo_scene_plan(scene, v->from, v->to, &plan_options, print_needs, &p, error);
     progress_wipe(&line);
     if (v->json) {
         json_end(&p.j);
@@ -121,11 +123,13 @@ ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scen
 
 /* ---- packing ---- */
 
+/* State while the written files are printed. */
 typedef struct pack {
     const scene_values *v;
     const ebpo_scene *scene;
-    json j;
-    uint64_t bytes, source_bytes;
+    json j;                /* used with --json */
+    uint64_t bytes;        /* sizes of all written files */
+    uint64_t source_bytes; /* sizes of their source files */
 } pack;
 
 static void packed_json(pack *p, const ebpo_scene_packed *m)
@@ -147,10 +151,10 @@ static void packed_json(pack *p, const ebpo_scene_packed *m)
 
 static void packed_words(const pack *p, const ebpo_scene_packed *m)
 {
-    char bytes[32], whole[32], got[32];
+    char bytes[32], whole[32], read[32];
     printf("%10s %10s %10s  %s", words_bytes(bytes, sizeof bytes, m->bytes),
            words_bytes(whole, sizeof whole, m->source_bytes),
-           words_bytes(got, sizeof got, m->bytes_read), name_of(p->scene, m->model));
+           words_bytes(read, sizeof read, m->bytes_read), name_of(p->scene, m->model));
     if (m->max_error > 0)
         printf(": with an error of at most %.6g", m->max_error);
     puts(m->complete ? "" : "; exact queries are refused");
@@ -192,22 +196,22 @@ ebpo_status scene_pack(const scene_values *v, const char *path, ebpo_scene *scen
                        ebpo_error *error)
 {
     pack p = { .v = v, .scene = scene };
-    ebpo_pack_options how = EBPO_PACK_OPTIONS_INIT;
+    ebpo_pack_options pack_options = EBPO_PACK_OPTIONS_INIT;
     progress_line line;
     (void)path;
-    how.margin = v->margin;
-    how.purpose = v->purpose;
-    how.threads = (unsigned)v->threads;
+    pack_options.margin = v->margin;
+    pack_options.purpose = v->purpose;
+    pack_options.threads = (unsigned)v->threads;
     if (v->target_size) /* already checked by the command */
-        (void)words_read_size(v->target_size, &how.target_bytes);
-    how.progress = progress_start(&line, "scene", v->quiet);
+        (void)words_read_size(v->target_size, &pack_options.target_bytes);
+    pack_options.progress = progress_start(&line, "scene", v->quiet);
     json_begin(&p.j, stdout);
     if (v->json) {
         json_object(&p.j, NULL);
         json_array(&p.j, "models");
     }
     ebpo_status status =
-        ebpo_scene_pack(scene, v->out, v->from, v->to, &how, print_packed, &p, error);
+        ebpo_scene_pack(scene, v->out, v->from, v->to, &pack_options, print_packed, &p, error);
     progress_wipe(&line);
     if (status == EBPO_OK)
         report_packed(&p);

@@ -5,6 +5,7 @@
 
 #include "cli/commands/scene_run.h"
 
+/* Both functions take the path of the scene, for messages, and the loaded scene. */
 ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scene,
                        ebpo_error *error);
 

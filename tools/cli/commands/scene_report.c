@@ -23,6 +23,7 @@ static const char *scene_instance_name(const ebpo_scene *scene, uint64_t instanc
     return i.name;
 }
 
+/* Returns the word for an ebpo_relation; NULL: undecided. */
 static const char *relation_word(int32_t relation)
 {
     static const char *const words[] = { "disjoint",   "touching",   "intersecting",
@@ -89,9 +90,9 @@ static void scene_head_csv(const scene_values *v)
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
-/* Writes the text with doubled quotes. Spreadsheets read a text that begins with some characters as
- * a formula: writes a ' before such a text. Also writes a ' before a text that begins with ', so
- * that removing the first ' restores the text. */
+/* Writes the text in quotes; doubles the quotes within. A spreadsheet reads a text that begins with
+ * =, +, - or @ as a formula: writes a ' before such a text. Also writes a ' before a text that
+ * begins with ', so that removing the first ' always restores the text. */
 static void csv_text(const char *text)
 {
     putchar('"');
@@ -175,27 +176,30 @@ static void scene_row_words(const scene_values *v, const ebpo_scene *scene, doub
     putchar('\n');
 }
 
-/* State of a report: contacts in a scene at each of several times. */
+/* State of a report: contacts in a scene at each of several times, called frames. */
 typedef struct report {
     const scene_values *v;
     ebpo_scene *scene;
-    ebpo_scene_clash_options how;
-    uint64_t found_clashes, frames_found, tested;
-    scene_frame frame;
-    uint64_t capacity; /* capacity for contacts */
-    bool prints;       /* rows on standard output */
+    ebpo_scene_clash_options clash_options;
+    uint64_t found_clashes; /* number of clashes in all frames so far */
+    uint64_t frames_found;  /* number of frames with clashes */
+    uint64_t tested;        /* number of tested pairs of instances */
+    scene_frame frame;      /* the current frame */
+    uint64_t capacity;      /* capacity of frame.found_clashes */
+    bool prints;            /* print rows on standard output */
     json j;
-    const char *path;
-    uint64_t frames, reported;
-    /* One of these is set, by the ending of v->out; the others are NULL or false. */
-    ebpo_scene_report *record;
-    clash_strip *strip;
-    bool page;
-    clash_list clashes;
+    const char *path;          /* of the scene */
+    uint64_t frames, reported; /* number of frames in all, and reported so far */
+    /* The ending of v->out sets one of these three; the others are NULL or false. */
+    ebpo_scene_report *record; /* .h5 */
+    clash_strip *strip;        /* .png */
+    bool page;                 /* .html */
+    clash_list clashes;        /* for the page */
 } report;
 
 /* --- a frame --- */
 
+/* Copies the clashes into the frame; frame.found_clashes is NULL if there is not enough memory. */
 static bool keep_clashes(void *user, const ebpo_scene_clash *found_clashes, uint64_t count)
 {
     report *r = user;
@@ -218,8 +222,8 @@ static ebpo_status query_frame(report *r, double time, ebpo_error *error)
     (void)ebpo_scene_get_stats(r->scene, &before);
     f->count = 0;
     f->cost = (ebpo_scene_frame){ .time = time };
-    ebpo_status status =
-        ebpo_scene_find_clashes(r->scene, time, &r->how, keep_clashes, r, &f->cost.tested, error);
+    ebpo_status status = ebpo_scene_find_clashes(r->scene, time, &r->clash_options, keep_clashes, r,
+                                                 &f->cost.tested, error);
     if (status == EBPO_OK && f->count && !f->found_clashes) {
         snprintf(error->message, sizeof error->message, "no memory for %llu clashes",
                  (unsigned long long)f->count);
@@ -354,7 +358,8 @@ static void finish_report(report *r, double seconds)
         words_plural(tested, sizeof tested, r->tested, "pair", "pairs");
         fprintf(stderr, "%s, %llu with contacts; %s tested, %llu in contact%s; %.3g s\n", times,
                 (unsigned long long)r->frames_found, tested, (unsigned long long)r->found_clashes,
-                r->how.relate ? "" : " (enclosed instances are not checked without --solids)",
+                r->clash_options.relate ? ""
+                                        : " (enclosed instances are not checked without --solids)",
                 seconds);
     }
 }
@@ -369,27 +374,27 @@ static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
 
 static uint64_t frames_of(const scene_values *v)
 {
-    return v->to > v->from /* the command has checked that these are not too many */
-               ? 1 + (uint64_t)ceil((v->to - v->from) / v->step * (1 - 0x1p-40))
-               : 1;
+    /* cmd_scene.c has checked that the number is not too large. The factor 1 - 2^-40 ignores
+     * rounding errors, so that they do not add a frame. */
+    return v->to > v->from ? 1 + (uint64_t)ceil((v->to - v->from) / v->step * (1 - 0x1p-40)) : 1;
 }
 
 ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
                          ebpo_error *error)
 {
-    report r = { .v = v, .scene = scene, .how = EBPO_SCENE_CLASH_OPTIONS_INIT };
+    report r = { .v = v, .scene = scene, .clash_options = EBPO_SCENE_CLASH_OPTIONS_INIT };
     double begun = progress_now();
     progress_line line;
     r.path = path;
     r.frames = frames_of(v);
     r.page = v->out && words_end_with(v->out, ".html");
     r.prints = !v->out || v->csv || v->json;
-    r.how.count = v->count || r.page;
-    r.how.locations = v->locations || r.page;
-    r.how.relate = v->solids || v->depth > 0 || r.page;
-    r.how.depth = v->depth;
-    r.how.threads = (unsigned)v->threads;
-    r.how.progress = progress_start(&line, "scene", v->quiet);
+    r.clash_options.count = v->count || r.page;
+    r.clash_options.locations = v->locations || r.page;
+    r.clash_options.relate = v->solids || v->depth > 0 || r.page;
+    r.clash_options.depth = v->depth;
+    r.clash_options.threads = (unsigned)v->threads;
+    r.clash_options.progress = progress_start(&line, "scene", v->quiet);
     ebpo_status status = begin_report(&r, error);
     for (uint64_t n = 0; n < r.frames && status == EBPO_OK; n++) {
         status = query_frame(&r, time_of(v, n, r.frames), error);

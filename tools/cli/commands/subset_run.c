@@ -13,12 +13,13 @@
 
 const char *const profile_words[] = { "full", "lod", "collision", NULL }; /* by ebpo_profile */
 
+/* Reads --levels, 0-N or 0-. Returns false for other text. */
 static bool read_levels(const char *text, int *last)
 {
     word_levels levels;
     if (!words_read_levels(text, &levels) || levels.first != 0 || !levels.is_contiguous)
         return false;
-    *last = levels.to_end ? -1 : levels.last; /* -1: all */
+    *last = levels.to_end ? -1 : levels.last; /* -1: all levels */
     return true;
 }
 
@@ -36,6 +37,7 @@ static bool read_box(const char *text, ebpo_subset_options *o)
     return o->boxed = true;
 }
 
+/* Returns the part of this name; 0: there is no such part. */
 static uint32_t part_named(const char *word, size_t length)
 {
     static const struct {
@@ -111,8 +113,8 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
         return command_usage(
             name, "--box: '%s' is not six numbers separated by commas, the lower corner first",
             v->box);
-    uint32_t all = ebpo_profile_parts(EBPO_PROFILE_FULL);
-    if (v->parts && !subset_read_parts(v->parts, all, &out->parts))
+    uint32_t full_parts = ebpo_profile_parts(EBPO_PROFILE_FULL);
+    if (v->parts && !subset_read_parts(v->parts, full_parts, &out->parts))
         return command_usage(name, "--parts: '%s' " SUBSET_PARTS_EXPECTED, v->parts);
     if (v->parts && v->profile >= 0)
         return command_usage(name, "--parts and --profile cannot be used together");
@@ -176,7 +178,7 @@ ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info, cons
 static void print_summary(const subset_values *v, const char *out_path, const ebpo_info *info,
                           const ebpo_info *from, const traffic *t, double seconds)
 {
-    char bytes[32], whole[32], parts[80], got[32];
+    char bytes[32], whole[32], parts[80], fetched[32];
     printf("%s: levels 0 to %d", out_path, info->level_count - 1);
     words_parts(parts, sizeof parts, info->parts);
     printf(", %s, %s of %s", parts[0] ? parts : "types only",
@@ -188,10 +190,10 @@ static void print_summary(const subset_values *v, const char *out_path, const eb
     if (info->kept_error > 0 && from->parts & ~info->parts & EBPO_PART_SURFACE)
         printf(", without the simplified surface, which has the faces of pruned nodes");
     if (t->remote)
-        printf(", %s in %" PRIu64 " requests", words_bytes(got, sizeof got, t->http.bytes),
+        printf(", %s in %" PRIu64 " requests", words_bytes(fetched, sizeof fetched, t->http.bytes),
                t->http.requests);
     if (t->remote && t->http.cache_bytes)
-        printf(", %s fetched earlier", words_bytes(got, sizeof got, t->http.cache_bytes));
+        printf(", %s fetched earlier", words_bytes(fetched, sizeof fetched, t->http.cache_bytes));
     printf(", in %.1f s\n", seconds);
 }
 

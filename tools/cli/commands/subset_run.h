@@ -11,8 +11,8 @@
 
 typedef struct subset_values {
     const char *levels, *box, *parts, *target_size, *subtree_faces;
-    double max_error;   /* 0: none given */
-    int profile, codec; /* -1: none given */
+    double max_error;   /* 0: not given */
+    int profile, codec; /* -1: not given */
     int face_coding;
     int64_t zstd_level, threads;
     bool json, quiet;
@@ -23,25 +23,27 @@ typedef struct subset_values {
         .profile = -1, .codec = -1, .remote = REMOTE_VALUES_INIT \
     }
 
-extern const char *const profile_words[];
+extern const char *const profile_words[]; /* by ebpo_profile; NULL ends them */
 
-/* Reads --parts: a list of part names separated by commas; with a minus or plus sign before each
- * name, the parts are `base` without or with these. Returns false if the list is invalid. */
+/* Reads --parts, a list of part names separated by commas. With a minus sign before each name,
+ * *parts becomes `base` without the named parts; with a plus sign, `base` and the named parts;
+ * without signs, the named parts. Returns false if the list is invalid. */
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 #define SUBSET_PARTS_EXPECTED                                                                     \
     "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, border, surface, " \
     "or of these with a minus or a plus sign before each"
 
-/* Sets *out from --max-error and --target-size; returns the exit code. */
+/* Sets the target in *out from --max-error and --target-size. name: of the command. Returns an exit
+ * code. */
 int subset_read_target(const char *name, double max_error, const char *target_size,
                        ebpo_subset_options *out);
 
-/* Prints the end of a summary, ", ...": the profile, if it was `chosen`, and the maximum error, if
- * the file is pruned. */
+/* Continues the line of a summary with ", ...": the profile, if the command chose the parts
+ * (`chosen`), and the maximum error, if the file is pruned. */
 void subset_print_target(const ebpo_info *info, bool chosen);
 
-/* Checks options before the file is open; returns the exit code, EXIT_OK to continue. `out` gets
- * all values that do not depend on the file. */
+/* Checks options before the file is open, and sets the members of *out that do not depend on the
+ * file. Returns an exit code; EXIT_OK: continue. */
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path,
                    ebpo_subset_options *out);
 
@@ -51,7 +53,8 @@ EBPO_MUST_USE ebpo_status subset_set_parts(const subset_values *v, const ebpo_in
                                            const char *shown, ebpo_subset_options *out,
                                            ebpo_error *error);
 
-/* Opens the written file, and reports its properties. t: traffic of the input. */
+/* Opens the written file, and reports its properties. from: facts of the input; t: traffic of the
+ * input. */
 EBPO_MUST_USE ebpo_status subset_report(const subset_values *v, const char *out_path,
                                         const ebpo_info *from, const traffic *t, double seconds,
                                         ebpo_error *error);

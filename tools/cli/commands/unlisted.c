@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* A file that appears to be one byte longer, see unlisted.h. */
 typedef struct longer_source {
     int fd;
     uint64_t size; /* size of the file; the source has one more byte */
@@ -32,7 +33,7 @@ static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void 
         if (read_bytes < 0 && errno == EINTR)
             continue;
         if (read_bytes == 0)
-            errno = EIO; /* it has been truncated */
+            errno = EIO; /* the file was truncated meanwhile */
         if (read_bytes <= 0)
             return fail_path(l->path, error);
         to += read_bytes;

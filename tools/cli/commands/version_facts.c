@@ -11,12 +11,12 @@
 #include "cli/words.h"
 #include "ebpo_config.h"
 
+/* Paths of installed files. */
 typedef struct installation {
     char program[PATH_MAX];
-    char library[PATH_MAX];           /* the library that runs; "": not known */
-    char installed_library[PATH_MAX]; /* the library installed with the program; "": does not exist
-                                       */
-    char plugin[PATH_MAX];            /* folder of the HDF5 plugin; "": does not exist */
+    char library[PATH_MAX];           /* the running library; "": not known */
+    char installed_library[PATH_MAX]; /* the library installed with the program; "": none */
+    char plugin[PATH_MAX];            /* folder of the HDF5 plugin; "": none */
 } installation;
 
 /* Sets `out` to the path of an installed file, or to "" if there is no such file. path: relative to
@@ -58,9 +58,9 @@ static void print_installation(const installation *i)
            EBPO_HAVE_QHULL ? " qhull" : "");
 }
 
-/* Warns that the running library is not the library installed with the program; called also without
- * --verbose. */
-static int warn_of_other(const installation *i)
+/* Warns if the running library is not the library installed with the program, or has another
+ * version. Returns an exit code. */
+static int warn_of_other_library(const installation *i)
 {
     bool other = i->installed_library[0] && i->library[0] &&
                  !command_same_file(i->installed_library, i->library);
@@ -90,5 +90,5 @@ int version_report(const char *argument)
            words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
     if (verbose)
         print_installation(&i);
-    return warn_of_other(&i);
+    return warn_of_other_library(&i);
 }

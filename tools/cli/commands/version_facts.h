@@ -2,10 +2,10 @@
 #ifndef EBPO_TOOLS_VERSION_FACTS_H
 #define EBPO_TOOLS_VERSION_FACTS_H
 
-/* `argument`: the argument after --version, or NULL. --verbose also prints the paths of the
- * program, the running library and the HDF5 plugin, and the built-in parts. Returns the exit code:
- * EXIT_FAILED, with the reason on stderr, when the running library is not the library installed
- * with the program. */
+/* argument: the argument after --version; NULL: none. With --verbose, also prints the paths of the
+ * program, the running library and the HDF5 plugin, and the names of built-in parts. Returns an
+ * exit code: EXIT_FAILED, with the reason on stderr, if the running library is not the library
+ * installed with the program. */
 int version_report(const char *argument);
 
 #endif
