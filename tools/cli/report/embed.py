@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""embed.py OUT.c NAME=FILE...: the files as C, for report_page.c, which finds them by their
+"""embed.py OUT.c NAME=FILE...: writes the files as C arrays, which report_page.c finds by their
 names."""
 import sys
 

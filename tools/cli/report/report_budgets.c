@@ -1,33 +1,35 @@
-/* Measures distance queries under a memory budget. The part of the model in memory gives an
- * interval without loading; an exact query loads subtrees. */
+/* Measures distance queries under a memory budget. Under a budget, a model keeps the levels 0 to
+ * its cut level in memory. These levels give an interval of each distance without loading; an exact
+ * query loads subtrees. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "cli/bench/bench_run.h"
 #include "cli/report/report_data.h"
 
-/* Maximum number of points; it is small, as loading subtrees takes time. */
+/* Maximum number of points; it is small because loading subtrees takes time. */
 enum { BUDGET_POINTS = 500 };
 
-static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, int cut, double *f,
-                                       ebpo_error *error)
+/* Sets the metrics f of a budget. cut_level: of the model; -1: the whole model is in memory. */
+static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, int cut_level,
+                                       double *f, ebpo_error *error)
 {
     uint64_t count = c->points < BUDGET_POINTS ? c->points : BUDGET_POINTS;
     double *width = malloc(count * sizeof *width);
     ebpo_context *context = NULL;
     ebpo_model_stats before = EBPO_MODEL_STATS_INIT, after = EBPO_MODEL_STATS_INIT;
-    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT, near = options;
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT, cut_options = options;
     ebpo_status status = width ? ebpo_context_new(model, &context, error) : EBPO_E_MEMORY;
-    options.unsigned_distance = near.unsigned_distance = true;
-    options.warm = near.warm = false;
-    near.level = cut;
-    for (uint64_t i = 0; i < count && status == EBPO_OK && cut >= 0; i++) {
+    options.unsigned_distance = cut_options.unsigned_distance = true;
+    options.warm = cut_options.warm = false;
+    cut_options.level = cut_level;
+    for (uint64_t i = 0; i < count && status == EBPO_OK && cut_level >= 0; i++) {
         ebpo_distance_result result;
-        status = ebpo_distance(context, c->uniform + 3 * i, &near, &result, error);
+        status = ebpo_distance(context, c->uniform + 3 * i, &cut_options, &result, error);
         width[i] = result.hi - result.lo;
     }
     if (status == EBPO_OK)
-        f[METRIC_BUDGET_WIDTH] = cut >= 0 ? quantile_of(width, count, 0.5) : 0;
+        f[METRIC_BUDGET_WIDTH] = cut_level >= 0 ? quantile_of(width, count, 0.5) : 0;
     ebpo_model_get_stats(model, &before);
     uint64_t begin = tool_clock();
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
@@ -43,7 +45,7 @@ static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, i
     return status;
 }
 
-/* Measures one budget. A budget that is too small gives no results, and is not an error. */
+/* Measures budget number i. */
 static ebpo_status measure_budget(comparison *c, method *m, ebpo_file *file, int i,
                                   ebpo_error *error)
 {
@@ -64,7 +66,7 @@ static ebpo_status measure_budget(comparison *c, method *m, ebpo_file *file, int
     return status;
 }
 
-/* Computes the memory of levels. */
+/* Computes the memory of models that keep levels 0 to i, for each measured level i. */
 static ebpo_status level_memory(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
@@ -109,7 +111,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
             m->budget[i][k] = NAN;
         method_note(m, "memory budgets", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;
-        return EBPO_OK; /* the budgets that follow are even smaller */
+        return EBPO_OK; /* this budget is too small, and the following ones are even smaller */
     }
     return EBPO_OK;
 }

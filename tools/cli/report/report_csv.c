@@ -3,7 +3,8 @@
 
 #include "cli/report/report_data.h"
 
-/* Prints a line. Names have no commas; an empty value means that the value is not available. */
+/* Prints a line. Names have no commas. v: NAN: not available; the field is then empty. level: -1:
+ * not a value of a level. */
 static void print_metric(FILE *out, const char *name, int level, const char *parameter,
                          const metric_name *q, double v)
 {
@@ -27,7 +28,7 @@ static void print_method(FILE *out, const comparison *c, const method *m)
     for (int i = 0; i < DEADLINES; i++) {
         snprintf(parameter, sizeof parameter, "%uus", deadlines_us[i]);
         for (int k = 0; k < DEADLINE_METRICS; k++)
-            print_metric(out, m->name, -1, parameter, &deadline_metrics[k], m->due[i][k]);
+            print_metric(out, m->name, -1, parameter, &deadline_metrics[k], m->deadline[i][k]);
     }
     for (int i = 0; i < BUDGETS; i++) {
         snprintf(parameter, sizeof parameter, "memory/%u", budget_parts[i]);

@@ -12,14 +12,15 @@
 
 enum {
     METHODS_MAX = ARGS_OPERANDS_MAX,
-    METHOD_NOTES = 10,
+    METHOD_NOTES = 10, /* maximum number of notes of a method */
     SETTINGS_MAX = METHODS_MAX,
-    DEADLINES = 8,
+    DEADLINES = 8, /* numbers of measured deadlines, budgets and targets */
     BUDGETS = 5,
     TARGETS = 8,
-    ROUNDS = 3,
-    REPORT_QUERIES =
-        200000 /* limits the bounds of a level's error: flat and huge models would take too long */
+    ROUNDS = 3, /* see round_times */
+    /* maximum number of distance queries for the error bounds of a level, because flat and huge
+     * models would need too much time */
+    REPORT_QUERIES = 200000
 };
 
 /* Values of each level; the table level_metrics describes them. */
@@ -106,11 +107,11 @@ typedef enum target_metric {
 } target_metric;
 
 typedef struct metric_name {
-    /* unit "1": a share or a ratio; "model": the model's unit of length, "model^3" its cube */
+    /* unit "1": a share or a ratio; "model": the model's unit of length; "model^3": its cube */
     const char *name, *unit;
     bool timed; /* the value differs from run to run */
     const char *meaning;
-    /* why the value may be absent; used if no note of the method gives a reason */
+    /* why the value may be absent if no note of the method gives a reason; NULL: never absent */
     const char *absent;
 } metric_name;
 extern const metric_name level_metrics[LEVEL_METRICS], whole_metrics[WHOLE_METRICS],
@@ -133,30 +134,32 @@ typedef struct target_result {
 typedef struct round_times {
     double reading[EBPO_LEVELS_MAX], inside[EBPO_LEVELS_MAX], distance[EBPO_LEVELS_MAX];
     double open, exact_inside, exact_distance;
-    double due[DEADLINES][DEADLINE_METRICS];
+    double deadline[DEADLINES][DEADLINE_METRICS];
 } round_times;
 
-/* One file. Unavailable values are NAN, and a note gives the reason. */
+/* A method is an .ebpo.h5 file: an operand, or built from a mesh with a selection of planes.
+ * Unavailable values are NAN, and a note gives the reason. */
 typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
     ebpo_solid_volume solid; /* bounds of the volume of the solid */
-    /* if volumes are beyond the range of a double: the share of the root cell that is inside the
-     * solid, from which the excess is computed; else 0 */
+    /* If volumes are beyond the range of a double: the share of the root cell that is inside the
+     * solid, from which the excess is computed. Otherwise 0. */
     double solid_share;
     ebpo_stored_sizes stored;
     int levels; /* number of levels in the file */
     double whole[WHOLE_METRICS], level[EBPO_LEVELS_MAX][LEVEL_METRICS],
-        due[DEADLINES][DEADLINE_METRICS], budget[BUDGETS][BUDGET_METRICS];
+        deadline[DEADLINES][DEADLINE_METRICS], budget[BUDGETS][BUDGET_METRICS];
     round_times round[ROUNDS];
     target_result targets[TARGETS];
     int target_count, note_count;
     ebpo_thesis_levels *unlimited; /* --unlimited; NULL: not computed */
     double unlimited_seconds;
-    char note[METHOD_NOTES][320];
-    char *picture[EBPO_LEVELS_MAX]; /* data URIs, or NULL */
+    char note[METHOD_NOTES][320];   /* [note_count] */
+    char *picture[EBPO_LEVELS_MAX]; /* data URIs; NULL: no picture */
 } method;
 
+/* Values of the options. */
 typedef struct report_values {
     const char *out, *levels, *percent, *k_root;
     uint32_t select;
@@ -170,30 +173,30 @@ typedef struct report_values {
     remote_values remote;
 } report_values;
 
-/* Number of planes for the selections of the theses. Each setting makes one method for each
+/* A number of planes for the selections of the theses. Each setting makes one method for each
  * selection. */
 typedef struct plane_setting {
-    double percent;
-    char k_root[24]; /* --k-root, used instead if not "" */
-    char word[32];   /* suffix of the selection's name; "" when there is one setting */
+    double percent;  /* --percent, used if `k_root` is "" */
+    char k_root[24]; /* --k-root */
+    char word[32];   /* follows the selection's name; "" if there is only one setting */
 } plane_setting;
 
 typedef struct comparison {
     const report_values *v;
     plane_setting setting[SETTINGS_MAX];
     int settings;
-    int first, last; /* levels to measure; a method that has fewer levels ends earlier */
-    double azimuth, elevation;
-    method *methods; /* [count] */
+    int first, last;           /* levels to measure; a method that has fewer levels ends earlier */
+    double azimuth, elevation; /* of the pictures, in degrees */
+    method *methods;           /* [count] */
     int count;
-    char model[256]; /* model name for the page */
-    char *portrait;  /* data URI of the model itself, or NULL */
-    double diagonal; /* diagonal of the bounding box of the model */
-    /* [points][3], the same for all methods; near NULL: no method has a mesh */
-    double *uniform, *near;
-    uint64_t points;
-    char folder[4096];            /* for temporary files */
-    const char *without_pictures; /* reason for missing pictures, or NULL */
+    char model[256];   /* model name for the page */
+    char *portrait;    /* picture of the model itself as a data URI; NULL: no picture */
+    double diagonal;   /* diagonal of the bounding box of the model */
+    uint64_t points;   /* number of points for queries, which are the same for all methods */
+    double *uniform;   /* [points][3] uniform in the bounding box of the model */
+    double *near;      /* [points][3] near the surface; NULL: no method has a mesh */
+    char folder[4096]; /* for temporary files */
+    const char *without_pictures; /* why there are no pictures; NULL: there are pictures */
     ebpo_progress progress;
     double seconds; /* duration of the whole report */
 } comparison;
@@ -203,8 +206,9 @@ int method_last(const comparison *c, const method *m);
 /* Returns the deepest measured level of all methods. */
 int comparison_last(const comparison *c);
 
-/* Sets all values to NAN. */
+/* Initializes a method; all values are NAN. */
 void method_begin(method *m, const char *name, const char *path);
+/* Adds the note "WHAT: WHY", unless the method has this note or too many notes. */
 void method_note(method *m, const char *what, const char *why);
 void comparison_free(comparison *c);
 
@@ -212,12 +216,12 @@ void comparison_free(comparison *c);
  */
 void report_stem(const char *path, char *out, size_t capacity);
 
-/* If `status` is a reason why a build or a file has no results of a kind, adds a note with this
- * reason, unless the note exists, and returns EBPO_OK. Otherwise returns `status`. */
+/* If `status` means that a file or this build does not support what was measured, adds the note
+ * "WHAT: " and the message of `error`, and returns EBPO_OK. Otherwise returns `status`. */
 ebpo_status method_note_missing(method *m, const char *what, ebpo_status status, ebpo_error *error);
 
-/* Sorts the values, and returns the quantile `share` (0 .. 1): the least value that at most 1 -
- * share of the values exceed; NAN if there is none. */
+/* Sorts the values, and returns their quantile: the least value that at most a share of 1 - `share`
+ * of the values exceeds. Returns NAN if `count` is 0. */
 double quantile_of(double *values, uint64_t count, double share);
 
 /* The steps of a report in their order. Each sets values of one method. */
@@ -232,9 +236,10 @@ EBPO_MUST_USE ebpo_status report_deadlines(comparison *c, method *m, ebpo_model 
                                            ebpo_error *error);
 /* Computes the medians of the rounds. */
 void report_medians(const comparison *c, method *m);
-/* Counts bytes and round trips for each level over a network. */
+/* Counts the bytes and round trips that reading each level over a network needs. */
 EBPO_MUST_USE ebpo_status report_lines(comparison *c, method *m, ebpo_error *error);
-/* Measures distances while only a part of the model is in memory. Needs memory_bytes. */
+/* Measures distances while only a part of the model is in memory. METRIC_MEMORY_BYTES must be set.
+ */
 EBPO_MUST_USE ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_targets(comparison *c, method *m, ebpo_file *file,

@@ -1,5 +1,5 @@
-/* Measures distance queries with a deadline: the width of the certain interval, and the time taken.
- */
+/* Measures distance queries with a deadline: the width of the interval that certainly contains the
+ * distance, and the time of the query. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -7,8 +7,8 @@
 #include "cli/report/report_data.h"
 
 typedef struct timing {
-    double *width, *took; /* [points] */
-    uint64_t exact, late;
+    double *width, *took; /* [points] widths of intervals, and times in nanoseconds */
+    uint64_t exact, late; /* numbers of exact results, and of results after the deadline */
 } timing;
 
 static ebpo_status query_in_time(const comparison *c, ebpo_context *context, unsigned us,
@@ -17,7 +17,7 @@ static ebpo_status query_in_time(const comparison *c, ebpo_context *context, uns
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.deadline_ns = UINT64_C(1000) * us;
     options.unsigned_distance = true;
-    options.warm = false; /* each point separately */
+    options.warm = false; /* no query uses the result of the query before */
     t->exact = t->late = 0;
     for (uint64_t i = 0; i < c->points; i++) {
         ebpo_distance_result result;
@@ -34,7 +34,8 @@ static ebpo_status query_in_time(const comparison *c, ebpo_context *context, uns
     return EBPO_OK;
 }
 
-static void note_timing(const comparison *c, timing *t, double *f)
+/* Sets the metrics of a deadline. */
+static void set_metrics(const comparison *c, timing *t, double *f)
 {
     double count = (double)c->points;
     f[METRIC_DEADLINE_EXACT] = (double)t->exact / count;
@@ -64,7 +65,7 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int ro
             c->progress.report(c->progress.user, "deadlines", (uint64_t)i, DEADLINES);
         status = query_in_time(c, context, deadlines_us[i], clock_cost, &t, error);
         if (status == EBPO_OK)
-            note_timing(c, &t, m->round[round].due[i]);
+            set_metrics(c, &t, m->round[round].deadline[i]);
     }
     free(t.width);
     free(t.took);

@@ -1,5 +1,5 @@
-/* Gathers the results of one method except times: values of the header, volumes, hulls and error
- * bounds, then targets and the costs of the theses. */
+/* Gathers the results of one method that are not times: values of the header, volumes, hulls, error
+ * bounds, targets and budgets, and the costs in the cost model of the theses. */
 #include <stdio.h>
 #include <string.h>
 
@@ -30,14 +30,16 @@ static void set_header_values(const comparison *c, method *m)
 
 /* --- levels --- */
 
-/* Returns true if the volume of the root cell, or of a cell far below it, is no normal double. */
+/* Returns true if the volume of the root cell, or of a cell 20 levels below (2^-60 of it), is no
+ * normal double. */
 static bool is_out_of_range(const ebpo_info *info)
 {
     double volume = info->box_size[0] * info->box_size[1] * info->box_size[2];
     return !isnormal(volume) || !isnormal(ldexp(volume, -60));
 }
 
-/* Returns the volume within the mesh in root cells, independent of the scale of the model. */
+/* Returns the volume within the mesh as a share of the root cell, which does not depend on the
+ * scale of the model. */
 static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
 {
     double sum = 0;
@@ -56,7 +58,7 @@ static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
     return fabs(sum) / 6;
 }
 
-/* Computes solid_share, which is used when volumes are beyond the range of a double. */
+/* Sets m->solid_share if volumes are beyond the range of a double. */
 static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
@@ -74,6 +76,7 @@ static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file
     return EBPO_OK;
 }
 
+/* Computes the excess of a level from m->solid_share. */
 static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *file, int level,
                                   ebpo_error *error)
 {
@@ -89,7 +92,8 @@ static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *fil
     return status;
 }
 
-/* Computes the volume of the solid from the header, or else from the mesh. */
+/* Sets the volume of the solid from the header or, if the header does not give it, from the mesh.
+ */
 static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file *file,
                                 ebpo_error *error)
 {
@@ -103,7 +107,7 @@ static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file 
     return status;
 }
 
-/* Computes volumes from all data of the file. */
+/* Computes the volumes of levels from all data of the file, including the mesh. */
 static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_status status = solid_volume(c, m, file, error);
@@ -120,20 +124,21 @@ static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebp
     return status;
 }
 
-/* Computes volumes from the levels alone. */
-static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+/* Computes the volumes of levels from the data of the levels alone, without the mesh. */
+static ebpo_status gather_levels_volumes(comparison *c, method *m, ebpo_file *file,
+                                         ebpo_error *error)
 {
-    ebpo_stream_options wanted = { sizeof(ebpo_stream_options), true, true,
-                                   (unsigned)c->v->threads };
+    ebpo_stream_options stream_options = { sizeof(ebpo_stream_options), true, true,
+                                           (unsigned)c->v->threads };
     ebpo_stream *stream = NULL;
-    bool more = true;
-    ebpo_status status = ebpo_stream_new(file, &wanted, &stream, error);
+    bool has_more = true;
+    ebpo_status status = ebpo_stream_new(file, &stream_options, &stream, error);
     for (int i = 0; i <= method_last(c, m) && status == EBPO_OK; i++) {
         ebpo_stream_level reported;
-        status = ebpo_stream_next_level(stream, &reported, &more, error);
+        status = ebpo_stream_next_level(stream, &reported, &has_more, error);
         if (status == EBPO_OK && i >= c->first) {
             m->level[i][METRIC_LEVELS_VOLUME] = reported.volume;
-            /* a file with leaf planes has all these data in its levels */
+            /* in a file with leaf planes, the levels alone have the same envelopes */
             m->level[i][METRIC_LEVELS_EXCESS] =
                 !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, reported.volume)
                 : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][METRIC_EXCESS]
@@ -183,29 +188,30 @@ static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file
     options.seed = (uint64_t)c->v->seed;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    /* begins at the root whichever levels are requested, as the bound of a level is at most the
-     * bound of the level above */
+    /* Begins at the root even if --levels omits it, because the bound of a level is at most the
+     * bound of the level above. */
     for (int i = 0; i <= method_last(c, m); i++) {
-        ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
+        ebpo_error_bound bound = EBPO_ERROR_BOUND_INIT;
         double *f = m->level[i];
         options.samples = i < c->first ? 0 : samples;
-        ebpo_status status = ebpo_level_error_bound(model, file, i, &options, &far, error);
+        ebpo_status status = ebpo_level_error_bound(model, file, i, &options, &bound, error);
         if (status != EBPO_OK)
             return method_note_missing(m, "Hausdorff distance", status, error);
-        options.at_most = far.hi;
+        options.at_most = bound.hi;
         if (i < c->first)
             continue;
-        f[METRIC_FAR_LO] = far.lo;
-        f[METRIC_FAR_HI] = far.hi;
-        f[METRIC_FAR_MEAN] = far.mean;
-        f[METRIC_FAR_RMS] = far.rms;
+        f[METRIC_FAR_LO] = bound.lo;
+        f[METRIC_FAR_HI] = bound.hi;
+        f[METRIC_FAR_MEAN] = bound.mean;
+        f[METRIC_FAR_RMS] = bound.rms;
     }
     return EBPO_OK;
 }
 
 /* --- all values --- */
 
-static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+/* Gathers the results for which the model is opened. */
+static ebpo_status gather_from_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
@@ -231,7 +237,7 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
     if (status == EBPO_OK)
         status = gather_volumes(c, m, file, error);
     if (status == EBPO_OK)
-        status = levels_alone(c, m, file, error);
+        status = gather_levels_volumes(c, m, file, error);
     if (status == EBPO_OK)
         status = report_lines(c, m, error);
     if (status == EBPO_OK)
@@ -239,7 +245,7 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
     if (status == EBPO_OK)
         status = gather_limits(c, m, file, error);
     if (status == EBPO_OK)
-        status = with_model(c, m, file, error);
+        status = gather_from_model(c, m, file, error);
     ebpo_close(file);
     return status;
 }

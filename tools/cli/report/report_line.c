@@ -1,5 +1,5 @@
-/* Counts bytes and round trips for reading a level over a network, with a simulated remote source.
- * The time follows from rate and latency; the page shows it for some networks. */
+/* Counts the bytes and round trips that reading a level over a network needs, with a simulated
+ * remote source. The page computes the times for networks with certain rates and delays. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,19 +9,19 @@
 
 #include "cli/report/report_data.h"
 
-/* as in the library for URLs: bytes fetched when opening, and the size of later blocks */
+/* Bytes fetched when a file is opened, and bytes of later blocks, as in the library for URLs. */
 enum { HEAD_BYTES = 128 << 10, BLOCK_BYTES = 4096 };
 
 /* A simulated network connection. Only one thread reads, so there is no lock. */
 typedef struct simulated_line {
-    int file;
-    uint64_t size, bytes;
+    int file;               /* descriptor of the local file */
+    uint64_t size, bytes;   /* of the file; number of bytes sent */
     uint64_t trips;         /* number of completed round trips */
     uint32_t *arrival_trip; /* for each block: the round trip that brings it; 0: not requested */
 } simulated_line;
 
-/* Requests the missing blocks of a range; they come with the next round trip. Returns the last
- * round trip that brings any block of the range. */
+/* Requests the missing blocks of a range, which come with the next round trip. Returns the number
+ * of the round trip after which all blocks of the range are there. */
 static uint64_t request_blocks(simulated_line *l, uint64_t offset, uint64_t size)
 {
     uint64_t last = 0;
@@ -53,25 +53,29 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
     return EBPO_OK;
 }
 
-static void hint_ranges(void *user, const ebpo_range *ranges, size_t count)
+/* Requests ranges that will be read: all their blocks come with one round trip. */
+static void prefetch_ranges(void *user, const ebpo_range *ranges, size_t count)
 {
     for (size_t i = 0; i < count; i++)
         (void)request_blocks(user, ranges[i].offset, ranges[i].size);
 }
 
+/* Opens the file over the simulated connection and reads levels 0 to `level`; sets the counts of
+ * `l`.
+ */
 static ebpo_status load_level(simulated_line *l, const char *path, int level, ebpo_error *error)
 {
-    ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream_options stream_options = EBPO_STREAM_OPTIONS_INIT;
     ebpo_source source = EBPO_SOURCE_INIT;
     ebpo_stream_level reported;
     ebpo_stream *stream = NULL;
     ebpo_file *file = NULL;
-    bool more = true;
-    wanted.threads = 1;
+    bool has_more = true;
+    stream_options.threads = 1;
     source.user = l;
     source.size = l->size;
     source.read = read_range;
-    source.prefetch = hint_ranges;
+    source.prefetch = prefetch_ranges;
     source.prefetched = l->size < HEAD_BYTES ? l->size : HEAD_BYTES;
     l->trips = l->bytes = 0;
     memset(l->arrival_trip, 0, (l->size / BLOCK_BYTES + 1) * sizeof *l->arrival_trip);
@@ -79,10 +83,10 @@ static ebpo_status load_level(simulated_line *l, const char *path, int level, eb
     ebpo_status status = ebpo_open_source(&source, path, &file, error);
     if (status == EBPO_OK) {
         ebpo_file_prefetch_levels(file, 0, level);
-        status = ebpo_stream_new(file, &wanted, &stream, error);
+        status = ebpo_stream_new(file, &stream_options, &stream, error);
     }
     for (int i = 0; i <= level && status == EBPO_OK; i++)
-        status = ebpo_stream_next_level(stream, &reported, &more, error);
+        status = ebpo_stream_next_level(stream, &reported, &has_more, error);
     ebpo_stream_free(stream);
     ebpo_close(file);
     return status;

@@ -12,6 +12,7 @@
 #include "cli/selection_args.h"
 #include "cli/words.h"
 
+/* Reports "WHAT: MESSAGE". Returns EXIT_USAGE. */
 static int refuse_method(const char *message, const char *what)
 {
     fprintf(stderr, "ebpo report: %s: %s; try 'ebpo report --help'\n", what, message);
@@ -20,6 +21,7 @@ static int refuse_method(const char *message, const char *what)
 
 /* --- files --- */
 
+/* Returns true if the files were made from the same mesh. */
 static bool same_model(const ebpo_info *a, const ebpo_info *b)
 {
     return memcmp(a->source_sha256, b->source_sha256, sizeof a->source_sha256) == 0 &&
@@ -30,6 +32,7 @@ static bool same_model(const ebpo_info *a, const ebpo_info *b)
            memcmp(&a->report.volume, &b->report.volume, sizeof a->report.volume) == 0;
 }
 
+/* Reads the facts of the method's file. Returns an exit code. */
 static int read_facts(comparison *c, method *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -54,7 +57,8 @@ static int read_facts(comparison *c, method *m)
     return EXIT_FAILED;
 }
 
-/* Derives the name of a method from a file name with any characters. */
+/* Sets `name` to the name of the file without folder and endings, with '_' instead of characters
+ * that names of methods must not have. */
 static void write_method_name(const char *path, char *name, size_t capacity)
 {
     report_stem(path, name, capacity);
@@ -89,8 +93,8 @@ static int add_file(comparison *c, const char *path)
 /* --- from a mesh --- */
 
 typedef struct build_result {
-    double seconds, unlimited_seconds;
-    ebpo_thesis_levels *levels; /* NULL: not computed */
+    double seconds, unlimited_seconds; /* times of the build and of --unlimited */
+    ebpo_thesis_levels *levels;        /* results of --unlimited; NULL: not computed */
 } build_result;
 
 static void build_options(const comparison *c, int selection, const plane_setting *setting,
@@ -101,8 +105,7 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->max_level = (int)v->max_level;
     o->leaf_faces = (uint32_t)v->leaf_faces;
     o->epsilon = v->epsilon;
-    o->parts |=
-        EBPO_PART_LEAF_PLANES; /* so that the levels of each method hold all of its planes */
+    o->parts |= EBPO_PART_LEAF_PLANES; /* so that levels have all planes, without the mesh */
     o->select = (ebpo_selection)selection;
     o->percent = setting->percent;
     o->normals = (ebpo_normal_distance)v->normals;
@@ -111,7 +114,8 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->progress = c->progress;
 }
 
-/* Computes the levels without the limits of files, from the mesh, which it consumes. */
+/* Computes the levels of --unlimited: without the limits that the file format sets, such as the
+ * number of planes of a node. Empties the mesh. */
 static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
                                      const ebpo_build_options *build, build_result *out,
                                      ebpo_error *error)
@@ -196,6 +200,8 @@ static int build_method(comparison *c, const char *mesh, int selection,
     return status == EBPO_OK ? EXIT_OK : command_failed("report", &error);
 }
 
+/* Returns the number of methods of a selection. Only selections of the theses, which select planes
+ * from the leaves, have settings. */
 static int settings_of(const comparison *c, int selection)
 {
     return ebpo_selection_describe((ebpo_selection)selection)->from_leaves ? c->settings : 1;
@@ -219,7 +225,7 @@ static int build_all(comparison *c, const char *mesh)
     return code;
 }
 
-/* --- both --- */
+/* --- files or a mesh --- */
 
 static int find_files(comparison *c, const char *const *operand)
 {
@@ -256,7 +262,7 @@ int report_find_methods(comparison *c, const char *const *operand)
     if (c->first > comparison_last(c)) {
         if (c->progress.user)
             progress_wipe(c->progress.user);
-        fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n",
+        fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest level is %d\n",
                 c->first, comparison_last(c));
         return EXIT_USAGE;
     }

@@ -14,12 +14,13 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 
-/* for the signal handler: the temporary folder, and the names of the model files that may be in it
- */
+/* For the signal handler: the temporary folder ("": none), and the names of the model files that
+ * may be in the folder. */
 static char temporary_folder[4096];
 static char model_names[OUTPUT_MODELS_MAX][OUTPUT_NAME_MAX];
 static volatile sig_atomic_t model_count;
 
+/* Reports "PATH: WHAT". Returns `code`. */
 static int fail_output(int code, const char *path, const char *what)
 {
     fprintf(stderr, "ebpo report: %s: %s\n", path, what);
@@ -48,10 +49,10 @@ static bool is_selection_file(const char *name)
     if (length < ending || strcmp(name + length - ending, MODEL_ENDING) != 0)
         return false;
     for (int i = 0; selection_words[i]; i++) {
-        size_t word = strlen(selection_words[i]), rest = length - ending;
+        size_t word = strlen(selection_words[i]), stem = length - ending;
         if (strncmp(name, selection_words[i], word) == 0 &&
-            (word == rest ||
-             (name[word] == '-' && word + 1 + strspn(name + word + 1, "K0123456789.e+-%") >= rest)))
+            (word == stem ||
+             (name[word] == '-' && word + 1 + strspn(name + word + 1, "K0123456789.e+-%") >= stem)))
             return true;
     }
     return false;
@@ -82,13 +83,13 @@ static bool is_operand(const char *folder, const char *name, const char *const *
 static int check_folder(const char *place, DIR *folder, const char *const *operand)
 {
     char text[600];
-    bool empty = true, report = false;
+    bool empty = true, has_report = false;
     for (struct dirent *entry; (entry = readdir(folder));) {
         const char *name = entry->d_name;
         if (is_dot(name))
             continue;
         empty = false;
-        report = report || strcmp(name, "report.json") == 0;
+        has_report = has_report || strcmp(name, "report.json") == 0;
         if (is_operand(place, name, operand)) {
             snprintf(text, sizeof text,
                      "is a folder with an input in it, '%.255s', and would be replaced; give "
@@ -104,7 +105,7 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
             return fail_output(EXIT_FAILED, place, text);
         }
     }
-    if (!empty && !report)
+    if (!empty && !has_report)
         return fail_output(
             EXIT_FAILED, place,
             "is a folder without report.json, so it may not be a report; give another folder with "
@@ -112,6 +113,7 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
     return EXIT_OK;
 }
 
+/* Checks that `place` does not exist, or is a report that may be replaced. Returns an exit code. */
 static int check_place(const char *place, const char *const *operand)
 {
     struct stat st;
@@ -126,8 +128,8 @@ static int check_place(const char *place, const char *const *operand)
     return code;
 }
 
-/* Removes the files, or only files with names of a report, and the folder if it is then empty.
- * Returns true if the folder was removed. */
+/* Removes all files of the folder or, if `report_files_only`, files with names of a report. Then
+ * removes the folder if it is empty. Returns true if the folder was removed. */
 static bool remove_folder(const char *folder, bool report_files_only)
 {
     char path[8192];
@@ -190,30 +192,31 @@ void output_remove(const char *folder)
     temporary_folder[0] = 0;
 }
 
-/* Makes the temporary folder. `place` may be an existing report, and ebpo_folder_begin fails if its
- * argument exists, so the argument is a hidden name beside `place`, .NAME.new. */
+/* Makes the temporary folder, and writes its path to `folder`. `place` (with `length` bytes) may be
+ * an existing report, but ebpo_folder_begin fails if its argument exists. So the argument is a
+ * hidden name beside `place`, .NAME.new. Returns false after a report on standard error. */
 static bool make_folder(const char *place, size_t length, char *folder, size_t capacity)
 {
-    char *making, hidden[4200];
+    char *made, hidden[4200];
     size_t name = length;
     ebpo_error error = EBPO_ERROR_INIT;
     while (name && place[name - 1] != '/')
         name--;
     snprintf(hidden, sizeof hidden, "%.*s.%.*s.new", (int)name, place, (int)(length - name),
              place + name);
-    if (ebpo_folder_begin(hidden, &making, &error) != EBPO_OK) {
+    if (ebpo_folder_begin(hidden, &made, &error) != EBPO_OK) {
         const char *cause = strncmp(error.message, hidden, strlen(hidden)) == 0
                                 ? error.message + strlen(hidden) + 2 /* and ": " */
                                 : error.message;
         return fail_output(EXIT_FAILED, access(hidden, F_OK) == 0 ? hidden : place, cause) ==
                EXIT_OK;
     }
-    bool fits = strlen(making) < capacity && strlen(making) < sizeof temporary_folder - 300;
+    bool fits = strlen(made) < capacity && strlen(made) < sizeof temporary_folder - 300;
     if (fits)
-        memcpy(folder, making, strlen(making) + 1);
+        memcpy(folder, made, strlen(made) + 1);
     else
-        rmdir(making);
-    free(making);
+        rmdir(made);
+    free(made);
     return fits || fail_output(EXIT_USAGE, place, "the name is too long") == EXIT_OK;
 }
 
@@ -238,11 +241,11 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
 
 /* Removes the folder of the replaced report. Files that the user has added since check_folder are
  * kept, with a warning. Returns true. */
-static bool remove_replaced(const char *older)
+static bool remove_replaced(const char *replaced)
 {
-    if (!remove_folder(older, true))
+    if (!remove_folder(replaced, true))
         fprintf(stderr, "ebpo report: warning: other files of the replaced report are now in %s\n",
-                older);
+                replaced);
     return true;
 }
 
@@ -255,7 +258,7 @@ bool output_commit(const char *place, const char *folder)
         length--;
     snprintf(target, sizeof target, "%.*s", (int)length, place);
     /* Exchanges the folders atomically, so that a report always exists under this name. Some file
-     * systems cannot exchange; the two renames below replace the exchange there. */
+     * systems cannot exchange folders; then the two renames below do it. */
     errno = 0;
 #ifdef EBPO_HAVE_RENAMEAT2
     if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {

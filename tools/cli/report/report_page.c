@@ -12,6 +12,7 @@
 
 #include "cli/report/page_parts.h"
 
+/* Returns the embedded file of this name, or the last element, whose name is NULL. */
 static const page_part *find_part(const char *name, size_t length)
 {
     const page_part *p = page_parts;
@@ -42,6 +43,7 @@ static void pictures_to_json(FILE *out, const comparison *c)
     json_finish(&j);
 }
 
+/* Writes what replaces {{name}}. */
 static void put_part(FILE *out, const comparison *c, const char *name, size_t length)
 {
     const page_part *part = find_part(name, length);

@@ -15,11 +15,11 @@
 #include "cli/render/raster.h"
 
 enum {
-    TILE_WIDTH = 320,
+    TILE_WIDTH = 320, /* sizes in pixels: of a level's picture, and of the model's picture */
     TILE_HEIGHT = 250,
     PORTRAIT_WIDTH = 720,
     PORTRAIT_HEIGHT = 540,
-    LEVELS_DRAWN = 12
+    LEVELS_DRAWN = 12 /* maximum number of levels with a picture */
 };
 
 static ebpo_status no_memory(ebpo_error *error)
@@ -46,6 +46,7 @@ static void make_transparent(const picture *black, const picture *white, uint8_t
     }
 }
 
+/* Draws a mesh with a transparent background, and sets *uri, which the caller frees. */
 static ebpo_status draw_picture(const comparison *c, const ebpo_mesh *mesh, const camera *view,
                                 int width, int height, const raster_style *style, char **uri,
                                 ebpo_error *error)
@@ -146,6 +147,7 @@ static ebpo_status draw_method(comparison *c, method *m, ebpo_file *file, const 
     return method_note_missing(m, "pictures", status, error);
 }
 
+/* Draws the model itself, from the mesh of the file. */
 static ebpo_status draw_portrait(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     raster_style style = { .colour = { 0.66, 0.54, 0.40 },

@@ -7,25 +7,26 @@
 
 /* --- reading a level --- */
 
+/* Opens the file and reads levels 0 to `level`, after the file was dropped from the page cache. */
 static ebpo_status read_level(const comparison *c, const method *m, int level, double *seconds,
                               traffic *t, ebpo_error *error)
 {
-    ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream_options stream_options = EBPO_STREAM_OPTIONS_INIT;
     ebpo_stream_level reported;
     ebpo_stream *stream = NULL;
     ebpo_file *file = NULL;
-    bool more = true;
+    bool has_more = true;
     if (!ebpo_is_url(m->path))
         bench_drop_file(m->path);
-    wanted.threads = (unsigned)c->v->threads;
+    stream_options.threads = (unsigned)c->v->threads;
     uint64_t begin = tool_clock();
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     if (status == EBPO_OK) {
         ebpo_file_prefetch_levels(file, 0, level);
-        status = ebpo_stream_new(file, &wanted, &stream, error);
+        status = ebpo_stream_new(file, &stream_options, &stream, error);
     }
     for (int i = 0; i <= level && status == EBPO_OK; i++)
-        status = ebpo_stream_next_level(stream, &reported, &more, error);
+        status = ebpo_stream_next_level(stream, &reported, &has_more, error);
     *seconds = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
         *t = traffic_of(file);
@@ -77,7 +78,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
 
 #define MEDIAN(field) median_of_rounds(m->round[0].field, m->round[1].field, m->round[2].field)
 
-/* Returns NAN when one of the values is NAN: then the value is not available. */
+/* Returns the median; NAN if one of the values is NAN (not available). */
 static double median_of_rounds(double a, double b, double c)
 {
     double v[ROUNDS] = { a, b, c };
@@ -96,5 +97,5 @@ void report_medians(const comparison *c, method *m)
     m->whole[METRIC_EXACT_DISTANCE_NS] = MEDIAN(exact_distance);
     for (int i = 0; i < DEADLINES; i++)
         for (int k = 0; k < DEADLINE_METRICS; k++)
-            m->due[i][k] = MEDIAN(due[i][k]);
+            m->deadline[i][k] = MEDIAN(deadline[i][k]);
 }

@@ -8,30 +8,31 @@
 #include "cli/report/report_data.h"
 #include "cli/report/report_output.h"
 
-static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
-static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
+static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the model's diagonal */
+static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the size of the first file */
 
 /* Makes the subset for a viewer: envelopes without the mesh. */
-static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const target_result *n,
+static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const target_result *target,
                               const char *path, ebpo_error *error)
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    if (n->kind == TARGET_ERROR)
-        options.max_error = n->requested;
+    if (target->kind == TARGET_ERROR)
+        options.max_error = target->requested;
     else
-        options.target_bytes = (uint64_t)n->requested;
+        options.target_bytes = (uint64_t)target->requested;
     return ebpo_subset(file, path, &options, error);
 }
 
+/* Sets the size and the error of the subset in the file `path`. model: the whole model. */
 static ebpo_status measure_error(const comparison *c, ebpo_model *model, const char *path,
-                                 target_result *n, ebpo_error *error)
+                                 target_result *target, ebpo_error *error)
 {
     ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
     options.queries = REPORT_QUERIES;
-    ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
+    ebpo_error_bound bound = EBPO_ERROR_BOUND_INIT;
     ebpo_file *file = NULL;
     options.samples = 0;
     options.tolerance = 0.01; /* a larger tolerance could show an error above the requested one */
@@ -40,12 +41,13 @@ static ebpo_status measure_error(const comparison *c, ebpo_model *model, const c
     ebpo_status status = ebpo_open(path, &file, error);
     if (status == EBPO_OK) {
         const ebpo_info *info = ebpo_file_info(file);
-        n->metric[METRIC_SUBSET_BYTES] = (double)info->file_bytes;
-        status = ebpo_level_error_bound(model, file, info->level_count - 1, &options, &far, error);
+        target->metric[METRIC_SUBSET_BYTES] = (double)info->file_bytes;
+        status =
+            ebpo_level_error_bound(model, file, info->level_count - 1, &options, &bound, error);
     }
     if (status == EBPO_OK) {
-        n->metric[METRIC_SUBSET_FAR_LO] = far.lo;
-        n->metric[METRIC_SUBSET_FAR_HI] = far.hi;
+        target->metric[METRIC_SUBSET_FAR_LO] = bound.lo;
+        target->metric[METRIC_SUBSET_FAR_HI] = bound.hi;
     }
     ebpo_close(file);
     return status;
@@ -59,7 +61,7 @@ static ebpo_status find_file_error(const comparison *c, method *m, ebpo_file *fi
 {
     ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
     options.queries = REPORT_QUERIES;
-    ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
+    ebpo_error_bound bound = EBPO_ERROR_BOUND_INIT;
     *out = m->level[m->levels - 1][METRIC_FAR_HI];
     if (!isnan(*out))
         return EBPO_OK;
@@ -68,10 +70,10 @@ static ebpo_status find_file_error(const comparison *c, method *m, ebpo_file *fi
     options.progress = c->progress;
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < m->levels && status == EBPO_OK; i++) {
-        status = ebpo_level_error_bound(model, file, i, &options, &far, error);
-        options.at_most = far.hi;
+        status = ebpo_level_error_bound(model, file, i, &options, &bound, error);
+        options.at_most = bound.hi;
     }
-    *out = status == EBPO_OK ? far.hi : 0;
+    *out = status == EBPO_OK ? bound.hi : 0;
     return method_note_missing(m, "Hausdorff distance", status, error);
 }
 
@@ -80,18 +82,18 @@ static ebpo_status measure_target(comparison *c, method *m, ebpo_file *file, ebp
                                   ebpo_error *error)
 {
     char path[sizeof c->folder + OUTPUT_NAME_MAX];
-    target_result *n = &m->targets[m->target_count];
-    *n = (target_result){ kind, requested, { NAN, NAN, NAN, NAN, NAN } };
+    target_result *target = &m->targets[m->target_count];
+    *target = (target_result){ kind, requested, { NAN, NAN, NAN, NAN, NAN } };
     output_add_model(c->folder, "target", path, sizeof path);
     uint64_t begin = tool_clock();
-    ebpo_status status = cut_subset(c, file, n, path, error);
-    n->metric[METRIC_SUBSET_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
+    ebpo_status status = cut_subset(c, file, target, path, error);
+    target->metric[METRIC_SUBSET_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
-        status = measure_error(c, model, path, n, error);
+        status = measure_error(c, model, path, target, error);
     unlink(path);
-    n->metric[METRIC_SUBSET_RATIO] =
-        kind == TARGET_ERROR ? n->metric[METRIC_SUBSET_FAR_HI] / fmax(requested, file_error)
-                             : n->metric[METRIC_SUBSET_BYTES] / requested;
+    target->metric[METRIC_SUBSET_RATIO] =
+        kind == TARGET_ERROR ? target->metric[METRIC_SUBSET_FAR_HI] / fmax(requested, file_error)
+                             : target->metric[METRIC_SUBSET_BYTES] / requested;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         m->target_count++;
     return status;

@@ -2,23 +2,23 @@
  * section 4.2): uncompressed, level after level from the root, each leaf with its faces and their
  * vertices. The costs are:
  *   leaf              1 byte for its corners
- *   plane             16 bytes the first time that its normal occurs, else 4; and 4 for its offset
- *   face              12 bytes the first time, else 4
- *   vertex of a leaf  12 bytes the first time, else 4 */
+ *   plane             16 bytes when its normal occurs first, otherwise 4; and 4 for its offset
+ *   face              12 bytes when it occurs first, otherwise 4
+ *   vertex of a leaf  12 bytes when it occurs first, otherwise 4 */
 #include <stdlib.h>
 #include <string.h>
 
 #include "cli/reading.h"
 #include "cli/report/report_data.h"
 
-enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
+enum { NORMAL_SPAN = 1023 }; /* number of values of a normal's component, -511 .. 511 */
 
 typedef struct cost_state {
     ebpo_mesh mesh;
     uint8_t *normals, *faces, *vertices; /* bit arrays; bit i: item i has occurred */
-    /* [vertex_count] number of the last leaf with the vertex, from 1 */
+    /* [vertex_count] number of the last leaf with the vertex, from 1; 0: none */
     uint64_t *leaf_of;
-    uint64_t leaves;
+    uint64_t leaves; /* number of leaves so far */
 } cost_state;
 
 /* Sets bit i. Returns true if it was not set before. */
@@ -72,6 +72,7 @@ static double leaf_bytes(cost_state *s, const ebpo_level *l)
     return sum;
 }
 
+/* Returns false if there is not enough memory. */
 static bool begin_counting(cost_state *s)
 {
     s->normals = calloc((size_t)NORMAL_SPAN * NORMAL_SPAN * 2 / 8 + 1, 1);

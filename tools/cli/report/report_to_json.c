@@ -4,29 +4,29 @@
 #include "cli/report/report_data.h"
 #include "cli/words.h"
 
-static void print_names(json *j, const char *scope, const metric_name *q, int count)
+static void print_names(json *j, const char *scope, const metric_name *names, int count)
 {
     for (int i = 0; i < count; i++) {
         json_object(j, NULL);
-        json_text(j, "name", q[i].name);
+        json_text(j, "name", names[i].name);
         json_text(j, "of", scope);
-        json_text(j, "unit", q[i].unit);
-        json_bool(j, "timed", q[i].timed);
-        json_text(j, "meaning", q[i].meaning);
-        if (q[i].absent)
-            json_text(j, "absent", q[i].absent);
+        json_text(j, "unit", names[i].unit);
+        json_bool(j, "timed", names[i].timed);
+        json_text(j, "meaning", names[i].meaning);
+        if (names[i].absent)
+            json_text(j, "absent", names[i].absent);
         json_end(j);
     }
 }
 
-static void print_metrics(json *j, const metric_name *q, const double *v, int count)
+static void print_metrics(json *j, const metric_name *names, const double *v, int count)
 {
     for (int i = 0; i < count; i++)
-        json_real(j, q[i].name, v[i]);
+        json_real(j, names[i].name, v[i]);
 }
 
-/* Prints the volume that represents the solid at a level: its nodes, and the leaves and black nodes
- * above. */
+/* Prints the levels of --unlimited. The envelope volume of a level includes the leaves and black
+ * nodes of the levels above, which also represent the solid there. */
 static void print_unlimited(json *j, const method *m)
 {
     double above = 0;
@@ -79,7 +79,7 @@ static void print_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < DEADLINES; i++) {
         json_object(j, NULL);
         json_uint(j, "microseconds", deadlines_us[i]);
-        print_metrics(j, deadline_metrics, m->due[i], DEADLINE_METRICS);
+        print_metrics(j, deadline_metrics, m->deadline[i], DEADLINE_METRICS);
         json_end(j);
     }
     json_end(j);

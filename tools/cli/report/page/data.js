@@ -15,9 +15,9 @@ const levelOf = (method, level) => method.levels.find((l) => l.level === level);
 // Converts a length to percent of the diagonal of the model's box.
 const ofDiagonal = (v) => (model.diagonal > 0 ? times(100 / model.diagonal, v) : null);
 
-// Returns the least value among levels of different methods; null if none has a value.
-function leastOf(some, of) {
-  const values = some.filter(Boolean).map(of).filter((v) => v !== null);
+// Returns the least value of some levels, which may be undefined; null if no level has a value. valueOfLevel: a function.
+function leastOf(someLevels, valueOfLevel) {
+  const values = someLevels.filter(Boolean).map(valueOfLevel).filter((v) => v !== null);
   return values.length ? Math.min(...values) : null;
 }
 
@@ -30,10 +30,12 @@ function sumOfLevels(method) {
   return all.includes(null) ? null : all.reduce((sum, excess) => sum + 100 + excess, 0);
 }
 
-// Simulated connections: sequential round trips, and all bytes at a constant rate.
+// Simulated connections: `trip` is the time of a round trip in seconds, `rate` is in bytes per second.
 const LINES = [
   { name: '10 Mbit/s, 100 ms', trip: 0.1, rate: 1.25e6 }, { name: '100 Mbit/s, 20 ms', trip: 0.02, rate: 1.25e7 },
 ];
+// Returns the function that computes the download time of a level.
 const lineTime = (line) => (l) => (l.line_trips === null ? null : l.line_trips * line.trip + l.line_bytes / line.rate);
 
-const least = (level, of) => leastOf(methods.map((m) => levelOf(m, level)), of);
+// Returns the least value of a level among all methods.
+const least = (level, valueOfLevel) => leastOf(methods.map((m) => levelOf(m, level)), valueOfLevel);

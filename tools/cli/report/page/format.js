@@ -21,6 +21,7 @@ function inUnits(v, units) {
 const BYTES = [['TB', 1e12], ['GB', 1e9], ['MB', 1e6], ['kB', 1e3], ['B', 1]];
 const SECONDS = [['s', 1], ['ms', 1e-3], ['µs', 1e-6], ['ns', 1e-9]];
 
+// Returns the function that formats a value with `write`, and a missing value as a dash.
 const known = (write) => (v) => (v === null || v === undefined ? NONE : write(v));
 const format = {
   number: known(threeDigits),
@@ -32,7 +33,7 @@ const format = {
   level: known((v) => v.toFixed(0)),
 };
 
-// null stays null.
+// These functions return null for null.
 const times = (factor, v) => (v === null ? null : factor * v);
 const percent = (share) => times(100, share);
 const fromNs = (v) => times(1e-9, v);

@@ -3,6 +3,7 @@
 
 // --- header ---
 
+// Makes an item of the list of facts. more: a text that follows in small letters; optional.
 function fact(name, text, more) {
   const value = element('dd', {}, text, ...(more ? [' ', element('small', {}, more)] : []));
   return element('div', { className: text.length > 24 ? 'wide' : '' }, element('dt', {}, name), value);
@@ -60,13 +61,13 @@ function tile(method, pictures, level) {
 }
 
 // Makes a grid of pictures of some levels, with a row for each method.
-function strip(some, columns) {
-  const grid = element('div', { className: 'strip' }, element('div', { className: 'level' }), ...some.map(levelName));
+function strip(someLevels, columns) {
+  const grid = element('div', { className: 'strip' }, element('div', { className: 'level' }), ...someLevels.map(levelName));
   grid.style.setProperty('--columns', columns);
   methods.forEach((m, i) => {
     const methodName = element('div', { className: 'methodName' }, m.name);
     methodName.style.color = `var(--m${i % METHOD_COLOURS})`;
-    grid.append(methodName, ...some.map((level) => tile(m, drawn.levels[i], level)));
+    grid.append(methodName, ...someLevels.map((level) => tile(m, drawn.levels[i], level)));
   });
   return grid;
 }
@@ -90,8 +91,8 @@ function showNotes() {
   byId('missing').querySelector('ul').append(...notes.map((note) => element('li', {}, note)));
   for (const q of report.quantities)
     byId('quantities').append(element('dt', {}, `${q.name}, ${q.unit}`), element('dd', {}, q.meaning));
-  const grid = `, version ${report.version}, in ${report.seconds.toFixed(0)} s.`;
-  document.querySelector('footer').append('Made by ', element('code', {}, 'ebpo report'), grid);
+  const version = `, version ${report.version}, in ${report.seconds.toFixed(0)} s.`;
+  document.querySelector('footer').append('Made by ', element('code', {}, 'ebpo report'), version);
 }
 
 // Hides sections without a plot, and the table of the limit if no method has a solid.

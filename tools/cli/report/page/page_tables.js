@@ -2,7 +2,7 @@
 // Defines the values that each table shows. The functions of columns get a level, a deadline, a target or a method. A row
 // that a method does not have (it has fewer levels, or not this target) has no values.
 
-// `of`: a quantity's name, or a function; `why`: why the value may be absent, by default the quantity's own reason.
+// `of`: the name of a quantity, or a function; `why`: why the value may be absent, by default the reason in the report.
 const valueOf = (of) => (typeof of === 'string' ? (row) => row[of] ?? null : (row) => of(row) ?? null);
 const absences = new Map(report.quantities.map((q) => [q.name, q.absent]));
 
