@@ -24,7 +24,7 @@ HELP = option_tables.Option(name="help", letter="h", value="", kind="flag", word
 
 
 def write(path, text):
-    """Writes a file, unless it has this text already, so that its time stays."""
+    """Writes a file, unless it has this text already, so that its modification time stays."""
     if os.path.exists(path):
         with open(path, encoding="utf-8") as file:
             if file.read() == text:

@@ -26,8 +26,8 @@ lines of mdoc for the man page:
       set NAME TEXT           replaces {NAME} in help and mdoc
     group KEY                 in shared.options: `use KEY` uses several options
       options KEY...
-      page NAME               `ebpo help NAME` describes them instead of --help
-    (mdoc)                    common text; the texts of the options are for the page of the group
+      page NAME               `ebpo help NAME` describes these options instead of --help
+    (mdoc)                    text for all of them; the texts of the options are for the page NAME
     text KEY                  in shared.options: mdoc that replaces a line @KEY@
 """
 import os
@@ -66,7 +66,8 @@ class Command:
 
 
 def records(path):
-    """(line, head, [(word, text)], [mdoc])"""
+    """Yields for each record: its position, the words of its first line, its lines as [(word, text)],
+    and its lines of mdoc."""
     with open(path, encoding="utf-8") as file:
         lines = file.read().splitlines()
     at = 0
@@ -90,6 +91,7 @@ def records(path):
 
 
 def fact(where, facts, word, default=None):
+    """Returns the text of the line `word`. Without a default, the line must exist."""
     found = [text for name, text in facts if name == word]
     if len(found) > 1 or (not found and default is None):
         raise Wrong(f"{where}: expected one line '{word}'")
@@ -162,7 +164,7 @@ class Shared:
         return option
 
     def use(self, where, head, facts, man):
-        """Returns runs of options for Command.runs."""
+        """Returns the lists of options that a record `use` adds to Command.runs."""
         member, of = fact(where, facts, "in", ""), fact(where, facts, "of", "")
         sets = [text.partition(" ")[::2] for name, text in facts if name == "set"]
         runs = []
@@ -185,7 +187,7 @@ def count_operands(where, facts):
 
 
 def add_output(command):
-    """Lets --output stand for the operand OUT, where the command has no such option."""
+    """Adds the option --output, which may replace the operand OUT, if the command has no such option."""
     names = [word.strip("[]") for word in command.operands.split()]
     at = next((i for i, word in enumerate(names) if word.startswith("OUT")), None)
     if at is None or any(o.name == OUTPUT for o in command.options()):
