@@ -1,9 +1,11 @@
-/* Bounds the distance by which an envelope extends beyond the model. ebpo_bound_envelope is a
- * branch and bound over the fragments of fragments.c: the upper bound of each fragment is computed
- * from the distance of the fragment's centre and from the face nearest to the centre, and the
- * largest distance found is the lower bound. The second part of the file decides for the nodes of a
- * level if their envelopes are within max_error. It uses several threads and keeps its results for
- * other limits. */
+/* Bounds the distance by which an envelope extends beyond the model.
+ *
+ * ebpo_bound_envelope is a branch and bound over fragments (fragments.c), the convex parts into
+ * which an envelope is cut. The upper bound of a fragment is computed from the distance of its
+ * centre, and from the face nearest to its centre. The largest distance found is the lower bound.
+ *
+ * The ebpo_tolerance functions decide for many nodes, with several threads, if the envelopes are
+ * within max_error. They keep their results, and use them again for other values of max_error. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -19,11 +21,11 @@
 #include "geometry/polytope.h"
 #include "query/query_model.h"
 
-ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model,
-                              ebpo_error *error)
+ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *model_tree,
+                              ebpo_model *model, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
-    out->whole = whole;
+    out->model_tree = model_tree;
     return ebpo_context_new(model, &out->context, error);
 }
 
@@ -38,7 +40,8 @@ void ebpo_bounder_free(ebpo_bounder *b)
 
 /* --- measures of a fragment --- */
 
-/* Sets the centre of a fragment, and the radius around the centre that contains the fragment. */
+/* Sets the centre of a fragment, and the radius of a ball around the centre that contains the
+ * fragment. */
 static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p,
                         ebpo_fragment_measure *measure)
 {
@@ -57,7 +60,7 @@ static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p,
             fmax(measure->radius, ebpo_cell_frame_apart(&b->frame, p->vertex[i], measure->centre));
 }
 
-/* Queries the signed distance of a point (in cell coordinates), in the frame's unit. */
+/* Queries the signed distance of a point in cell coordinates; *distance is in the frame's unit. */
 static ebpo_status query_distance(ebpo_bounder *b, const double xi[3], double *distance)
 {
     ebpo_distance_result result;
@@ -72,24 +75,24 @@ static ebpo_status query_distance(ebpo_bounder *b, const double xi[3], double *d
 /* Returns true if the point is certainly in the envelope, despite rounding. */
 static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
 {
-    for (int i = 0; i < b->halves.count; i++) {
-        double n[3], d = ebpo_plane_as_double(b->halves.at[i].n, b->halves.at[i].d, n);
+    for (int i = 0; i < b->half_spaces.count; i++) {
+        double n[3], d = ebpo_plane_as_double(b->half_spaces.at[i].n, b->half_spaces.at[i].d, n);
         if (n[0] * xi[0] + n[1] * xi[1] + n[2] * xi[2] > d - 1e-12)
             return false;
     }
     return true;
 }
 
-/* Moves a point that is outside the envelope towards the envelope's middle until the point is
- * inside. Fragments extend a little beyond the envelope, and at a sharp corner of the envelope, all
- * of a fragment may be outside. The move changes the point's distance by at most the length of the
- * move. */
+/* Moves a point that is outside the envelope towards the envelope's middle (b->inner) until the
+ * point is inside. Fragments extend a little beyond the envelope, and at a sharp corner of the
+ * envelope, all of a fragment may be outside. `out` is the moved point. */
 static void move_into_envelope(const ebpo_bounder *b, const double xi[3], double out[3])
 {
     double share = 0;
-    for (int i = 0; i < b->halves.count; i++) {
-        double n[3], d = ebpo_plane_as_double(b->halves.at[i].n, b->halves.at[i].d, n) - 2e-12,
-                     at = -d, middle = -d;
+    for (int i = 0; i < b->half_spaces.count; i++) {
+        double n[3],
+            d = ebpo_plane_as_double(b->half_spaces.at[i].n, b->half_spaces.at[i].d, n) - 2e-12,
+            at = -d, middle = -d;
         for (int k = 0; k < 3; k++) {
             at += n[k] * xi[k];
             middle += n[k] * b->inner[k];
@@ -101,27 +104,29 @@ static void move_into_envelope(const ebpo_bounder *b, const double xi[3], double
         out[k] = xi[k] + share * (b->inner[k] - xi[k]);
 }
 
-/* Raises the lower bound if the distance of a queried point shows a greater one. */
+/* Raises the lower bound b->lo if the queried distance of the point xi shows a greater bound. If xi
+ * must be moved into the envelope, its distance may decrease by the length of the move. */
 static void raise_lower_bound(ebpo_bounder *b, const double xi[3], double distance)
 {
-    double at[3], lower_bound = distance - 4 * b->frame.grain;
+    double moved[3], lower_bound = distance - 4 * b->frame.grain;
     if (lower_bound <= b->lo)
         return;
-    move_into_envelope(b, xi, at);
-    lower_bound -= ebpo_cell_frame_apart(&b->frame, xi, at);
-    if (lower_bound <= b->lo || !is_in_envelope(b, at))
+    move_into_envelope(b, xi, moved);
+    lower_bound -= ebpo_cell_frame_apart(&b->frame, xi, moved);
+    if (lower_bound <= b->lo || !is_in_envelope(b, moved))
         return;
     b->lo = lower_bound;
-    ebpo_cell_frame_point(&b->frame, at, b->location);
+    ebpo_cell_frame_point(&b->frame, moved, b->location);
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
-/* Bounds the distance of a fragment with one or two queries. */
+/* Bounds the distance of a fragment's points with one or two queries: at the centre, and at the
+ * corner that is farthest from the face nearest to the centre. */
 static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment,
                                     ebpo_fragment_measure *measure)
 {
-    double corner = 0;
-    int farthest = 0;
+    double corner = 0; /* greatest distance of a corner from that face */
+    int farthest = 0;  /* this corner */
     find_centre(b, &fragment->p, measure);
     ebpo_status status = query_distance(b, measure->centre, &measure->distance);
     if (status != EBPO_OK)
@@ -139,8 +144,8 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
         4 * b->frame.grain;
     if (measure->upper <= b->target || (measure->distance < 0 && corner <= -measure->distance))
         return EBPO_OK;
-    /* Also query the corner most likely to have the largest distance, moved off the rounded
-     * surface. */
+    /* Also query the farthest corner. A corner may be on the envelope's rounded boundary, so it is
+     * moved a little towards the centre. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
         xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
@@ -155,16 +160,16 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
 
 /* --- the search --- */
 
-/* Sets the stack to one fragment, which is the whole envelope. The stack is empty for a black node.
- */
+/* Sets the stack to one fragment, which is the whole envelope. For a black node, whose distance is
+ * 0, the stack is empty. */
 static ebpo_status begin_search(ebpo_bounder *b)
 {
     ebpo_node node;
     ebpo_fragment *first = NULL;
-    if (!ebpo_tree_find(b->whole, b->frame.cell, &node))
+    if (!ebpo_tree_find(b->model_tree, b->frame.cell, &node))
         return ebpo_fail(b->error, EBPO_E_ARGUMENT,
-                         "the model has no node of level %d where the level has one: they are "
-                         "not from the same file",
+                         "the model has no node for a node of level %d: the level and the model "
+                         "are not from the same file; pass the file of the model",
                          b->frame.cell.level);
     b->fragment_count = b->face_count = 0;
     if (node.type == EBPO_BLACK)
@@ -176,7 +181,7 @@ static ebpo_status begin_search(ebpo_bounder *b)
                                             NULL, &first);
     if (status != EBPO_OK)
         return status;
-    ebpo_half_spaces_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
+    ebpo_half_spaces_cut(&b->half_spaces, EBPO_CUT_SLACK, &first->p);
     first->node = node;
     for (int k = 0; k < 3; k++) {
         b->inner[k] = 0;
@@ -186,7 +191,8 @@ static ebpo_status begin_search(ebpo_bounder *b)
     return node.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &node) : EBPO_OK;
 }
 
-/* Takes a fragment from the stack; measures and cuts it if its upper bound is above the target. */
+/* Takes a fragment from the stack. If its upper bound is above the target, measures the fragment,
+ * and cuts it if its upper bound is then still above the target. */
 static ebpo_status search_step(ebpo_bounder *b)
 {
     ebpo_fragment fragment;
@@ -216,7 +222,7 @@ static ebpo_status search_step(ebpo_bounder *b)
 ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
                                 ebpo_envelope_bound *out, ebpo_error *error)
 {
-    ebpo_box box = b->whole->box;
+    ebpo_box box = b->model_tree->box;
     ebpo_cell_frame_make(&b->frame, &box, cell);
     b->error = error;
     b->target = ebpo_cell_frame_length(&b->frame, goal->enough) * (1 - 0x1p-40);
@@ -236,6 +242,7 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     return status;
 }
 
+/* Improves the known bounds by those of a further search. */
 static void merge_bounds(ebpo_envelope_bound *known, const ebpo_envelope_bound *found)
 {
     known->hi = fmin(known->hi, found->hi);
@@ -255,10 +262,10 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
     ebpo_status status = EBPO_OK;
     if (isinf(out->hi)) {
         ebpo_cell_frame frame;
-        ebpo_box box = b->whole->box;
+        ebpo_box box = b->model_tree->box;
         ebpo_cell_frame_make(&frame, &box, cell);
-        /* The cell of a gray node or leaf touches a face, so no point of the cell is farther from
-         * the face than the cell's diagonal. */
+        /* A face touches the cell of a gray node or leaf, so no point of the cell is farther from
+         * this face than the cell's diagonal. */
         out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
     }
     for (;;) {
@@ -279,14 +286,16 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
     }
 }
 
-/* Maximum number of queries for a node. A node that needs more queries is refined, because its
- * children's envelopes are smaller and closer to the model. */
+/* --- the decision which envelopes are close enough to the model --- */
+
+/* Maximum number of queries for a node. If a node needs more queries, its envelope is not accepted,
+ * and the caller uses its children, whose envelopes are smaller and closer to the model. */
 enum { NODE_QUERIES = 4096 };
 
-/* Results of earlier searches for a node. They determine the results for some other limits, because
- * a search for a larger max_error never needs more queries (error_bound.h). The upper bound of an
- * earlier search determines nothing, because a search with that upper bound as limit might use up
- * its queries before it finds the bound. */
+/* Results of earlier searches for a node. They determine the results for some other values of
+ * max_error, because a search for a larger max_error never needs more queries (error_bound.h). The
+ * upper bound of an earlier search is not kept: a search with this bound as max_error might use up
+ * its queries before it finds the bound, and results must not depend on earlier calls. */
 typedef struct earlier_results {
     double enough; /* least max_error that was enough */
     double failed; /* largest max_error that was not enough */
@@ -296,20 +305,21 @@ typedef struct earlier_results {
 struct ebpo_tolerance {
     ebpo_model *model;
     ebpo_lod_model tree;
-    bool planes;
+    bool planes; /* false: each envelope is the whole cell of its node */
     unsigned threads;
     ebpo_progress progress;
+    /* for each level, the results of its gray nodes and of its leaves, by rank */
     earlier_results *gray[EBPO_LEVELS_MAX], *leaf[EBPO_LEVELS_MAX];
     ebpo_bounder *bounders;     /* [threads] */
-    ebpo_tolerance_node *nodes; /* nodes of the current call */
-    double max_error;
+    ebpo_tolerance_node *nodes; /* argument of the current call of ebpo_tolerance_judge */
+    double max_error;           /* argument of the current call */
 };
 
 static earlier_results *new_results(uint64_t count)
 {
     earlier_results *out = ebpo_alloc(count, sizeof *out);
     for (uint64_t i = 0; out && i < count; i++)
-        out[i] = (earlier_results){ INFINITY, -1, 0 };
+        out[i] = (earlier_results){ .enough = INFINITY, .failed = -1, .lo = 0 };
     return out;
 }
 
@@ -363,13 +373,16 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
     free(n);
 }
 
-/* Decides for one node, from earlier results if possible, else by a search. */
+/* Decides for one node if its envelope is within n->max_error, from earlier results if possible,
+ * otherwise by a search. */
 static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
                               ebpo_error *error)
 {
     ebpo_node stored;
     ebpo_envelope_bound found;
-    ebpo_bound_goal goal = { n->max_error, n->max_error, 0, NODE_QUERIES };
+    ebpo_bound_goal goal = { .enough = n->max_error,
+                             .too_much = n->max_error,
+                             .queries = NODE_QUERIES };
     node->enough = false;
     if (!node->required)
         return EBPO_OK;
@@ -378,24 +391,25 @@ static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: a node is missing in the tree; run ebpo verify",
                          node->cell.level);
-    earlier_results *m = stored.type == EBPO_GRAY ? &n->gray[node->cell.level][stored.rank]
-                                                  : &n->leaf[node->cell.level][stored.rank];
-    node->enough = n->max_error >= m->enough;
-    if (node->enough || n->max_error <= m->failed || n->max_error < m->lo)
+    earlier_results *earlier = stored.type == EBPO_GRAY ? &n->gray[node->cell.level][stored.rank]
+                                                        : &n->leaf[node->cell.level][stored.rank];
+    node->enough = n->max_error >= earlier->enough;
+    if (node->enough || n->max_error <= earlier->failed || n->max_error < earlier->lo)
         return EBPO_OK;
     if (n->planes)
-        (void)ebpo_tree_bounds(&n->tree, node->cell, stored.type == EBPO_GRAY, &stored, &b->halves);
+        (void)ebpo_tree_bounds(&n->tree, node->cell, stored.type == EBPO_GRAY, &stored,
+                               &b->half_spaces);
     else
-        b->halves.count = 0;
+        b->half_spaces.count = 0;
     ebpo_status status = ebpo_bound_envelope(b, node->cell, &goal, &found, error);
     if (status != EBPO_OK)
         return status;
     node->enough = found.hi <= n->max_error;
-    m->lo = fmax(m->lo, found.lo);
+    earlier->lo = fmax(earlier->lo, found.lo);
     if (node->enough)
-        m->enough = fmin(m->enough, n->max_error);
+        earlier->enough = fmin(earlier->enough, n->max_error);
     else
-        m->failed = fmax(m->failed, n->max_error);
+        earlier->failed = fmax(earlier->failed, n->max_error);
     return EBPO_OK;
 }
 
@@ -423,13 +437,14 @@ ebpo_status ebpo_tolerance_max(ebpo_tolerance *n, double *out, ebpo_error *error
     ebpo_node stored;
     ebpo_envelope_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
     ebpo_cell root = { 0, { 0, 0, 0 } };
-    ebpo_bound_goal goal = { 0, INFINITY, 1.02, NODE_QUERIES };
-    (void)ebpo_tree_bounds(&n->tree, root, true, &stored, &n->bounders[0].halves);
+    ebpo_bound_goal goal = { .too_much = INFINITY, .ratio = 1.02, .queries = NODE_QUERIES };
+    (void)ebpo_tree_bounds(&n->tree, root, true, &stored, &n->bounders[0].half_spaces);
     if (stored.type == EBPO_LEAF || !n->planes)
-        n->bounders[0].halves.count = 0;
+        n->bounders[0].half_spaces.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
-    /* The search of judge_node may need a slightly larger limit than this upper bound. With the
-     * root cell's diagonal as limit, the search succeeds without queries, so the loop ends. */
+    /* With found.hi as max_error, judge_node may fail, because it searches in another way. So
+     * max_error is increased until judge_node succeeds. The loop ends, because judge_node succeeds
+     * without queries when max_error is the root cell's diagonal. */
     ebpo_tolerance_node node = { root, true, false };
     double upper = found.hi > 0 ? found.hi : DBL_MIN;
     *out = upper;

@@ -1,7 +1,8 @@
-/* Exports levels and the mesh in other programs' formats. The table below has one row for each
- * format: its name, its second file, its contents, and the function that writes it. A new format is
- * a value of ebpo_export_format, a row here, and a file export_NAME.c with the function, which is
- * declared in export_job.h. The functions that the writers share are in export_job.c. */
+/* Exports levels and the mesh in other programs' formats. The table `formats` has one row for each
+ * format: its name, the ending of its second file, the colours that it can hold, and the function
+ * that writes it. To add a format, add a value of ebpo_export_format, a row of the table, and a
+ * file export_NAME.c with the function, which is declared in export_job.h. The functions that the
+ * writers share are in export_job.c. */
 #include <ebpo/export.h>
 
 #include <stdio.h>
@@ -48,7 +49,7 @@ static const ebpo_export_row formats[] = {
     [EBPO_EXPORT_STL] = { .name = "stl", .one_block = true, .write = WRITE_BY_ASSIMP },
 };
 
-/* Returns NULL for an invalid format value. */
+/* Returns the row of a format, or NULL for an invalid value. */
 static const ebpo_export_row *format_row(ebpo_export_format format)
 {
     return (unsigned)format < sizeof formats / sizeof *formats ? &formats[format] : NULL;
@@ -82,6 +83,7 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
 static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *row,
                                 const ebpo_export_options *o, ebpo_error *error)
 {
+    /* the end of the range of levels that is checked: the first one, if it is wrong */
     int blocks = ebpo_block_count(o),
         requested = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
                                                                               : o->last_level;
@@ -93,10 +95,11 @@ static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *ro
                          info->level_count - 1);
     if (o->vertex_colours && (!o->mesh || !row || !row->takes_colours))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "colours are supported for the mesh in glTF, GLB and OBJ only");
+                         "colours of the caller are supported only for the mesh, and only in glTF, "
+                         "GLB and OBJ");
     if (row && row->one_block && blocks > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "an STL file contains one object: one level, or the mesh");
+                         "an STL file contains one object; give one level, or the mesh");
     return EBPO_OK;
 }
 
@@ -118,7 +121,7 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
 {
     EBPO_DEFAULT_FP;
     ebpo_export_options wanted = EBPO_EXPORT_OPTIONS_INIT;
-    ebpo_export_report own = EBPO_EXPORT_REPORT_INIT;
+    ebpo_export_report own_report = EBPO_EXPORT_REPORT_INIT;
     const ebpo_export_row *row = format_row(format);
     char second[4096];
     ebpo_status status = EBPO_TAKE(ebpo_export_options, &wanted, options, error);
@@ -135,8 +138,9 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
     if (wanted.first_level <= wanted.last_level)
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
     status =
-        write_format(&(ebpo_export_job){ file, path, second, format, row, &wanted, &own }, error);
+        write_format(&(ebpo_export_job){ file, path, second, format, row, &wanted, &own_report },
+                     error);
     if (report)
-        EBPO_GIVE(ebpo_export_report, report, &own);
+        EBPO_GIVE(ebpo_export_report, report, &own_report);
     return status;
 }

@@ -1,8 +1,8 @@
-/* Writes OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a
- * job become one assimp scene, which borrows their arrays for the call. assimp may write only one
- * file, which has a temporary name until it is complete. If assimp opens another file for writing,
- * the export fails. A build without assimp does not compile this file, and the table in export.c
- * then has no function for these formats. */
+/* Writes OBJ and STL through the exporters of the library assimp, which write float32 coordinates.
+ * The blocks of a job (levels and the mesh, export_job.h) become one assimp scene. assimp may write
+ * only one file, which has a temporary name until it is complete. If assimp opens another file for
+ * writing, the export fails. A build without assimp does not compile this file, and the table in
+ * export.c then has no function for these formats. */
 #include "core/strict_fp.h"
 
 #include <assimp/cexport.h>
@@ -28,10 +28,10 @@
 typedef struct scene_file {
     const char *path; /* borrowed */
     ebpo_publish publish;
-    FILE *stream; /* NULL: assimp has not opened it */
-    bool failed;  /* a write failed; `why` is its errno */
-    int why;
-    char unknown[128]; /* another name that assimp opened for writing, or "" */
+    FILE *stream;         /* NULL: assimp has not opened the file */
+    bool failed;          /* a write failed */
+    int error_number;     /* errno of the first failure */
+    char unexpected[128]; /* another name that assimp opened for writing; "": none */
 } scene_file;
 
 /* A file that assimp has opened. */
@@ -45,7 +45,7 @@ static open_stream *stream_of(struct aiFile *file) { return (open_stream *)(void
 /* Records the first failure, because assimp ignores the results of these callbacks. */
 static void keep_failure(scene_file *target)
 {
-    target->why = target->failed ? target->why : errno;
+    target->error_number = target->failed ? target->error_number : errno;
     target->failed = true;
 }
 
@@ -100,14 +100,14 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     bool is_target = strcmp(ebpo_path_name(target->path), ebpo_path_name(name)) == 0;
     FILE *stream = is_target ? ebpo_publish_stream(&target->publish) : NULL;
     if (!is_target)
-        snprintf(target->unknown, sizeof target->unknown, "%s", name);
+        snprintf(target->unexpected, sizeof target->unexpected, "%s", name);
     struct aiFile *file = calloc(1, sizeof *file);
     open_stream *c = calloc(1, sizeof *c);
     if (!stream || !file || !c) {
         free(file);
         free(c);
         target->failed = true;
-        target->why = ENOMEM;
+        target->error_number = ENOMEM;
         return NULL;
     }
     target->stream = stream;
@@ -130,22 +130,23 @@ static void scene_file_begin(scene_file *file, const char *path)
     *file = (scene_file){ .path = path, .publish = EBPO_PUBLISH_INIT };
 }
 
-/* Gives assimp access to the file under the last part of its path, and to no other file. `io`
- * points to `file`. */
+/* Sets `io` to functions that give assimp access to this file only. assimp knows the file by the
+ * last part of its path. `io` refers to `file`. */
 static void scene_file_offer(scene_file *file, struct aiFileIO *io)
 {
     *io = (struct aiFileIO){ open_file, close_file, (aiUserData)(void *)file };
 }
 
+/* Publishes the file, if assimp wrote it without a failure. */
 static ebpo_status scene_file_commit(scene_file *file, ebpo_error *error)
 {
-    if (file->unknown[0])
+    if (file->unexpected[0])
         return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
                               "this version of assimp also writes an unexpected file '%s'; "
                               "choose another format",
-                              file->unknown);
+                              file->unexpected);
     if (file->failed) {
-        errno = file->why;
+        errno = file->error_number;
         return ebpo_fail_errno(error, file->path, "could not be written");
     }
     if (!file->stream)
@@ -171,8 +172,8 @@ typedef struct scene {
     struct aiNode top, node[BLOCKS_MAX], *children[BLOCKS_MAX];
     struct aiMesh mesh[BLOCKS_MAX], *meshes[BLOCKS_MAX];
     struct aiMaterial material, *materials;
-    unsigned number[BLOCKS_MAX], count;
-    double largest_change;
+    unsigned mesh_index[BLOCKS_MAX], count; /* mesh of each node; number of meshes */
+    double largest_change; /* largest rounding error of a coordinate (ebpo_mesh_floats) */
 } scene;
 
 static void set_name(struct aiString *to, const char *name)
@@ -238,8 +239,8 @@ static ebpo_status add_block(scene *s, ebpo_block *block, ebpo_error *error)
     node->mTransformation = identity;
     node->mParent = &s->top;
     node->mNumMeshes = 1;
-    node->mMeshes = &s->number[s->count];
-    s->number[s->count] = s->count;
+    node->mMeshes = &s->mesh_index[s->count];
+    s->mesh_index[s->count] = s->count;
     s->children[s->count] = node;
     s->meshes[s->count++] = mesh;
     ebpo_status status = add_vertices(s, mesh, &block->mesh, error);
@@ -294,7 +295,8 @@ static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error
         ebpo_block_free(&block);
     }
     if (status == EBPO_OK && s->count == 0)
-        status = ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "it would contain no triangle");
+        status = ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path,
+                                "would contain no triangles; choose another level");
     finish_scene(s);
     job->report->largest_change = s->largest_change;
     return status;
@@ -324,7 +326,8 @@ ebpo_status ebpo_export_assimp(const ebpo_export_job *job, ebpo_error *error)
     scene *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
-    /* Begins before the work, so that a folder without write permission is reported at once. */
+    /* Begins the file before the work, so that a folder without write permission is reported at
+     * once. */
     ebpo_status status = ebpo_publish_begin(&file.publish, job->path, error);
     if (status == EBPO_OK)
         status = gather_scene(s, job, error);

@@ -1,8 +1,8 @@
 /* Writes glTF 2.0, as one file (GLB) or as a text file with a .bin file beside it. Coordinates are
- * float32. If the model is far from zero, its coordinates are relative to the middle of the root
- * cell, which becomes the translation of the nodes. assimp is not used here, because its exporter
- * joins vertices that are less than 1e-5 apart, at any size of the model. Source: Khronos,
- * "glTF 2.0 Specification", sections 3 and 4. */
+ * float32. If the model is far from the origin, its coordinates are relative to the middle of the
+ * root cell, and this middle becomes the translation of the nodes. assimp, which writes OBJ and
+ * STL, is not used here, because its glTF exporter joins vertices that are less than 1e-5 apart, at
+ * any size of the model. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -29,25 +29,29 @@ enum {
     UINT16 = 5123,
     VERTICES = 34962,
     INDICES = 34963,
-    WORDS_AT_ONCE = 1 << 14
+    WORDS_AT_ONCE = 1 << 14 /* size of the buffer of write_words */
 };
 
+/* A block (a level or the mesh, export_job.h) with its coordinates. */
 typedef struct gltf_block {
     ebpo_block block; /* block.mesh has no positions, which are in xyz */
-    float *xyz, low[3], high[3];
+    float *xyz;       /* [vertex_count][3] positions minus the origin */
+    float low[3], high[3];
 } gltf_block;
 
 typedef struct model {
     gltf_block blocks[BLOCKS_MAX];
-    int count;
+    int count; /* of blocks */
+    /* origin: subtracted from all positions; largest_change: see ebpo_mesh_floats */
     double origin[3], largest_change;
-    const char *bin_name; /* name of the file with the numbers; NULL: they are in the same file */
+    const char *bin_name; /* name of the file with the binary data; NULL: GLB, one file for all */
 } model;
 
 /* --- content --- */
 
-/* Sets the origin of the stored coordinates. Far from zero, a float32 coordinate has too few
- * digits. Then the origin is the middle of the root cell, which becomes the nodes' translation. */
+/* Sets m->origin. If the model is far from the origin of its coordinates, compared with its size,
+ * float32 coordinates have too few digits. Then m->origin is the middle of the root cell, and
+ * becomes the nodes' translation. */
 static void choose_origin(model *m, const ebpo_info *info)
 {
     double size = 0, largest = 0;
@@ -73,10 +77,11 @@ static void find_bounds(gltf_block *p)
     }
 }
 
-/* Buffer views of a block, in this order; each view has one accessor. A block without colours lacks
- * the last view. */
+/* The buffer views of a block, in this order; each view has one accessor. A block without colours
+ * does not have VIEW_COLOURS. */
 enum { VIEW_POSITIONS, VIEW_CORNERS, VIEW_COLOURS, VIEWS };
 
+/* Returns the size of a view; 0 if the block does not have the view. */
 static uint64_t view_bytes(const gltf_block *p, int view)
 {
     const ebpo_block *block = &p->block;
@@ -86,15 +91,17 @@ static uint64_t view_bytes(const gltf_block *p, int view)
                                    : 0;
 }
 
-/* Returns the index of a block's first accessor, which is also the index of its first view. */
-static int first_view(const model *m, int number)
+/* Returns the index of the first view of block `block`, which is also the index of its first
+ * accessor. */
+static int first_view(const model *m, int block)
 {
     int n = 0;
-    for (int i = 0; i < number; i++)
+    for (int i = 0; i < block; i++)
         n += m->blocks[i].block.colours.vertex ? VIEWS : VIEW_COLOURS;
     return n;
 }
 
+/* Returns the size of the binary data. */
 static uint64_t bin_bytes(const model *m)
 {
     uint64_t sum = 0;
@@ -136,16 +143,18 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
     memcpy(job->report->origin, m->origin, sizeof m->origin);
     job->report->largest_change = m->largest_change;
     if (status == EBPO_OK && m->count == 0)
-        return ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "it would contain no triangle");
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path,
+                              "would contain no triangles; choose another level");
     return status;
 }
 
 /* --- the text --- */
 
+/* Prints a file name as a URI. In a URI, characters other than these are written as %XX. */
 static void print_name(FILE *f, const char *name)
 {
     static const char hex[] = "0123456789ABCDEF";
-    for (; *name; name++) { /* a URI has other characters as %XX */
+    for (; *name; name++) {
         unsigned char c = (unsigned char)*name;
         if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
             strchr("-._~", c))
@@ -155,7 +164,7 @@ static void print_name(FILE *f, const char *name)
     }
 }
 
-/* Prints three numbers as JSON, in any locale. */
+/* Prints three numbers as JSON. A locale's decimal separator is replaced by a point. */
 static void print_three(FILE *f, const char *before, const double x[3])
 {
     fputs(before, f);
@@ -264,8 +273,9 @@ static void print_text(FILE *f, const model *m)
     fprintf(f, "}\n");
 }
 
-/* --- the numbers, little-endian --- */
+/* --- the binary data --- */
 
+/* Writes 32-bit words as little-endian. */
 static void write_words(FILE *f, const void *words, uint64_t count)
 {
     uint8_t buffer[4 * WORDS_AT_ONCE];
@@ -282,7 +292,8 @@ static void write_words(FILE *f, const void *words, uint64_t count)
     }
 }
 
-/* COLOR_0 is linear, but a mesh's colours are sRGB. With 16 bits, all 256 values stay distinct. */
+/* Writes colours as the attribute COLOR_0. COLOR_0 is linear, but the colours of a mesh are sRGB.
+ * With 16 bits, all 256 values stay distinct after the conversion. */
 static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
 {
     uint16_t linear[256];
@@ -372,7 +383,8 @@ ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
     m->bin_name = *job->second ? ebpo_path_name(job->second) : NULL;
-    /* Begins before the work, so that a folder without write permission is reported at once. */
+    /* Begins the files before the work, so that a folder without write permission is reported at
+     * once. */
     ebpo_status status = ebpo_publish_begin(&main_file, job->path, error);
     if (status == EBPO_OK && m->bin_name)
         status = ebpo_publish_begin(&bin_file, job->second, error);

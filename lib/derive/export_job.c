@@ -1,7 +1,7 @@
-/* Reads the data that all export formats share. The functions read a block from the file: a level
- * with its nodes and colours, or the mesh with its source indices and colours. They also make the
- * block's columns (values of each node, polygon or face), float32 coordinates for formats that need
- * them, and the entries in the report, and check the limits of formats. */
+/* Reads the data that all export formats share. A block is a level with its nodes and colours, or
+ * the mesh with its source indices and colours. These functions read a block, make its columns
+ * (arrays of values of its nodes, polygons or faces) and float32 coordinates for formats that need
+ * them, add it to the report, and check the limits of formats. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -18,13 +18,14 @@
 #include "mesh/attributes.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
+    /* The values for a level; the mesh has -1 or 0. */
     { "octcode", EBPO_H5_I64 },     /* locational code of the node; 0 for the mesh */
     { "level", EBPO_H5_I32 },       /* level of the node in the octree; -1 for the mesh */
     { "type", EBPO_H5_I32 },        /* type of the node (ebpo_node_type); -1 for the mesh */
     { "winding", EBPO_H5_I32 },     /* winding number in a black node's cell, or at a leaf's lowest
                                        corner; else 0 */
     { "volume", EBPO_H5_F64 },      /* volume of the envelope; 0 for the mesh */
-    { "source_face", EBPO_H5_I64 }, /* source index; -1 for envelopes, and without maps */
+    { "source_face", EBPO_H5_I64 }, /* for the mesh: source index, or -1 without maps; else -1 */
     { "lod", EBPO_H5_I32 },         /* level of the block; -1 for the mesh */
 };
 
@@ -118,6 +119,7 @@ static void report_block(const ebpo_block *block, ebpo_export_report *report)
 
 /* --- columns --- */
 
+/* Stores an integer as value i of an array of this type. */
 static void set_integer(void *values, ebpo_h5_number number, uint64_t i, int64_t v)
 {
     if (number == EBPO_H5_I64)
@@ -211,6 +213,7 @@ ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double or
     return EBPO_OK;
 }
 
+/* Records in the report if the block's colours are written. */
 static void report_colours(const ebpo_export_job *job, const ebpo_colours *colours)
 {
     if (colours->vertex)
@@ -245,7 +248,7 @@ ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, path,
         "would have %" PRIu64
-        " bytes or more, but a GLB file has less than 4 GiB; use gltf, or coarser levels",
+        " bytes or more, but a GLB file must be smaller than 4 GiB; export gltf, or coarser levels",
         total);
 }
 
@@ -257,6 +260,7 @@ ebpo_status ebpo_export_check_assimp(const char *path, uint64_t vertices, uint64
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, path,
         "would have %" PRIu64 " vertices and %" PRIu64
-        " triangles, more corners than assimp supports; choose another format, or a coarser level",
+        " triangles, which are more corners than assimp supports; choose another format, or a "
+        "coarser level",
         vertices, faces);
 }

@@ -1,5 +1,5 @@
-/* Declares what the writers of all export formats share: blocks (the envelopes of a level, or the
- * mesh, with colours), the job of a writer, and the writers. */
+/* Declares what the writers of all export formats share: blocks, columns, the job of a writer, and
+ * the writers. A block is what an export contains for one level (its envelopes) or for the mesh. */
 #ifndef EBPO_DERIVE_EXPORT_JOB_H
 #define EBPO_DERIVE_EXPORT_JOB_H
 
@@ -11,7 +11,7 @@
 typedef struct ebpo_block {
     int level; /* -1: the mesh */
     char name[24];
-    ebpo_mesh mesh;
+    ebpo_mesh mesh;       /* the mesh, or the polygons of the level's envelopes as triangles */
     ebpo_lod_nodes nodes; /* set for a level */
     ebpo_maps maps;       /* set for the mesh of a file with maps */
     ebpo_colours colours; /* set if there are colours; a level has colours of vertices */
@@ -22,11 +22,11 @@ typedef struct ebpo_block {
 int ebpo_block_count(const ebpo_export_options *options);
 int ebpo_block_level(const ebpo_export_options *options, int i);
 
-/* Order of the mesh in its block (`level` -1). */
+/* Order of the faces and vertices in the block of the mesh. The source is the mesh file from which
+ * the model was converted; source indices are positions in it (the part `maps` of a file). */
 typedef enum ebpo_block_order {
-    EBPO_FILE_ORDER,  /* order of the file; the block has the source indices, if present */
-    EBPO_SOURCE_ORDER /* order of the source, if the file has source indices; the block has no
-                         source indices */
+    EBPO_FILE_ORDER,  /* order of the .ebpo.h5 file; block.maps has the source indices, if any */
+    EBPO_SOURCE_ORDER /* order of the source, if the file has source indices; block.maps is empty */
 } ebpo_block_order;
 
 /* Frees a block, also after a failure. */
@@ -36,7 +36,7 @@ void ebpo_block_free(ebpo_block *block);
  * of the polygon's node), or for each triangle of the mesh. */
 typedef struct ebpo_column {
     const char *name;
-    ebpo_h5_number number;
+    ebpo_h5_number number; /* type of the values */
 } ebpo_column;
 enum {
     EBPO_COLUMN_OCTCODE,
@@ -45,23 +45,24 @@ enum {
     EBPO_COLUMN_WINDING,
     EBPO_COLUMN_VOLUME,
     EBPO_COLUMN_SOURCE_FACE,
-    EBPO_COLUMN_LOD,
+    EBPO_COLUMN_LOD, /* level of the block; EBPO_COLUMN_LEVEL: level of the node in the octree */
     EBPO_COLUMNS,
-    EBPO_COLUMNS_OF_NODES = EBPO_COLUMN_SOURCE_FACE
+    EBPO_COLUMNS_OF_NODES = EBPO_COLUMN_SOURCE_FACE /* number of columns that nodes have */
 };
 extern const ebpo_column ebpo_columns[EBPO_COLUMNS];
 
-/* Returns the vertex number of corner i of a polygon; the polygon's fan begins with this triangle.
- */
+/* Returns the vertex of corner i of a polygon, which is stored as a fan of triangles. `triangle` is
+ * the first triangle of the fan. */
 static inline uint32_t ebpo_polygon_corner(const uint32_t *triangle, unsigned i)
 {
     return i < 2 ? triangle[i] : triangle[3 * (i - 2) + 2];
 }
 
-/* Returns the values of a column, to be freed by the caller; NULL when out of memory. */
+/* Returns the values of a column, to be freed by the caller; NULL when out of memory. `polygons`,
+ * for a level: true: one value for each polygon, false: for each node. */
 void *ebpo_column_make(const ebpo_block *block, int column, bool polygons);
-/* Returns the source's number of each vertex of the mesh as int64_t; all numbers are -1 for a
- * level, and without maps. To be freed by the caller; NULL when out of memory. */
+/* Returns the source index of each vertex of the block's mesh as int64_t, to be freed by the
+ * caller; NULL when out of memory. All values are -1 for a level, and if the file has no maps. */
 void *ebpo_column_of_vertices(const ebpo_block *block);
 
 /* --- jobs and formats --- */
@@ -75,9 +76,10 @@ typedef struct ebpo_export_row {
     /* true: second_ending replaces the ending of the first file's name; false: it is appended */
     bool replaces_ending;
     bool holds_vertex_colours, holds_face_colours;
-    bool takes_colours; /* ebpo_export_options.vertex_colours */
-    bool one_block;     /* a file holds a single level, or the mesh */
-    /* Fills the report. NULL: the build lacks the library for the format. */
+    bool takes_colours; /* supports colours of the caller (ebpo_export_options.vertex_colours) */
+    bool one_block;     /* a file holds only one block */
+    /* Writes the files and fills in the report. NULL: the build lacks the library for the format.
+     */
     ebpo_status (*write)(const ebpo_export_job *job, ebpo_error *error);
 } ebpo_export_row;
 
@@ -99,15 +101,15 @@ EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int
 /* These functions fail with EBPO_E_LIMIT for sizes that a format cannot represent. GLB files have
  * 32-bit sizes; `text` and `bin` are the sizes in bytes of the JSON text and of the binary data.
  * OBJ and STL files are written by assimp, which has 32-bit indices of corners. */
-enum { EBPO_GLB_HEADS = 28 };
+enum { EBPO_GLB_HEADS = 28 }; /* size in bytes of the header and of the heads of the two chunks */
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
                                                 ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_export_check_assimp(const char *path, uint64_t vertices,
                                                    uint64_t faces, ebpo_error *error);
 
-/* Sets *out to the vertices minus the origin, as floats [vertex_count][3] to be freed by the
- * caller; NULL on failure (EBPO_E_MEMORY; EBPO_E_LIMIT: a coordinate out of range for float32).
- * Raises *largest_change to the largest rounding error of a coordinate. */
+/* Sets *out to the mesh's vertices minus the origin, as floats [vertex_count][3] to be freed by the
+ * caller. Raises *largest_change to the largest rounding error of a coordinate. Errors:
+ * EBPO_E_MEMORY; EBPO_E_LIMIT: a coordinate is out of range for float32. Then *out is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh,
                                            const double origin[3], double *largest_change,
                                            ebpo_error *error);

@@ -1,7 +1,7 @@
-/* Writes VTKHDF 1.0: a file with one unstructured grid of polygons. Version 1.0 has no blocks (2.1
- * has them) and no polyhedra (2.5 has them). So each level, and the mesh, is a partition of the
- * grid, and the cell array `lod` gives the level of each polygon. Source: VTK's documentation,
- * "VTKHDF file format". */
+/* Writes VTKHDF 1.0: a file with one unstructured grid of polygons. VTKHDF has separate grids only
+ * since version 2.1, and polyhedra only since 2.5. So each level, and the mesh, is a partition of
+ * the one grid, and the cell array `lod` gives the level of each polygon. Source: VTK's
+ * documentation, "VTKHDF file format". */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -12,8 +12,9 @@
 #include "derive/export_job.h"
 #include "io/publish.h"
 
-enum { VTK_TRIANGLE = 5, VTK_POLYGON = 7 };
+enum { VTK_TRIANGLE = 5, VTK_POLYGON = 7 }; /* VTK's types of cells */
 
+/* The tables (datasets) of the file. */
 enum {
     POINTS,
     CONNECTIVITY,
@@ -23,17 +24,18 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
-    VERTEX_COLOURS, /* each of the two tables of colours is made for the first block that has
-                       colours */
+    VERTEX_COLOURS, /* these two tables are made when the first block with such colours is written
+                     */
     FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
 };
 
+/* The tables before the columns. */
 static const struct {
     const char *path;
     ebpo_h5_number number;
-    uint32_t cols;
+    uint32_t cols; /* values in a row; 0: the dataset has one dimension */
 } layout[FIRST_COLUMN] = {
     { "/VTKHDF/Points", EBPO_H5_F64, 3 },
     { "/VTKHDF/Connectivity", EBPO_H5_I64, 0 },
@@ -66,6 +68,7 @@ static ebpo_status make_group(writer *w, const char *path, ebpo_error *error)
     return status;
 }
 
+/* Makes all tables except those of colours. floats: positions are float32. */
 static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
 {
     static const char *const groups[] = { "/VTKHDF", "/VTKHDF/PointData", "/VTKHDF/CellData" };
@@ -87,8 +90,8 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
     return status;
 }
 
-/* Appends the values to a table and frees them. If `values` is NULL, the caller's allocation
- * failed, and so does this function. */
+/* Appends the values to a table and frees them. If `values` is NULL, because the caller's
+ * allocation failed, returns EBPO_E_MEMORY. */
 static ebpo_status append_table(writer *w, int table, void *values, uint64_t count,
                                 ebpo_error *error)
 {
@@ -141,7 +144,7 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     return status;
 }
 
-/* Appends white rows, for the blocks without colours, until the table has `rows` rows. */
+/* Appends white rows, for earlier blocks without colours, until the table has `rows` rows. */
 static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *error)
 {
     uint8_t white[4 * 1024];
@@ -155,10 +158,11 @@ static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *
     return status;
 }
 
-/* Appends a block's colours, which are `rows` rows. `all` is the number of rows with this block
- * included. Makes the table for the first block that has colours. */
+/* Appends a block's colours (NULL: white), which are `rows` rows. `total_rows` is the number of
+ * rows of this block and all earlier blocks. Makes the table at the first block that has colours.
+ */
 static ebpo_status append_rgba(writer *w, int table, const uint8_t *rgba, uint64_t rows,
-                               uint64_t all, ebpo_error *error)
+                               uint64_t total_rows, ebpo_error *error)
 {
     bool *has_colours = &w->has_colours[table - VERTEX_COLOURS];
     ebpo_status status = EBPO_OK;
@@ -169,7 +173,7 @@ static ebpo_status append_rgba(writer *w, int table, const uint8_t *rgba, uint64
                                     layout[table].cols, &w->table[table], error);
     *has_colours = true;
     if (status == EBPO_OK)
-        status = pad_colours(w, table, rgba ? all - rows : all, error);
+        status = pad_colours(w, table, rgba ? total_rows - rows : total_rows, error);
     return status == EBPO_OK && rgba ? ebpo_h5_append(&w->out, &w->table[table], rgba, rows, error)
                                      : status;
 }

@@ -11,12 +11,12 @@
 #include "io/file_source.h"
 #include "io/publish.h"
 
-enum { XDMF_POLYHEDRON = 16 };
+enum { XDMF_POLYHEDRON = 16 }; /* XDMF's type of polyhedra in a mixed topology */
 
 typedef struct writer {
     ebpo_h5_out out;
     FILE *text;
-    const char *data_file; /* the HDF5 file's name in the text */
+    const char *data_file; /* name of the HDF5 file, as the text refers to it */
 } writer;
 
 static void print_escaped(FILE *f, const char *s)
@@ -30,7 +30,7 @@ static void print_escaped(FILE *f, const char *s)
 }
 
 /* Writes an array to the HDF5 file and a reference to the array to the text file. If `values` is
- * NULL, the caller's allocation failed, and so does this function. */
+ * NULL, because the caller's allocation failed, returns EBPO_E_MEMORY. */
 static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name,
                              ebpo_h5_number number, uint32_t cols, const void *values,
                              uint64_t rows, ebpo_error *error)
@@ -54,6 +54,7 @@ static ebpo_status put_array(writer *w, const ebpo_block *block, const char *nam
     return status;
 }
 
+/* Writes an attribute with one value for each node or cell (`centre`). Frees `values`. */
 static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char *name,
                                  const char *centre, ebpo_h5_number number, void *values,
                                  uint64_t rows, ebpo_error *error)
@@ -67,8 +68,8 @@ static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char 
     return status;
 }
 
-/* Writes for each polyhedron its kind and the number of its polygons; then for each polygon the
- * number of its corners, and the corners. */
+/* Writes the envelopes of a level as polyhedra. A polyhedron is its XDMF type, the number of its
+ * polygons, and then, for each polygon, the number of its corners and the corners. */
 static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_lod_nodes *nodes = &block->nodes;
@@ -127,6 +128,7 @@ static ebpo_status put_colours(writer *w, const ebpo_block *block, const char *n
     return status;
 }
 
+/* Writes the colours of the block's vertices and faces, if it has any. */
 static ebpo_status put_colours_of(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_colours *c = &block->colours;
@@ -137,6 +139,7 @@ static ebpo_status put_colours_of(writer *w, const ebpo_block *block, ebpo_error
                              : status;
 }
 
+/* Writes the values of a level's nodes, or the source indices of the mesh. */
 static ebpo_status put_data(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     bool mesh = block->level < 0;

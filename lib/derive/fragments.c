@@ -1,11 +1,12 @@
 /* Cuts an envelope into fragments, for bounds of the distance by which the envelope extends beyond
  * the model. Fragments are convex polytopes in the cell coordinates of a node; together they cover
  * the envelope. The unit of length is a power of two near the cell's longest side, so that no
- * length overflows or underflows. Every cut keeps slightly too much on both sides, so that the
- * tolerances of ebpo_polytope_clip lose nothing. Fragments follow the model's tree down to leaves.
- * Within leaves, they are cut along the planes of faces, or halved, until each fragment is inside,
- * outside, or small. This file also reads the trees: the tree whose envelopes are measured, and the
- * tree of the whole model, which determines the solid. */
+ * length overflows or underflows. At every cut, both parts extend slightly beyond the cut, so that
+ * no point is lost within the tolerances of ebpo_polytope_clip.
+ *
+ * Fragments are first cut along the cells of the model's tree, down to leaves. Within leaves, they
+ * are cut along the planes of faces, or halved, until each fragment is inside the solid, outside
+ * the solid, or small. This file also reads the trees (fragments.h). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -95,8 +96,8 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
     return bounds.hi + f->grain;
 }
 
-/* Converts a triangle of the model to cell coordinates; returns a bound of the rounding error of a
- * coordinate. */
+/* Converts a triangle of the model to cell coordinates. Returns a bound of the rounding error of
+ * the converted coordinates. */
 static double cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
                                   double out[3][3])
 {
@@ -125,15 +126,16 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
     }
 }
 
-/* Computes the part with x[axis] <= at (side 0) or >= at (side 1). If the part on the other side is
- * thin, adds it to this part. Returns false if this part is empty or thin. */
+/* Computes the part of `p` with x[axis] <= at (side 0) or with x[axis] >= at (side 1). If the part
+ * on the other side of the cut is thin, the result includes that part. Returns false if the part on
+ * this side is empty or thin. */
 static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
 {
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    /* Clipping fails where almost nothing would remain. A thin part's box, used instead, would
-     * extend far beyond the part. So a thin part stays with the thick part. */
+    /* Clipping fails if almost nothing would remain, so a thin part cannot be cut off. It stays
+     * with the thick part. */
     bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
          low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
     if (side ? high_is_thin : low_is_thin)
@@ -146,7 +148,7 @@ static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo
     return true;
 }
 
-/* Computes the part with n . x <= d, |n| = 1; returns false when clipping fails. */
+/* Computes the part of `p` with n . x <= d, |n| = 1. Returns false when clipping fails. */
 static bool cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
@@ -163,8 +165,8 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, uns
                               "not have; use a file with its mesh (`ebpo convert`)");
     if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "is a subset, and error bounds are measured against the whole "
-                              "mesh; use the original");
+                              "is a subset, but error bounds are measured against the whole "
+                              "mesh; use the original file");
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
     ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, &read, error);
@@ -192,30 +194,30 @@ bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out)
 }
 
 bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool include_node, ebpo_node *out,
-                      ebpo_half_spaces *halves)
+                      ebpo_half_spaces *half_spaces)
 {
     ebpo_level_nodes nodes = ebpo_lod_model_nodes(tree);
     ebpo_cursor c;
     return go_to(&c, &nodes, cell, out) &&
-           ebpo_cursor_half_spaces(&c, include_node, halves, NULL) == EBPO_OK;
+           ebpo_cursor_half_spaces(&c, include_node, half_spaces, NULL) == EBPO_OK;
 }
 
 ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
-                             ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
+                             ebpo_leaf_scratch *scratch, ebpo_half_spaces *half_spaces,
                              ebpo_error *error)
 {
     ebpo_polytope inherited;
     uint32_t codes[EBPO_PLANES_MAX];
     int count = 0;
-    ebpo_half_spaces_cut(halves, 0, &inherited);
+    ebpo_half_spaces_cut(half_spaces, 0, &inherited);
     ebpo_status status = ebpo_lod_leaf_planes(tree, leaf->cell, leaf->rank, scratch, &inherited,
                                               codes, &count, error);
     if (status == EBPO_OK)
-        ebpo_half_spaces_add(halves, codes, (uint64_t)count);
+        ebpo_half_spaces_add(half_spaces, codes, (uint64_t)count);
     return status;
 }
 
-/* maximum number of faces to cut along; a fragment with more faces is halved */
+/* A fragment with more faces than this is halved instead of cut along the planes of its faces. */
 enum { CUT_FACES = 64 };
 /* A plane cuts a fragment only if the fragment extends to at least this distance (in cell
  * coordinates) on both sides of the plane. The distance is more than the width that
@@ -245,6 +247,7 @@ ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
     return EBPO_OK;
 }
 
+/* Pushes a fragment like ebpo_fragment_push, and sets its polytope to `p`. */
 static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
                                  const ebpo_fragment *parent, const ebpo_polytope *p,
                                  ebpo_fragment **out)
@@ -284,7 +287,7 @@ ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
 {
     uint64_t count = 0, first = b->face_count;
     ebpo_status status =
-        ebpo_lod_leaf_faces(b->whole, leaf->cell, leaf->rank, &b->scratch, &count, b->error);
+        ebpo_lod_leaf_faces(b->model_tree, leaf->cell, leaf->rank, &b->scratch, &count, b->error);
     if (status == EBPO_OK &&
         !ebpo_grow(&b->faces, &b->face_capacity, first + count, sizeof *b->faces))
         status = ebpo_fail_memory(b->error, (first + count) * sizeof *b->faces);
@@ -297,8 +300,8 @@ ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
 
 /* --- cutting --- */
 
-/* Computes the bounds of a cell `levels` below the envelope's node, in the coordinates of that
- * node's cell. */
+/* Computes the box of a cell that is `levels` levels below the envelope's node, in the cell
+ * coordinates of the envelope's node. */
 static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3],
                             double high[3])
 {
@@ -310,11 +313,11 @@ static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, d
     }
 }
 
-/* Returns the distance by which a fragment extends beyond its cell: up to EBPO_CUT_THIN where a
- * neighbour's thin part stayed with the fragment, or EBPO_CUT_SLACK after a cut. Both are lengths
- * in the cell coordinates of the envelope's node. Many levels below this node, they are not small
- * compared with the fragment's cell. A bound for the cell plus this distance is a bound for the
- * fragment. */
+/* Returns the distance by which a fragment extends beyond its cell: up to EBPO_CUT_THIN if the thin
+ * part of a neighbour stayed with the fragment, otherwise up to EBPO_CUT_SLACK. A bound for the
+ * cell plus this distance is a bound for the fragment. The distance must not be ignored: many
+ * levels below the envelope's node, these widths are not small compared with the fragment's cell.
+ */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
@@ -326,9 +329,10 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Bounds a fragment in a black cell. The fragment is inside the solid, except for thin parts of
- * neighbouring cells that stayed with it. Parts within EBPO_CUT_SLACK of the cell are ignored,
- * because the fragments of the neighbours cover these parts, too. */
+/* Raises the upper bound of the search to the bound of a fragment in a black cell. The fragment is
+ * inside the solid, except for thin parts of neighbouring cells that stayed with it. Parts within
+ * EBPO_CUT_SLACK of the cell are ignored, because fragments of the neighbouring cells cover them,
+ * too. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
@@ -348,7 +352,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
 {
     ebpo_polytope z, y, x;
     ebpo_status status = EBPO_OK;
-    ebpo_level_nodes nodes = ebpo_lod_model_nodes(b->whole);
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(b->model_tree);
     double low[3], half = .5 * ebpo_half_power(fragment->levels);
     for (int k = 0; k < 3; k++)
         low[k] = (double)(fragment->node.cell.at[k] - (b->frame.cell.at[k] << fragment->levels)) *
@@ -380,7 +384,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
     return status;
 }
 
-/* Halves a fragment across its longest extent. */
+/* Halves a fragment across its longest side. The halves get this kind. */
 static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
                                ebpo_fragment_kind kind)
 {
@@ -448,10 +452,11 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status;
 }
 
-/* Cuts a fragment along a side of the prism that stands on its nearest face, perpendicular to the
- * face. Within this prism, the distance to the face's plane is the distance to the face, so no
- * small fragments are needed where the surface is flat. A fragment that is much larger than the
- * face, or that no side of the prism cuts, is halved. */
+/* Cuts a fragment that is outside the solid. The cut is along a side of the prism that stands
+ * perpendicularly on the face nearest to the fragment's centre. Within this prism, the distance to
+ * the face's plane is the distance to the face, so no small fragments are needed where the surface
+ * is flat. If the fragment is much larger than the face, or no side of the prism cuts it, it is
+ * halved. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
                              const ebpo_fragment_measure *measure)
 {
@@ -489,19 +494,20 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
             greatest = fmax(greatest, e);
             least = fmin(least, e);
         }
-        /* A face without area gives NAN, for which both comparisons are false. */
+        /* For a face without area, both values are NAN, and both comparisons are false. */
         if (greatest > side_least && least < -side_least)
             status = cut_along(b, fragment, EBPO_FRAGMENT_OUTSIDE, n, d, &done);
     }
     return status != EBPO_OK || done ? status : cut_longest(b, fragment, EBPO_FRAGMENT_OUTSIDE);
 }
 
-/* Returns a bound of the distance for a fragment whose centre is inside the solid. The planes of
- * the fragment's faces may cut off only thin outermost parts of it. A segment from the centre to a
- * point of the fragment may leave the solid only behind such a plane, and the part of the segment
- * behind the plane is at most as long as the returned bound. Where the fragment extends beyond the
- * leaf's cell by more than EBPO_CUT_SLACK, the cell face counts as such a plane, because the faces
- * beyond it are listed by the neighbour and not by this leaf. */
+/* Returns a bound of the distance from the solid for the points of a fragment whose centre is
+ * inside the solid. The planes of the fragment's faces must cut off only thin outermost parts of
+ * the fragment. A segment from the centre to a point of the fragment can leave the solid only
+ * behind such a plane, and the part of the segment behind the plane is at most as long as the
+ * returned bound. If the fragment extends beyond a cell face of the leaf by more than
+ * EBPO_CUT_SLACK, the cell face counts as such a plane, because this leaf does not list the faces
+ * behind it. Returns INFINITY if the planes are too uncertain for a bound. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                            const ebpo_fragment_measure *measure)
 {
@@ -515,7 +521,7 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                    centre_to_side =
                        side ? high[k] - measure->centre[k] : measure->centre[k] - low[k];
             if (beyond > EBPO_CUT_SLACK && !(centre_to_side > 0))
-                /* The centre is beyond the cell face, so this function gives no bound. */
+                /* The centre is beyond the cell face, so there is no bound. */
                 return INFINITY;
             if (beyond > EBPO_CUT_SLACK)
                 share = fmax(share, (beyond + 2e-9) / (beyond + 2e-9 + centre_to_side));
@@ -537,17 +543,20 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
     return share * measure->radius + b->frame.grain;
 }
 
-/* Returns true if the cell is so thin on some axis that the planes of faces are too uncertain. */
+/* Returns true if the node's cell is so thin along an axis that the planes of faces are too
+ * uncertain to distinguish inside and outside. */
 static bool is_flat(const ebpo_bounder *b)
 {
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* Cuts a fragment within a leaf of a solid. Every point of the fragment is inside or outside the
- * solid. */
+/* Cuts a fragment within a leaf of a solid: along the plane of a listed face, if one cuts it. If
+ * none does, the whole fragment is inside or outside the solid, except for thin outermost parts;
+ * then its bound is computed, or it is cut until its bound is good enough. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
                             const ebpo_fragment_measure *measure)
 {
+    /* usable: all planes so far are certain, and there are not too many faces */
     bool done = false, usable = fragment->face_count <= CUT_FACES;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < fragment->face_count && usable && !done && status == EBPO_OK; i++) {
@@ -566,8 +575,8 @@ static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
     }
     if (status != EBPO_OK || done)
         return status;
-    /* In a flat cell, inside and outside cannot be distinguished, so the model counts as a surface.
-     */
+    /* In a flat cell, inside and outside cannot be distinguished. So the model is treated as a
+     * surface, and all of the fragment as outside. */
     if (!usable && is_flat(b))
         return cut_prism(b, fragment, measure);
     if (!usable)
@@ -587,8 +596,8 @@ ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
     switch (fragment->kind) {
     case EBPO_FRAGMENT_GRAY: return cut_gray(b, fragment);
     case EBPO_FRAGMENT_LEAF:
-        return b->whole->info->solid ? cut_leaf(b, fragment, measure)
-                                     : cut_prism(b, fragment, measure);
+        return b->model_tree->info->solid ? cut_leaf(b, fragment, measure)
+                                          : cut_prism(b, fragment, measure);
     case EBPO_FRAGMENT_OUTSIDE: break;
     }
     return cut_prism(b, fragment, measure);

@@ -1,5 +1,7 @@
-/* Declares the functions of fragments.c: a node's cell with its unit of length, fragments of an
- * envelope, the trees of a file, and the state of a search for an error bound. */
+/* Declares what the searches for error bounds share (error_bound.c, level_error_bound.c). An error
+ * bound is an upper bound of the distance by which an envelope extends beyond the model. Declared
+ * are: a node's cell with a unit of length, fragments (the convex parts into which an envelope is
+ * cut), the trees of files, and the state of a search. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 
@@ -10,12 +12,12 @@
 #include "geometry/polytope.h"
 #include "levels/lod.h"
 
-/* A node's cell in the model. The frame's unit of length is a power of two near the cell's longest
- * side. */
+/* The frame of a node: its cell, and a unit of length, which is a power of two near the cell's
+ * longest side. In this unit, lengths neither overflow nor underflow. */
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;
-    int exponent;                    /* the unit is 2^exponent in the model's unit */
-    double factor[2];                /* two factors of 2^-exponent, which itself may overflow */
+    int exponent;     /* the unit is 2^exponent in the model's unit */
+    double factor[2]; /* their product is 2^-exponent, which may overflow as one double */
     double low[3], high[3], size[3]; /* box of the cell, in the model's unit */
     double side[3];                  /* sides of the cell, in the frame's unit */
     /* bound of the rounding error of points and distances, in the frame's unit */
@@ -49,53 +51,57 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
 /* Fragments of an envelope are convex polytopes in the cell coordinates of the node. Together they
  * cover the envelope. Every cut keeps a little too much on both sides. */
 
-/* Width, in cell coordinates, of what each cut keeps too much. The width is more than the tolerance
- * of clipping, for normals of Euclidean length 1/sqrt(3) and up. */
+/* Each part extends beyond its cut by this width, in cell coordinates. The width is more than the
+ * tolerance of clipping, if the normal of the cut has a length of at least 1/sqrt(3). */
 #define EBPO_CUT_SLACK 4e-10
 
+/* The box of a polytope, in cell coordinates. */
 typedef struct ebpo_extent {
     double min[3], max[3];
 } ebpo_extent;
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
-/* If one of the two parts that a cut makes is at most this wide, no cut is made, and the other part
- * keeps it. The width is less than a quarter of the smallest fragment that is cut. */
-#define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
+/* If one of the two parts of a cut would be at most this wide, the fragment is not cut. This width
+ * is less than a quarter of the smallest fragment that is cut, and more than 1e-7, which
+ * ebpo_polytope_clip refuses. */
+#define EBPO_CUT_THIN 1.2e-7
 
-/* Two trees determine a bound: the tree whose envelopes are bounded, and the tree of the whole
- * model, which determines the solid. */
+/* --- trees: the levels of a file, with the faces of leaves ---
+ *
+ * A search reads two trees: the tree whose envelopes are bounded, and the tree of the whole model,
+ * which determines the solid. Both may be the same. */
 
-/* Reads the whole model of a file that has a mesh and is no subset, else fails with EBPO_E_ABSENT.
- * The caller frees it by ebpo_lod_model_free. */
+/* Reads all levels of a file. Fails with EBPO_E_ABSENT if the file has no mesh or is a subset. The
+ * caller frees the result by ebpo_lod_model_free. */
 EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file,
                                                unsigned threads, ebpo_error *error);
 
 /* Finds the node of `cell`; returns false if there is none. */
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
 
-/* Finds the node like ebpo_tree_find, and returns the half-spaces of the node's ancestors in the
- * coordinates of `cell`. With `include_node`, also returns the half-spaces that the file stores for
- * the node itself. */
+/* Finds the node as ebpo_tree_find does. Also returns the half-spaces of the node's ancestors and,
+ * with `include_node`, those that the file stores for the node, all in the coordinates of `cell`.
+ */
 bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool include_node, ebpo_node *out,
-                      ebpo_half_spaces *halves);
+                      ebpo_half_spaces *half_spaces);
 
 /* Adds the half-spaces that ebpo_lod_level derives for a leaf of a file without stored leaf planes.
  */
 EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
-                                           ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
-                                           ebpo_error *error);
+                                           ebpo_leaf_scratch *scratch,
+                                           ebpo_half_spaces *half_spaces, ebpo_error *error);
 
 /* --- state of one thread that bounds the error of an envelope --- */
 
 typedef struct ebpo_fragment ebpo_fragment;
 
 typedef struct ebpo_bounder {
-    const ebpo_lod_model *whole; /* the model's tree, which determines the solid */
-    ebpo_context *context;       /* context of the same file */
+    const ebpo_lod_model *model_tree; /* tree of the whole model, which determines the solid */
+    ebpo_context *context;            /* for distance queries of the same model */
     ebpo_leaf_scratch scratch;
-    ebpo_half_spaces halves;  /* half-spaces of the envelope */
-    ebpo_fragment *fragments; /* a stack */
+    ebpo_half_spaces half_spaces; /* half-spaces of the envelope, in cell coordinates */
+    ebpo_fragment *fragments;     /* a stack: fragments that are still to be examined */
     uint64_t fragment_capacity, fragment_count;
     /* a stack: the faces of the fragments within leaves, in the model's unit */
     double (*faces)[3][3];
@@ -119,18 +125,18 @@ typedef struct ebpo_bounder {
 #define EBPO_FRAGMENT_LEAST 1e-6
 
 typedef enum ebpo_fragment_kind {
-    EBPO_FRAGMENT_GRAY, /* the part of the envelope in a gray node's cell */
-    /* within a leaf's cell; the fragment lists the leaf's faces that may intersect it */
+    EBPO_FRAGMENT_GRAY, /* in a gray node's cell: the whole part of the envelope in this cell */
+    /* in a leaf's cell; the fragment lists the leaf's faces that may intersect it */
     EBPO_FRAGMENT_LEAF,
-    /* in a white cell, or cut off from all faces, or in a surface's envelope, which has no inside
-     */
+    /* outside the solid: in a white cell, or cut off from all faces; for a surface, which has no
+     * inside, also other fragments without faces */
     EBPO_FRAGMENT_OUTSIDE
 } ebpo_fragment_kind;
 
 struct ebpo_fragment {
     ebpo_fragment_kind kind;
     double upper;   /* upper bound of the distance of the fragment's points */
-    ebpo_node node; /* GRAY, LEAF: the node of the model's tree whose cell has the fragment */
+    ebpo_node node; /* GRAY, LEAF: the node of the model's tree in whose cell the fragment is */
     int levels;     /* GRAY, LEAF: the number of levels of `node` below the node of the envelope */
     /* GRAY, LEAF: bound of the distance of the fragment's points from the cell of `node` */
     double beyond;
@@ -146,8 +152,8 @@ typedef struct ebpo_fragment_measure {
     double face[3][3];        /* the face nearest to the centre, in the model's unit */
 } ebpo_fragment_measure;
 
-/* Pushes a fragment with the bounds of `parent`, the fragment that it was cut from (NULL: no
- * bounds). *out is valid until the next call; its polytope is not set. */
+/* Pushes a fragment onto the stack. It gets the bounds of `parent`, the fragment from which it was
+ * cut (NULL: no bounds). *out is valid until the next call; its polytope is not set. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 

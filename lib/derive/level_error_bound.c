@@ -1,9 +1,14 @@
 /* Measures the error of a level: bounds of the largest distance by which its envelopes extend
- * beyond the model, and the mean distance, from samples. A level's bounds are the largest bounds of
- * its nodes. A short search for each node shows for most nodes that they do not have the largest
- * distance; the other nodes are searched in the order of their upper bounds. Samples are points on
- * the level's polygons. The area of the polygons is divided into equal parts, with one sample in
- * each part. A sample counts if the point slightly outside its polygon is in no other envelope. */
+ * beyond the model, and the mean distance, from samples. The level may be that of a subset;
+ * distances are always measured to the whole model.
+ *
+ * A level's bounds are the largest bounds of its nodes. A short search for each node
+ * (error_bound.h) shows for most nodes that they do not have the largest distance. The other nodes
+ * are searched in the order of their upper bounds.
+ *
+ * Samples are points on the level's polygons. The area of the polygons is divided into equal parts,
+ * with one sample in each part. A sample counts if its polygon is on the outside of the level: the
+ * point slightly in front of the polygon must be in no other envelope. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -28,17 +33,17 @@ typedef struct sampling {
     const ebpo_error_bound_options *o;
     int level;
     ebpo_box box;
-    ebpo_cell_frame frame; /* frame of the root cell: the unit of areas and distances */
-    ebpo_mesh mesh;
-    ebpo_lod_nodes nodes;
-    uint64_t *first_triangle; /* [node_count + 1] */
-    uint32_t *triangle;       /* [samples] */
+    ebpo_cell_frame frame;    /* of the root cell; areas and distances below are in its unit */
+    ebpo_mesh mesh;           /* the level's polygons as triangles */
+    ebpo_lod_nodes nodes;     /* the nodes with these polygons */
+    uint64_t *first_triangle; /* [node_count + 1] first triangle of each node */
+    uint32_t *triangle;       /* [samples] triangle that has the sample */
     double *distance;         /* [samples]; NAN: the sample does not count */
     ebpo_context **contexts;  /* [threads] */
     unsigned threads;
 } sampling;
 
-/* Returns the random number at index `index` of the stream for `seed`, from 0 to 1. */
+/* Returns random number `index` of the sequence that `seed` selects; it is between 0 and 1. */
 static double random_unit(uint64_t seed, uint64_t index)
 {
     uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + index + 1;
@@ -64,7 +69,8 @@ static double triangle_area(const sampling *s, uint64_t triangle)
     return .5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-/* Distributes one sample to each of `samples` equal parts of the area. */
+/* Divides the area into `samples` equal parts. Chooses a random position in each part, and stores
+ * the triangle that has this position. */
 static void distribute_samples(sampling *s)
 {
     double total = 0, area_before = 0;
@@ -84,7 +90,7 @@ static void distribute_samples(sampling *s)
 
 /* --- the envelope that contains a point --- */
 
-/* Returns the index of the node that has a triangle. */
+/* Returns the index of the node to which a triangle belongs. */
 static uint64_t node_of_triangle(const sampling *s, uint64_t triangle)
 {
     uint64_t low = 0, high = s->nodes.node_count;
@@ -95,8 +101,8 @@ static uint64_t node_of_triangle(const sampling *s, uint64_t triangle)
     return low;
 }
 
-/* Returns the node with the octcode (locational code), or node_count. Nodes are sorted by octcode.
- */
+/* Returns the index of the node with an octcode (locational code), or node_count if there is none.
+ * Nodes are sorted by octcode. */
 static uint64_t find_node(const sampling *s, uint64_t octcode)
 {
     uint64_t low = 0, high = s->nodes.node_count;
@@ -110,8 +116,8 @@ static uint64_t find_node(const sampling *s, uint64_t octcode)
                : s->nodes.node_count;
 }
 
-/* Computes a triangle's normal in root cell coordinates, of length 1; returns false without area.
- */
+/* Computes a triangle's normal in root cell coordinates, of length 1. Returns false if the triangle
+ * has no area. */
 static bool unit_normal(const sampling *s, uint64_t triangle, double n[3])
 {
     double u[3], v[3], length = 0;
@@ -134,19 +140,19 @@ static bool is_in_node_envelope(const sampling *s, uint64_t node, const double p
 {
     double slack = 1e-9 * ebpo_half_power(s->level);
     for (uint64_t t = s->first_triangle[node]; t < s->first_triangle[node + 1]; t++) {
-        double n[3], out = 0;
+        double n[3], in_front = 0; /* distance in front of the triangle's plane */
         if (!unit_normal(s, t, n))
             continue;
         for (int k = 0; k < 3; k++)
-            out += n[k] * ((p[k] - triangle_corner(s, t, 0)[k]) / s->box.size[k]);
-        if (out > slack)
+            in_front += n[k] * ((p[k] - triangle_corner(s, t, 0)[k]) / s->box.size[k]);
+        if (in_front > slack)
             return false;
     }
     return true;
 }
 
-/* Returns true if a point is in the envelope of a node other than `own`. */
-static bool is_in_other_envelope(const sampling *s, uint64_t own, const double p[3])
+/* Returns true if a point is in the envelope of a node other than `excluded`. */
+static bool is_in_other_envelope(const sampling *s, uint64_t excluded, const double p[3])
 {
     double xi[3];
     for (int k = 0; k < 3; k++) {
@@ -160,19 +166,19 @@ static bool is_in_other_envelope(const sampling *s, uint64_t own, const double p
             cell.at[k] = (uint32_t)(xi[k] * (double)(1u << level));
         uint64_t node = find_node(s, ebpo_octcode_of_cell(cell));
         if (node < s->nodes.node_count)
-            return node != own && is_in_node_envelope(s, node, p);
+            return node != excluded && is_in_node_envelope(s, node, p);
     }
     return false;
 }
 
 /* --- samples --- */
 
-/* Chooses the point of sample i in the sample's triangle, and measures its distance if the sample
- * counts. */
+/* Chooses the point of sample i in the sample's triangle. Measures the point's distance from the
+ * model, if the sample counts. */
 static ebpo_status measure_sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
 {
     double a = sqrt(random_unit(s->o->seed, 3 * i + 1)), b = random_unit(s->o->seed, 3 * i + 2),
-           p[3], n[3], q[3];
+           p[3], n[3], q[3]; /* q: p moved slightly outward */
     uint64_t t = s->triangle[i];
     s->distance[i] = NAN;
     if (!unit_normal(s, t, n))
@@ -220,6 +226,7 @@ static void sum_up(const sampling *s, ebpo_error_bound *out)
     out->rms = ldexp(sqrt(squares / (double)out->samples), s->frame.exponent);
 }
 
+/* Makes the arrays and contexts of the sampling, and finds the first triangle of each node. */
 static ebpo_status reserve_space(sampling *s, ebpo_model *model, ebpo_error *error)
 {
     uint64_t triangles = 0, polygon = 0;
@@ -241,7 +248,7 @@ static ebpo_status reserve_space(sampling *s, ebpo_model *model, ebpo_error *err
     return status;
 }
 
-/* Sets out->mean, rms and samples. */
+/* Sets out->mean, out->rms and out->samples. */
 static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, int level,
                                       const ebpo_error_bound_options *options,
                                       ebpo_error_bound *out, ebpo_error *error)
@@ -281,6 +288,7 @@ static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, 
  * queries. */
 enum { BLOCK_MAX = 512, QUERIES_MAX = 1 << 16 };
 
+/* A node with an envelope of the level, and the bounds of its error. */
 typedef struct level_node {
     ebpo_cell cell;
     ebpo_envelope_bound bound;
@@ -288,14 +296,15 @@ typedef struct level_node {
 
 /* The search for the bounds of a level. */
 typedef struct survey {
-    const ebpo_lod_model *tree;  /* of the file */
-    const ebpo_lod_model *whole; /* of the model's file; may be the same tree */
+    const ebpo_lod_model *level_tree; /* tree of the file, which may be a subset */
+    const ebpo_lod_model *model_tree; /* tree of the whole model; may be the same tree */
     int level;
-    level_node *nodes;
-    uint64_t count, capacity, *order;
+    level_node *nodes; /* [count] */
+    uint64_t count, capacity;
+    uint64_t *order;        /* [count] indices of the nodes in the order of the search */
     ebpo_bounder *bounders; /* [threads] */
     unsigned threads;
-    ebpo_bound_goal goal;
+    ebpo_bound_goal goal; /* for the nodes of the current block */
     uint64_t first;       /* start of the current block in `order` */
     bool queries_used_up; /* the queries were used up before the tolerance was reached */
     const ebpo_progress *progress;
@@ -312,7 +321,8 @@ static ebpo_status add_node(survey *s, const ebpo_node *node)
     return EBPO_OK;
 }
 
-/* Lists the gray nodes of the level, and the leaves and pruned nodes above it, below `node`. */
+/* Lists the nodes at or below `node` that have an envelope of the level, except black nodes: gray
+ * nodes of the level, leaves, and pruned nodes above the level. */
 static ebpo_status list_nodes(survey *s, const ebpo_level_nodes *tree, const ebpo_node *node)
 {
     if (node->type == EBPO_LEAF)
@@ -331,13 +341,14 @@ static ebpo_status list_nodes(survey *s, const ebpo_level_nodes *tree, const ebp
 
 /* --- bounds of nodes --- */
 
+/* Searches one node with the goal s->goal. */
 static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo_error *error)
 {
-    ebpo_node own;
+    ebpo_node found;
     ebpo_status status = EBPO_OK;
-    (void)ebpo_tree_bounds(s->tree, node->cell, true, &own, &b->halves);
-    if (own.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
-        status = ebpo_tree_derive(s->tree, &own, &b->scratch, &b->halves, error);
+    (void)ebpo_tree_bounds(s->level_tree, node->cell, true, &found, &b->half_spaces);
+    if (found.type == EBPO_LEAF && s->level_tree->leaf_source == EBPO_LEAF_DERIVED)
+        status = ebpo_tree_derive(s->level_tree, &found, &b->scratch, &b->half_spaces, error);
     if (status != EBPO_OK)
         return status;
     return s->goal.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->goal, &node->bound, error)
@@ -360,6 +371,7 @@ typedef struct ranked {
     uint64_t node;
 } ranked;
 
+/* Puts greater upper bounds first. */
 static int compare_upper_bounds(const void *a, const void *b)
 {
     const ranked *x = a, *y = b;
@@ -368,6 +380,7 @@ static int compare_upper_bounds(const void *a, const void *b)
     return (x->node > y->node) - (x->node < y->node);
 }
 
+/* Sets s->order: nodes with greater upper bounds first. */
 static ebpo_status sort_nodes(survey *s)
 {
     ranked *list = ebpo_alloc(s->count, sizeof *list);
@@ -383,9 +396,9 @@ static ebpo_status sort_nodes(survey *s)
     return EBPO_OK;
 }
 
-/* Raises the lower bound in *out to the bounds of the nodes with indices first .. last - 1 in
- * s->order. */
-static void gather_survey(const survey *s, uint64_t first, uint64_t last, ebpo_error_bound *out)
+/* Raises the lower bound in *out to the largest lower bound of the nodes s->order[first] to
+ * s->order[last - 1]. */
+static void raise_lower_bound(const survey *s, uint64_t first, uint64_t last, ebpo_error_bound *out)
 {
     for (uint64_t i = first; i < last; i++) {
         const ebpo_envelope_bound *b = &s->nodes[s->order[i]].bound;
@@ -428,7 +441,7 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
         for (uint64_t i = 0; i < size; i++)
             after += s->nodes[s->order[done + i]].bound.queries;
         queries_done += after - before;
-        gather_survey(s, done, done + size, out);
+        raise_lower_bound(s, done, done + size, out);
         done += size;
         block = block < BLOCK_MAX ? 2 * block : block;
         if (status == EBPO_OK &&
@@ -438,7 +451,8 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
     return status;
 }
 
-/* Applies the guaranteed bound of a coarser level to all nodes. */
+/* Lowers the upper bounds of all nodes to `at_most`, an upper bound of a coarser level (0: none).
+ */
 static void bound_by_coarser(survey *s, double at_most)
 {
     for (uint64_t i = 0; i < s->count && at_most > 0; i++) {
@@ -459,20 +473,21 @@ static bool has_used_up_queries(const survey *s, const ebpo_error_bound_options 
     return queries_used_up;
 }
 
+/* Bounds the error of level s->level. */
 static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
 {
-    ebpo_level_nodes tree = ebpo_lod_model_nodes(s->tree);
+    ebpo_level_nodes tree = ebpo_lod_model_nodes(s->level_tree);
     ebpo_node root = ebpo_level_root(&tree);
     free(s->order);
     s->order = NULL;
     s->count = 0;
-    s->first = 0; /* the search in a finer level may have set it */
+    s->first = 0; /* not 0 after the search in a finer level */
     ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
     for (uint64_t i = 0; i < s->count && status == EBPO_OK; i++)
         s->order[i] = i;
-    s->goal = (ebpo_bound_goal){ 0, INFINITY, 0, 1 };
+    s->goal = (ebpo_bound_goal){ .too_much = INFINITY, .queries = 1 };
     if (status == EBPO_OK)
         status = ebpo_parallel_for(s->threads, NULL, s->count, 16, bound_some, s, s->progress,
                                    "measuring envelopes", s->error);
@@ -481,7 +496,7 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
         status = sort_nodes(s);
     if (status != EBPO_OK)
         return status;
-    gather_survey(s, 0, s->count, out);
+    raise_lower_bound(s, 0, s->count, out);
     status = search_nodes(s, o, out);
     for (uint64_t i = 0; i < s->count; i++)
         out->hi = fmax(out->hi, s->nodes[i].bound.hi);
@@ -490,9 +505,9 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
     return status;
 }
 
-/* Improves the upper bound by the bounds of coarser levels. Each envelope is within its parent's
- * envelope, so no level has a larger error than a coarser level. The search in a coarser level cuts
- * other fragments and may give a lower upper bound. */
+/* If the queries were used up, improves the upper bound by the bounds of coarser levels. Each
+ * envelope is within its parent's envelope, so no level has a larger error than a coarser level.
+ * The search in a coarser level cuts envelopes in another way and may give a lower upper bound. */
 static ebpo_status use_coarser_levels(survey *s, const ebpo_error_bound_options *o,
                                       ebpo_error_bound *out)
 {
@@ -516,13 +531,13 @@ static ebpo_status make_bounders(survey *s, ebpo_model *model)
     if (!(s->bounders = ebpo_alloc_zero(s->threads, sizeof *s->bounders)))
         return ebpo_fail_memory(s->error, s->threads * sizeof *s->bounders);
     for (unsigned i = 0; i < s->threads && status == EBPO_OK; i++)
-        status = ebpo_bounder_make(&s->bounders[i], s->whole, model, s->error);
+        status = ebpo_bounder_make(&s->bounders[i], s->model_tree, model, s->error);
     return status;
 }
 
-/* Compares the file with the model's file. If the file cannot be a subset, returns the properties
- * that differ, else NULL. Digests alone cannot decide this: a subset of a subset names only the
- * first file, and a subset with all nodes names none. */
+/* Returns NULL if the file may be the model's file or a subset of it. Otherwise returns the name of
+ * the properties that differ. Digests alone cannot decide: a subset of a subset names the original
+ * file only, and a subset with all nodes names no file. */
 static const char *find_difference(const ebpo_info *info, const ebpo_info *model)
 {
     if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 ||
@@ -554,13 +569,15 @@ static ebpo_status check_error_bound(const ebpo_info *info, const ebpo_info *mod
                          info->level_count - 1);
     if (!(o->tolerance > 0) || !(o->tolerance <= 1e6))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
+                         "tolerance %g: give a number above 0 and at most 1e6, such as 0.05",
+                         o->tolerance);
     if (!(o->at_most >= 0))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "at_most %g: give an upper bound from a coarser level, or 0", o->at_most);
     if (o->samples > UINT32_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "more than 4294967295 samples; a million give the mean to three digits");
+                         "more than 4294967295 samples; use fewer: a million samples give the mean "
+                         "to three digits");
     const char *differ = find_difference(info, model);
     if (differ)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -585,20 +602,20 @@ ebpo_status ebpo_level_error_bound(ebpo_model *model, const ebpo_file *file, int
     if (status != EBPO_OK)
         return status;
     found.mean = found.rms = NAN;
-    ebpo_lod_model whole = { 0 }, own = { 0 };
+    ebpo_lod_model whole_tree = { 0 }, file_tree = { 0 };
     survey s = { .level = level,
                  .threads = ebpo_thread_count(o->threads),
                  .progress = &o->progress,
                  .error = error,
-                 .whole = &whole,
-                 .tree = &whole };
+                 .model_tree = &whole_tree,
+                 .level_tree = &whole_tree };
     status = check_error_bound(ebpo_file_info(file), model->info, level, o, error);
     if (status == EBPO_OK)
-        status = ebpo_tree_read_whole(&whole, model->file, s.threads, error);
+        status = ebpo_tree_read_whole(&whole_tree, model->file, s.threads, error);
     if (status == EBPO_OK && file != model->file) {
         read.threads = s.threads;
-        status = ebpo_lod_model_read(&own, file, level, &read, error);
-        s.tree = &own;
+        status = ebpo_lod_model_read(&file_tree, file, level, &read, error);
+        s.level_tree = &file_tree;
     }
     if (status == EBPO_OK)
         status = make_bounders(&s, model);
@@ -614,7 +631,7 @@ ebpo_status ebpo_level_error_bound(ebpo_model *model, const ebpo_file *file, int
     if (status == EBPO_OK && o->samples)
         status = error_bound_sample(model, file, level, o, &found, error);
     EBPO_GIVE(ebpo_error_bound, out, &found);
-    ebpo_lod_model_free(&own);
-    ebpo_lod_model_free(&whole);
+    ebpo_lod_model_free(&file_tree);
+    ebpo_lod_model_free(&whole_tree);
     return status;
 }

@@ -1,9 +1,9 @@
-/* Computes the "limit" of a level: the least volume that its convex envelopes can have, which is
- * the sum of the volumes of the convex hulls of the solid in each cell of the level. The extreme
- * points of a hull are among the corners of the mesh faces that are clipped to the cell, and the
- * corners of the cell that are inside the solid. qhull computes the volumes; a build without qhull
- * reports EBPO_E_ABSENT. Volumes are stored for each node and added in the order of the nodes, so
- * that the number of threads does not change the sum. */
+/* Computes the "limit" of a level: the least volume that its convex envelopes can have. The limit
+ * is the sum, over the cells of the level, of the volume of the convex hull of the solid in the
+ * cell. The extreme points of a hull are corners of the mesh's faces after clipping to the cell, or
+ * corners of the cell that are inside the solid. qhull computes the volumes; in a build without
+ * qhull, ebpo_limit_level returns EBPO_E_ABSENT. Volumes are stored for each node and added in the
+ * order of the nodes, so that the number of threads does not change the sum. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -37,7 +37,7 @@
 
 /* State of qhull, one for each thread. */
 typedef struct hull {
-    FILE *null_file; /* receives qhull's long explanations of flat sets */
+    FILE *null_file; /* receives qhull's messages, which are long for flat sets */
     qhT qhull;
 } hull;
 
@@ -51,7 +51,7 @@ static ebpo_status hull_new(hull **out, ebpo_error *error)
         return EBPO_OK;
     free(h);
     *out = NULL;
-    return ebpo_fail(error, EBPO_E_IO, "/dev/null cannot be opened for qhull's messages");
+    return ebpo_fail(error, EBPO_E_IO, "/dev/null could not be opened for qhull's messages");
 }
 
 static void hull_free(hull *h)
@@ -85,7 +85,7 @@ static double volume_by(hull *h, double *points, int count, char *command, bool 
     return volume > 0 ? volume : 0;
 }
 
-/* Returns the volume of the hull of points [count][3], whose coordinates are of the order of 1.
+/* Returns the volume of the convex hull of points[count][3], whose coordinates are from 0 to 1.
  * Returns 0 when all points are in a plane, up to rounding. */
 static double hull_volume(hull *h, double *points, uint64_t count)
 {
@@ -94,8 +94,9 @@ static double hull_volume(hull *h, double *points, uint64_t count)
     if (count < 4 || count > INT_MAX / 3)
         return 0;
     double volume = volume_by(h, points, (int)count, merged, &failed);
-    /* qhull fails for a thin hull if it merges all facets of the hull. With option QJ, qhull moves
-     * the points by about 1e-11. Then a thin hull has a volume, and a flat hull has almost none. */
+    /* qhull fails for some thin hulls, because it merges all their facets. With option QJ, qhull
+     * merges no facets, and moves the points by about 1e-11 instead. Then it returns the volume of
+     * a thin hull, and almost 0 for a flat hull. */
     return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
 }
 
@@ -121,22 +122,21 @@ static double hull_volume(hull *h, double *points, uint64_t count)
 
 #endif
 
-/* Memory for the computation of one node's hull, one for each thread. */
+/* Memory of one thread, for the computation of one node's hull. */
 typedef struct scratch {
     hull *hull;
-    uint32_t *list; /* indices of the node's faces */
-    ebpo_triangle *faces;
-    double *points;
+    uint32_t *list;       /* [list_count] indices of the node's faces */
+    ebpo_triangle *faces; /* [list_count] */
+    double *points;       /* [point_count][3] points of the hull, in cell coordinates */
     uint64_t list_count, list_capacity, faces_capacity, point_count, points_capacity;
-    ebpo_limit sum;
 } scratch;
 
 typedef struct job {
     ebpo_lod_model model;
-    ebpo_mesh mesh;
+    ebpo_mesh mesh; /* all faces of the file */
     int level;
-    ebpo_level_nodes tree;
-    ebpo_node *nodes; /* nodes to compute hulls for */
+    ebpo_level_nodes tree; /* `model` as cursors read it */
+    ebpo_node *nodes;      /* [node_count] nodes whose hulls are computed */
     uint64_t node_count, node_capacity;
     double *volume; /* [node_count] volume of the hull, as a fraction of the volume of the node's
                        cell */
@@ -152,8 +152,8 @@ static double cell_volume(const job *j, int level)
 
 /* --- the nodes --- */
 
-/* Lists the gray nodes of the level and the leaves above it, and adds the volumes of black nodes.
- */
+/* Lists the gray nodes of the level, and the leaves of the level and above it. Adds the volumes of
+ * black nodes to j->black. Returns false when out of memory. */
 static bool list_nodes(job *j, const ebpo_node *node)
 {
     if (node->type == EBPO_BLACK)
@@ -176,21 +176,24 @@ static bool list_nodes(job *j, const ebpo_node *node)
 
 /* --- a node's faces --- */
 
-static bool list_leaf_faces(const job *j, scratch *s, int number, uint64_t leaf)
+/* Appends the faces of a leaf of level `depth` to s->list. Returns false when out of memory. */
+static bool list_leaf_faces(const job *j, scratch *s, int depth, uint64_t leaf)
 {
-    const ebpo_level *level = &j->model.level[number];
-    uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
-    if (!ebpo_grow(&s->list, &s->list_capacity, s->list_count + refs + fresh, sizeof *s->list))
+    const ebpo_level *level = &j->model.level[depth];
+    uint64_t refs = level->leaf_ref_count[leaf], new_count = level->leaf_new[leaf];
+    if (!ebpo_grow(&s->list, &s->list_capacity, s->list_count + refs + new_count, sizeof *s->list))
         return false;
     if (refs)
-        memcpy(s->list + s->list_count, level->leaf_refs + j->model.ranks[number].ref_first[leaf],
+        memcpy(s->list + s->list_count, level->leaf_refs + j->model.ranks[depth].ref_first[leaf],
                refs * sizeof *s->list);
-    for (uint64_t i = 0; i < fresh; i++)
+    for (uint64_t i = 0; i < new_count; i++)
         s->list[s->list_count + refs + i] = (uint32_t)(level->leaf_first[leaf] + i);
-    s->list_count += refs + fresh;
+    s->list_count += refs + new_count;
     return true;
 }
 
+/* Appends the faces of all leaves at or below a node to s->list; a face may be listed repeatedly.
+ * Returns false when out of memory. */
 static bool list_node_faces(const job *j, scratch *s, const ebpo_node *node)
 {
     bool complete = true;
@@ -209,7 +212,7 @@ static int compare_faces(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sorts the listed faces, removes repeated ones, and copies their coordinates. */
+/* Sorts the listed faces, removes repetitions, and copies the coordinates to s->faces. */
 static bool load_listed_faces(const job *j, scratch *s)
 {
     const ebpo_mesh *m = &j->mesh;
@@ -233,8 +236,8 @@ static bool load_listed_faces(const job *j, scratch *s)
 
 /* --- a node's points --- */
 
-/* Returns the winding number at a node's lowest corner. For a gray node, this is the winding number
- * of the descendant in that corner. */
+/* Returns the winding number at a node's lowest corner. A gray node has none in the file, so it is
+ * taken from the white, black or leaf node below it at this corner. */
 static int32_t lowest_winding(const job *j, ebpo_node node)
 {
     while (node.type == EBPO_GRAY)
@@ -242,7 +245,7 @@ static int32_t lowest_winding(const job *j, ebpo_node node)
     return ebpo_level_winding(&j->tree, &node);
 }
 
-/* Adds the corners of the cell that are inside the solid. */
+/* Adds the corners of the node's cell that are inside the solid to s->points. */
 static bool add_corners(const job *j, scratch *s, const ebpo_node *node)
 {
     const ebpo_lod_model *m = &j->model;
@@ -260,7 +263,7 @@ static bool add_corners(const job *j, scratch *s, const ebpo_node *node)
     return true;
 }
 
-/* Adds the corners of the listed faces after each face is clipped to the cell. */
+/* Adds the corners of the listed faces, after each face is clipped to the cell, to s->points. */
 static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
 {
     if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 9 * s->list_count,
@@ -301,8 +304,10 @@ static ebpo_status check_level(const ebpo_file *file, int level, ebpo_error *err
                          "there is no level %d; this file has levels 0 to %d", level,
                          info->level_count - 1);
     if (!(info->parts & EBPO_PART_MESH) || info->pruned)
-        return ebpo_fail(error, EBPO_E_ABSENT, "hulls need the whole mesh, and this file has %s",
-                         info->pruned ? "a part of it" : "none");
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "convex hulls need the whole mesh, but this file %s; use the original "
+                         "file with its mesh",
+                         info->pruned ? "is a subset" : "has no mesh");
     return EBPO_OK;
 }
 
@@ -366,7 +371,7 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
         status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j,
                                    &requested.progress, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
-        /* avoids 0 times infinity */
+        /* The volume of a cell may be infinite, and 0 times infinity is NAN. */
         double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;
         found.volume += volume;
         found.gray_volume += j.nodes[i].type == EBPO_GRAY ? volume : 0;

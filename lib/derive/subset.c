@@ -1,14 +1,14 @@
-/* Makes subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that
- * are close enough to the model. This file
- * - counts the bytes of its file that a subset needs, from headers and tables alone;
+/* Makes subsets. A subset is a smaller file that contains only some levels or parts, or a box, or
+ * only nodes down to those whose envelopes are within max_error of the model. This source file
+ * - counts the bytes of a file that a subset needs, from headers and tables alone;
  * - resolves the options and makes the subset's tree, with subset_levels.c and subset_faces.c;
- * - searches for the smallest max_error whose file fits a target size;
+ * - searches for the smallest max_error whose subset fits a target size;
  * - publishes the result.
  *
- * The size of the file falls as max_error grows. Coarse files are tried first, because they are
- * small and quick to make. All trials share the results of the searches for bounds of envelopes.
- * Trials are written beside the output. The finest trial that fits is published itself, so its size
- * is the size that was measured. */
+ * A larger max_error gives a smaller file. For a target size, coarse subsets are tried first,
+ * because they are small and quick to make. All trials share the results of the searches for bounds
+ * of envelopes (error_bound.h). Trials are written beside the output. The finest trial that fits is
+ * itself published, so its size is the size that was measured. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -33,6 +33,8 @@
 #include "geometry/cells.h"
 #include "io/publish.h"
 
+/* --- counting the bytes that a subset needs --- */
+
 enum { COUNTING_BUDGET = 16 << 20 }; /* memory of each cache of chunks, in bytes */
 
 typedef struct counting {
@@ -43,8 +45,8 @@ typedef struct counting {
     /* a cache without chunks of the subtrees, so that all of their chunks are counted */
     ebpo_chunks *subtree_chunks;
     ebpo_hints hints; /* collects the chunks that are needed, and counts their bytes */
-    uint32_t needs;
-    int last_level;
+    uint32_t needs;   /* the data that the subset needs (EBPO_NEEDS_...) */
+    int last_level;   /* deepest level that is counted */
     ebpo_subset_reads *out;
     ebpo_error *error;
 } counting;
@@ -56,7 +58,8 @@ static void count_subtree(counting *c, uint64_t index)
                        c->needs & EBPO_NEEDS_MESH);
 }
 
-/* Counts the subtrees at or below a gray node whose root's cell intersects the box. */
+/* Counts the subtrees at or below a gray node. A subtree counts if its root's cell intersects the
+ * box. */
 static ebpo_status descend_to_subtrees(counting *c, const ebpo_node *gray)
 {
     const ebpo_subset_options *o = c->options;
@@ -121,10 +124,11 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     if (c.last_level < 0 || c.last_level > deepest || c.needs & EBPO_NEEDS_MESH)
         c.last_level = deepest;
     c.hints.counts_bytes = true;
+    /* true: only some subtrees are read */
     bool divided = options->boxed && info->subtree_level && c.last_level > info->subtree_level;
-    out->of_subtrees = info->subtree_level ? info->level[info->subtree_level].gray_count : 0;
+    out->total_subtrees = info->subtree_level ? info->level[info->subtree_level].gray_count : 0;
     if (!divided && c.last_level > info->subtree_level)
-        out->subtrees = out->of_subtrees;
+        out->subtrees = out->total_subtrees;
     count_levels(&c, divided ? info->subtree_level : c.last_level);
     if (divided)
         status = count_subtrees(&c);
@@ -133,6 +137,8 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     out->bytes = ebpo_hints_bytes(&c.hints);
     return status;
 }
+
+/* --- the tree of a subset --- */
 
 enum { CHUNK_BUDGET = 64 << 20 }; /* memory of the cache of chunks, in bytes */
 
@@ -161,8 +167,8 @@ static ebpo_status resolve_box(ebpo_cutting *c)
     for (int k = 0; k < 3; k++) {
         if (!isfinite(o->min[k]) || !isfinite(o->max[k]) || !(o->min[k] <= o->max[k]))
             return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
-                                  "a box must have finite corners, the lower one first on each "
-                                  "axis");
+                                  "a box must have finite corners, and the first corner must not "
+                                  "be above the second one on any axis");
         if (ebpo_cell_face(&c->box, k, 0, 0) > o->max[k] ||
             ebpo_cell_face(&c->box, k, 0, 1) < o->min[k])
             return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
@@ -176,8 +182,8 @@ static ebpo_status resolve_box(ebpo_cutting *c)
             (c->from->kept_box[k] > o->max[k] || c->from->kept_box[3 + k] < o->min[k]))
             return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
                                   "the box does not intersect the box of this subset, %.17g "
-                                  "%.17g %.17g to %.17g %.17g %.17g; take the subset of the "
-                                  "original",
+                                  "%.17g %.17g to %.17g %.17g %.17g; make the subset from the "
+                                  "original file",
                                   c->from->kept_box[0], c->from->kept_box[1], c->from->kept_box[2],
                                   c->from->kept_box[3], c->from->kept_box[4], c->from->kept_box[5]);
     }
@@ -202,7 +208,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
                               deepest);
     if (!(o->max_error >= 0) || !isfinite(o->max_error))
         return ebpo_fail(c->error, EBPO_E_ARGUMENT,
-                         "maximum error %g: give a length above 0, or 0 to keep everything",
+                         "maximum error %g: give a length above 0, or 0 for no maximum error",
                          o->max_error);
     c->last_level = o->last_level < 0 || o->last_level > deepest ? deepest : o->last_level;
     c->parts = c->from->parts & o->parts;
@@ -219,8 +225,8 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     return resolve_box(c);
 }
 
-/* Sends prefetch hints for whole arrays, which are read if there is no box. A remote source then
- * fetches the arrays in few requests. */
+/* Sends prefetch hints for whole arrays. They are read completely if there is neither a box nor a
+ * max_error. A remote source then fetches them in few requests. */
 static void hint_cut(const ebpo_cutting *c)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -246,8 +252,9 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-/* Lists the patches that are kept: those of the kept levels, and with a box only the root's and
- * those below nodes whose cells intersect the box. Returns their number. */
+/* Lists the patches (of the simplified surface) that are kept: the patches of nodes in the kept
+ * levels. With a box, a patch other than the root's is kept only if the cell of its node's parent
+ * intersects the box. Returns their number. `kept`: [table->count] false on entry. */
 static uint64_t list_patches(const ebpo_cutting *c, const ebpo_patch_table *table, bool *kept,
                              uint64_t *list)
 {
@@ -268,8 +275,8 @@ static uint64_t list_patches(const ebpo_cutting *c, const ebpo_patch_table *tabl
     return count;
 }
 
-/* Reads the patches that are kept. With a maximum error, a node loses faces, so the part is
- * omitted. */
+/* Reads the patches that are kept. With a maximum error, leaves are removed with their faces, so
+ * the part `surface` is omitted. */
 static ebpo_status cut_surface(ebpo_cutting *c)
 {
     ebpo_surface *surface = &c->out->surface;
@@ -297,8 +304,8 @@ static ebpo_status cut_surface(ebpo_cutting *c)
     return status;
 }
 
-/* Makes the tree of the subset. `tolerance` decides which envelopes of the file, with the kept
- * planes, are close enough; it may be NULL. */
+/* Makes the tree of the subset. `tolerance` decides which envelopes are close enough to the model;
+ * it may be NULL if there is no max_error. */
 static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                                       const ebpo_subset_options *options, ebpo_tolerance *tolerance,
                                       ebpo_error *error)
@@ -355,7 +362,7 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
     return status;
 }
 
-/* Returns the options for writing the subset with all parts of its tree. */
+/* Returns the options for writing the tree of a subset with all its parts. */
 static ebpo_write_options subset_write_options(const ebpo_subset_options *options)
 {
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -372,24 +379,24 @@ static ebpo_write_options subset_write_options(const ebpo_subset_options *option
 
 /* The search ends when fitting.fits is at most this multiple of fitting.too_large. */
 static const double size_precision = 1.01;
-/* No max_error below this share of the coarsest max_error is tried. */
+/* No max_error below the coarsest max_error times this factor is tried. */
 static const double least_share = 0x1p-40;
 
 /* The search for the smallest max_error whose file fits the target size. */
 typedef struct fitting {
     const ebpo_file *file;
     ebpo_subset_options *options;
-    ebpo_publish trial, best; /* best: the finest trial that fits so far */
+    ebpo_publish trial, best; /* files: of the current trial, of the finest trial that fits */
     ebpo_tolerance *tolerance;
-    double fits;                     /* least max_error with a file that fits */
-    double too_large;                /* largest max_error with a file that is too large; 0: none */
-    uint64_t fit_bytes, large_bytes; /* sizes of these two files */
+    double fits;                     /* least max_error so far whose file fits */
+    double too_large;                /* largest max_error so far whose file is too large; 0: none */
+    uint64_t fit_bytes, large_bytes; /* sizes of the files for `fits` and `too_large` */
     ebpo_error *error;
 } fitting;
 
-/* Writes a trial file for a max_error and returns its size in *bytes. A trial that fits becomes the
- * best trial, because it is finer than the trials that fitted before. Sets *pruned to true if the
- * file has pruned nodes. */
+/* Writes a trial file for a max_error and returns its size in *bytes. A trial that fits becomes
+ * f->best, because it is finer than all earlier trials that fit. Sets *pruned to true if the file
+ * has pruned nodes. */
 static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool *pruned)
 {
     ebpo_tree tree;
@@ -417,9 +424,9 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
     return EBPO_OK;
 }
 
-/* Tries files from the coarsest on, with half the max_error each time. Ends when a file is too
- * large, or has no pruned nodes (*pruned is false). f->too_large stays 0 if no file is too large.
- */
+/* Tries subsets, beginning with the coarsest one, with half the max_error each time. Ends when a
+ * file is too large, or has no pruned nodes (then *pruned is false). f->too_large stays 0 if no
+ * file is too large. */
 static ebpo_status bracket_size(fitting *f, bool *pruned)
 {
     uint64_t bytes = 0;
@@ -430,8 +437,9 @@ static ebpo_status bracket_size(fitting *f, bool *pruned)
         status = try_error(f, coarsest, &bytes, pruned);
     if (status == EBPO_OK && bytes > f->options->target_bytes)
         return ebpo_fail_file(f->error, EBPO_E_ARGUMENT, f->file->in.shown,
-                              "no subset with these parts has at most %" PRIu64
-                              " bytes; the smallest has %" PRIu64,
+                              "no subset with these parts fits in %" PRIu64
+                              " bytes; the smallest one has %" PRIu64
+                              " bytes; give a larger size or fewer parts",
                               f->options->target_bytes, bytes);
     f->fits = coarsest;
     f->fit_bytes = bytes;
@@ -446,11 +454,11 @@ static ebpo_status bracket_size(fitting *f, bool *pruned)
     return status;
 }
 
-/* Returns the max_error to try next, between too_large and fits. These two differ by at most a
- * factor of 2, and the size changes almost linearly between them. The result is halfway between the
- * linear interpolation and the middle, so that both ends move within a few trials. Functions of
- * libm are not used, because their results differ between systems and max_error is stored in the
- * file. */
+/* Returns the max_error to try next, between f->too_large and f->fits. These two differ by at most
+ * a factor of 2, and the size changes almost linearly between them. The result is halfway between
+ * the linear interpolation and the middle, so that both ends of the interval move within a few
+ * trials. Functions of libm are not used, because their results differ between systems, and
+ * max_error is stored in the file. */
 static double next_guess(const fitting *f)
 {
     double share = .5;
@@ -466,17 +474,19 @@ static ebpo_status find_error(fitting *f)
 {
     uint64_t bytes = 0;
     bool pruned = false;
-    /* The whole file is tried first only if the target is at least a quarter of the source's size,
-     * because otherwise it hardly fits. */
+    /* The subset with all nodes (max_error 0) is tried first, but only if the target is at least a
+     * quarter of the file's size; it would hardly fit a smaller target. With choose_parts, the
+     * caller has already tried it. */
     bool may_fit =
              !f->options->choose_parts && f->options->target_bytes >= f->file->info.file_bytes / 4,
-         tried = f->options->choose_parts || may_fit;
+         tried_all = f->options->choose_parts || may_fit;
     ebpo_status status = may_fit ? try_error(f, 0, &bytes, &pruned) : EBPO_OK;
     if (status != EBPO_OK || (may_fit && bytes <= f->options->target_bytes))
         return status;
     status = bracket_size(f, &pruned);
-    /* Envelopes that coincide with the solid are pruned for any max_error. */
-    if (status == EBPO_OK && f->too_large == 0 && pruned && !tried)
+    /* All trials fit, but still have pruned nodes: envelopes that coincide with the solid are
+     * pruned for any max_error above 0. */
+    if (status == EBPO_OK && f->too_large == 0 && pruned && !tried_all)
         return try_error(f, 0, &bytes, &pruned);
     while (status == EBPO_OK && f->too_large > 0 && f->fits > size_precision * f->too_large) {
         double e = next_guess(f);
@@ -490,8 +500,8 @@ static ebpo_status find_error(fitting *f)
     return status;
 }
 
-/* Tries the profiles without pruning (max_error 0), from the largest profile on. Sets *found if a
- * profile fits. */
+/* Tries the profiles (sets of parts) with all nodes (max_error 0), beginning with the largest
+ * profile. Sets *found if a profile fits. */
 static ebpo_status choose_parts(fitting *f, bool *found)
 {
     static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,
@@ -508,8 +518,8 @@ static ebpo_status choose_parts(fitting *f, bool *found)
     return status;
 }
 
-/* Makes the subset for options->target_bytes, and publishes it as `path`. Changes max_error and
- * parts of the options. */
+/* Makes the subset for options->target_bytes, and publishes it as `path`. Changes
+ * options->max_error and options->parts. */
 static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subset_options *options,
                               ebpo_error *error)
 {
@@ -521,7 +531,8 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
     bool done = false;
     if (options->max_error != 0)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
-                              "a maximum error and a target size cannot be combined");
+                              "a maximum error and a target size cannot be combined; give one of "
+                              "them");
     ebpo_status status = ebpo_publish_begin(&f.trial, path, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&f.best, path, error);
@@ -546,9 +557,9 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
 
 uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
 {
-    /* Measured memory in bytes: per face for the mesh and its bounds (OF_MESH); per face for
-     * leaves, which take more when they are smaller (OF_LEAVES / leaf_faces, at most
-     * OF_LEAVES_MAX); and for everything else (ALWAYS). */
+    /* Measured memory in bytes: for each face, OF_MESH for the mesh and its bounds, and OF_LEAVES /
+     * leaf_faces (at most OF_LEAVES_MAX) for the leaves, which are more if they are smaller; and
+     * ALWAYS for everything else. */
     enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MAX = 430, ALWAYS = 16 << 20 };
     double leaves = OF_LEAVES / (double)leaf_faces;
     return (uint64_t)((double)face_count *
@@ -589,20 +600,20 @@ ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
 {
     EBPO_DEFAULT_FP;
     ebpo_subset_options wanted = EBPO_SUBSET_OPTIONS_INIT;
-    ebpo_publish whole = EBPO_PUBLISH_INIT;
+    ebpo_publish original = EBPO_PUBLISH_INIT;
     ebpo_file *file = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
     ebpo_write_options write = subset_write_options(&wanted);
     if (status == EBPO_OK)
-        status = ebpo_publish_begin(&whole, path, error);
+        status = ebpo_publish_begin(&original, path, error);
     if (status == EBPO_OK)
-        status = ebpo_tree_write_into(tree, ebpo_publish_path(&whole), path, &write, error);
+        status = ebpo_tree_write_into(tree, ebpo_publish_path(&original), path, &write, error);
     ebpo_tree_free(tree);
     if (status == EBPO_OK)
-        status = ebpo_open_own(ebpo_publish_path(&whole), &file, error);
+        status = ebpo_open_own(ebpo_publish_path(&original), &file, error);
     if (status == EBPO_OK)
         status = ebpo_subset(file, path, &wanted, error);
     ebpo_close(file);
-    ebpo_publish_abort(&whole);
+    ebpo_publish_abort(&original);
     return status;
 }

@@ -1,9 +1,8 @@
-/* Copies the faces, vertices, maps and attributes of a subset, with new numbers. Faces and vertices
- * are numbered in the order of the specification: by a depth-first walk through the remaining
- * leaves. The arrays that map old numbers to new numbers have an entry for each face or vertex of
- * the original file. For a small subset, these arrays still take little memory: pages that are
- * never written take no memory, and faces that are close in space have close numbers. Source:
- * format-spec/README.md, section 7. */
+/* Copies the faces, vertices, maps and attributes of a subset, with new indices. The order is that
+ * of the specification: by a depth-first walk through the remaining leaves. The arrays that map old
+ * indices to new indices have an entry for each face or vertex of the original file. For a small
+ * subset, these arrays still take little memory: pages that are never written take no memory, and
+ * faces that are close in space have close indices. Source: format-spec/README.md, section 7. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -18,66 +17,66 @@
 
 typedef struct numbering {
     ebpo_cutting *c;
-    uint32_t *number; /* [faces of the original file] new number + 1; 0: none yet */
-    uint32_t *old;    /* [count] old number of each new face */
+    uint32_t *new_plus_one; /* [faces of the original file] new index + 1; 0: none yet */
+    uint32_t *old_index;    /* [count] old index of each new face */
     uint64_t count, capacity;
     /* for each level: index of the next group and of the next leaf; number of references read and
      * written so far */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
         written[EBPO_LEVELS_MAX];
-    bool no_memory;
+    bool no_memory; /* an allocation failed */
 } numbering;
 
-/* Gives a face the next new number; returns false when out of memory. */
+/* Gives a face the next new index; returns false when out of memory. */
 static bool add_new(numbering *n, uint32_t face)
 {
-    n->no_memory = !ebpo_grow(&n->old, &n->capacity, n->count + 1, sizeof *n->old);
+    n->no_memory = !ebpo_grow(&n->old_index, &n->capacity, n->count + 1, sizeof *n->old_index);
     if (n->no_memory)
         return false;
-    n->old[n->count++] = face;
-    n->number[face] = (uint32_t)n->count;
+    n->old_index[n->count++] = face;
+    n->new_plus_one[face] = (uint32_t)n->count;
     return true;
 }
 
-static int compare_numbers(const void *a, const void *b)
+static int compare_indices(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
 }
 
-/* Numbers the faces of a leaf. In a file, the *new* faces of a leaf are the faces that no earlier
- * leaf lists; the other listed faces are its *references*. If the subset contains none of the
- * earlier leaves that list a reference, the reference becomes a new face of this leaf. In the
- * subset, these former references are numbered first. The new faces of the original file follow.
- * Both sets keep the order of their old numbers. The other references stay references and are
- * renumbered in place. */
+/* Gives the faces of a leaf new indices. In a file, the *new* faces of a leaf are the faces that no
+ * earlier leaf lists; the other listed faces are its *references*. If the subset contains none of
+ * the earlier leaves that list a reference, the reference becomes a new face of this leaf. These
+ * former references get the first new indices of the leaf. The leaf's new faces of the original
+ * file get the next ones. Both sets keep the order of their old indices. All other references stay
+ * references; their new indices are written over the old ones. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];
     uint64_t i = n->leaf[level]++, begin = n->count, kept = 0;
     uint32_t *refs = l->leaf_refs + n->read[level], *to = l->leaf_refs + n->written[level];
-    bool is_sorted = true, valid = true;
+    bool is_sorted = true, valid = true; /* is_sorted: the references that were kept ascend */
     for (uint64_t k = 0; k < l->leaf_ref_count[i] && valid; k++) {
         uint32_t face = refs[k];
-        if (n->number[face] && n->number[face] <= begin) {
-            to[kept++] = n->number[face] - 1;
+        if (n->new_plus_one[face] && n->new_plus_one[face] <= begin) {
+            to[kept++] = n->new_plus_one[face] - 1;
             is_sorted = is_sorted && (kept == 1 || to[kept - 2] < to[kept - 1]);
         } else {
-            valid = n->number[face] == 0 && add_new(n, face);
+            valid = n->new_plus_one[face] == 0 && add_new(n, face);
         }
     }
     for (uint64_t k = 0; k < l->leaf_new[i] && valid; k++)
-        valid =
-            n->number[l->leaf_first[i] + k] == 0 && add_new(n, (uint32_t)(l->leaf_first[i] + k));
+        valid = n->new_plus_one[l->leaf_first[i] + k] == 0 &&
+                add_new(n, (uint32_t)(l->leaf_first[i] + k));
     if (n->no_memory)
-        return ebpo_fail_memory(n->c->error, n->count * sizeof *n->old);
+        return ebpo_fail_memory(n->c->error, n->count * sizeof *n->old_index);
     if (!valid)
         return ebpo_fail(n->c->error, EBPO_E_FORMAT,
-                         "level %d: a leaf lists a face twice, or as new although an earlier "
-                         "leaf lists it; run ebpo verify",
+                         "level %d: a leaf lists a face twice, or lists a face as new that an "
+                         "earlier leaf lists; run ebpo verify",
                          level);
     if (!is_sorted)
-        qsort(to, kept, sizeof *to, compare_numbers);
+        qsort(to, kept, sizeof *to, compare_indices);
     n->read[level] += l->leaf_ref_count[i];
     n->written[level] += kept;
     l->leaf_first[i] = begin;
@@ -86,6 +85,7 @@ static ebpo_status number_leaf(numbering *n, int level)
     return EBPO_OK;
 }
 
+/* Gives new indices to the faces of all leaves at or below the next group of this level. */
 static ebpo_status number_group(numbering *n, int level)
 {
     const ebpo_tree *tree = n->c->out;
@@ -104,38 +104,41 @@ static ebpo_status number_group(numbering *n, int level)
 /* --- vertices --- */
 
 typedef struct vertices {
-    uint32_t *number, *old; /* as in `numbering`, for vertices */
+    uint32_t *new_plus_one, *old_index; /* as in `numbering`, but for vertices */
     uint64_t count, capacity;
 } vertices;
 
+/* Gives the vertices new indices, in the order of their first use by a face, and sets the vertices
+ * of the faces to these indices. */
 static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
 {
     ebpo_mesh *mesh = &c->out->mesh;
-    v->number = ebpo_alloc_zero(c->from->vertex_count, sizeof *v->number);
-    bool valid = v->number;
+    v->new_plus_one = ebpo_alloc_zero(c->from->vertex_count, sizeof *v->new_plus_one);
+    bool valid = v->new_plus_one;
     for (uint64_t i = 0; i < 3 * mesh->face_count && valid; i++) {
         uint32_t vertex = mesh->faces[i];
-        if (v->number[vertex] == 0) {
-            valid = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
+        if (v->new_plus_one[vertex] == 0) {
+            valid = ebpo_grow(&v->old_index, &v->capacity, v->count + 1, sizeof *v->old_index);
             if (valid)
-                v->old[v->count++] = vertex;
-            v->number[vertex] = (uint32_t)v->count;
+                v->old_index[v->count++] = vertex;
+            v->new_plus_one[vertex] = (uint32_t)v->count;
         }
-        mesh->faces[i] = v->number[vertex] - 1;
+        mesh->faces[i] = v->new_plus_one[vertex] - 1;
     }
     for (uint64_t i = 0; i < c->from->vertex_count && valid && !c->out->info.pruned;
          i++) /* if nothing was pruned, vertices that no face uses are kept */
-        if (v->number[i] == 0) {
-            valid = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
+        if (v->new_plus_one[i] == 0) {
+            valid = ebpo_grow(&v->old_index, &v->capacity, v->count + 1, sizeof *v->old_index);
             if (valid)
-                v->old[v->count++] = (uint32_t)i;
+                v->old_index[v->count++] = (uint32_t)i;
         }
-    return valid ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
+    return valid ? EBPO_OK
+                 : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->new_plus_one);
 }
 
-/* Reads the attributes that are not copied row by row. In a subset, attributes of elements other
- * than vertices and faces are omitted, because their values may refer to removed elements; textures
- * are kept. If nothing was pruned, all attributes are kept. */
+/* Begins the attributes of the subset. If nothing was pruned, reads all attributes. Otherwise reads
+ * the textures; copy_attributes adds the attributes of the remaining vertices and faces.
+ * Attributes of other elements are omitted, because their values may refer to removed elements. */
 static ebpo_status begin_attributes(ebpo_cutting *c)
 {
     ebpo_read_options read = ebpo_read_threads(c->options->threads);
@@ -147,6 +150,7 @@ static ebpo_status begin_attributes(ebpo_cutting *c)
                              : status;
 }
 
+/* If nodes were pruned, copies these rows of the attributes of an element ("vertex" or "face"). */
 static ebpo_status copy_attributes(ebpo_cutting *c, const char *element, const uint32_t *rows,
                                    uint64_t count)
 {
@@ -161,28 +165,28 @@ static ebpo_status copy_vertices(ebpo_cutting *c)
     ebpo_tree *out = c->out;
     vertices v = { NULL, NULL, 0, 0 };
     ebpo_status status = number_vertices(c, &v);
-    free(v.number);
+    free(v.new_plus_one);
     if (status == EBPO_OK) {
         size_t size = c->from->double_coordinates ? 3 * sizeof(double) : 3 * sizeof(float);
         void *xyz = ebpo_alloc(v.count, size);
-        ebpo_vertices_hint(c->chunks, v.old, v.count, c->parts);
+        ebpo_vertices_hint(c->chunks, v.old_index, v.count, c->parts);
         out->info.vertex_count = out->mesh.vertex_count = v.count;
         out->mesh.xyz32 = c->from->double_coordinates ? NULL : xyz;
         out->mesh.xyz64 = c->from->double_coordinates ? xyz : NULL;
-        status = xyz ? ebpo_pick_rows(c->chunks, EBPO_A_VERTICES, v.old, v.count,
+        status = xyz ? ebpo_pick_rows(c->chunks, EBPO_A_VERTICES, v.old_index, v.count,
                                       c->options->threads, xyz, c->error)
                      : ebpo_fail_memory(c->error, v.count * size);
     }
     if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
         out->vertex_source = ebpo_alloc(v.count, sizeof *out->vertex_source);
         status = out->vertex_source
-                     ? ebpo_pick_rows(c->chunks, EBPO_A_VERTEX_SOURCE, v.old, v.count,
+                     ? ebpo_pick_rows(c->chunks, EBPO_A_VERTEX_SOURCE, v.old_index, v.count,
                                       c->options->threads, out->vertex_source, c->error)
                      : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
     }
     if (status == EBPO_OK)
-        status = copy_attributes(c, "vertex", v.old, v.count);
-    free(v.old);
+        status = copy_attributes(c, "vertex", v.old_index, v.count);
+    free(v.old_index);
     return status;
 }
 
@@ -190,26 +194,27 @@ static ebpo_status copy_faces(ebpo_cutting *c, const numbering *n)
 {
     ebpo_tree *out = c->out;
     out->info.face_count = out->mesh.face_count = n->count;
-    ebpo_faces_hint(c->chunks, n->old, n->count, c->parts);
+    ebpo_faces_hint(c->chunks, n->old_index, n->count, c->parts);
     out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
     ebpo_status status = out->mesh.faces
-                             ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count,
+                             ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old_index, n->count,
                                               c->options->threads, out->mesh.faces, c->error)
                              : ebpo_fail_memory(c->error, n->count * 3 * sizeof *out->mesh.faces);
     if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
         out->face_source = ebpo_alloc(n->count, sizeof *out->face_source);
-        status = out->face_source ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old, n->count,
-                                                   c->options->threads, out->face_source, c->error)
-                                  : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
+        status = out->face_source
+                     ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old_index, n->count,
+                                      c->options->threads, out->face_source, c->error)
+                     : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
     }
     if (status == EBPO_OK && c->parts & EBPO_PART_ATTRIBUTES)
         status = begin_attributes(c);
     if (status == EBPO_OK)
-        status = copy_attributes(c, "face", n->old, n->count);
+        status = copy_attributes(c, "face", n->old_index, n->count);
     return status == EBPO_OK ? copy_vertices(c) : status;
 }
 
-/* Removes the mesh with its maps and attributes. Used if no leaf lists a face. */
+/* Removes the mesh with its maps and attributes, because no leaf of the subset lists a face. */
 static void drop_lists(ebpo_cutting *c)
 {
     c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
@@ -223,11 +228,11 @@ static void drop_lists(ebpo_cutting *c)
 ebpo_status ebpo_cut_faces(ebpo_cutting *c)
 {
     numbering n = { .c = c };
-    n.number = ebpo_alloc_zero(c->from->face_count, sizeof *n.number);
-    ebpo_status status = n.number
-                             ? number_group(&n, 0)
-                             : ebpo_fail_memory(c->error, c->from->face_count * sizeof *n.number);
-    free(n.number);
+    n.new_plus_one = ebpo_alloc_zero(c->from->face_count, sizeof *n.new_plus_one);
+    ebpo_status status =
+        n.new_plus_one ? number_group(&n, 0)
+                       : ebpo_fail_memory(c->error, c->from->face_count * sizeof *n.new_plus_one);
+    free(n.new_plus_one);
     for (int i = 0; i < c->out->info.level_count && status == EBPO_OK; i++) {
         ebpo_level *l = &c->out->level[i];
         l->ref_count = n.written[i];
@@ -241,6 +246,6 @@ ebpo_status ebpo_cut_faces(ebpo_cutting *c)
         drop_lists(c);
     if (c->out->info.pruned)
         ebpo_attributes_drop_others(c->out->mesh.attributes);
-    free(n.old);
+    free(n.old_index);
     return status;
 }

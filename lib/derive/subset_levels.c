@@ -1,10 +1,13 @@
-/* Makes the levels of a subset: the nodes that remain, and their volumes. Levels are made from the
- * root downwards. Each level determines the groups of the next level that are needed, so only these
- * groups are read. Nodes with omitted descendants become pruned nodes. All arrays of ebpo_schema
- * are copied node by node for the remaining nodes. Faces keep the numbers of the source until
- * subset_faces.c renumbers them. With max_error, the envelopes of a level are evaluated together.
- * Volumes are those of envelopes that are cut as in ebpo_lod_level; leaves are cut by stored planes
- * only. */
+/* Makes the levels of a subset: the nodes that remain, and their volumes. The "source" here is the
+ * file from which the subset is made, and the "result" is the subset.
+ *
+ * Levels are made from the root downwards. Each level determines the groups (the eight children of
+ * a gray node) of the next level that are needed, so only these groups are read. A gray node whose
+ * children are omitted becomes a pruned node, and so does a leaf that is omitted. All arrays of a
+ * level (ebpo_schema) are copied node by node for the remaining nodes. Faces keep their indices in
+ * the source until subset_faces.c gives them new ones. With max_error, all envelopes of a level are
+ * tested together (error_bound.h). Volumes are those of envelopes that are cut as in
+ * ebpo_lod_level, but leaves are cut by stored planes only. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -27,23 +30,23 @@
 typedef struct kept_column {
     const uint8_t *from;
     uint8_t *to;
-    uint8_t size;
+    uint8_t size;         /* of a value in bytes */
     int8_t default_value; /* value for nodes that are not in the source */
 } kept_column;
 
-/* The number of items of each node of a type, as u8 or u32. */
+/* For each node of a type, the number of its items (planes or faces), as u8 or u32. */
 typedef struct kept_counts {
-    ebpo_per per;
-    const uint8_t *counts;
-    uint8_t size;
+    ebpo_per per;          /* kind of the items */
+    const uint8_t *counts; /* NULL: all counts are 0 */
+    uint8_t size;          /* of a count in bytes: 1 or 4 */
 } kept_counts;
 
-/* An array with the items of each node; several arrays may share the numbers of items. */
+/* An array with the items of all nodes of a type. Several arrays may have the same counts. */
 typedef struct kept_list {
-    unsigned counts; /* index in `count` of the node type */
+    unsigned counts; /* index of its counts in kept_nodes.of_type[].count */
     const uint8_t *from;
     uint8_t *to;
-    uint8_t size;
+    uint8_t size; /* of an item in bytes */
 } kept_list;
 
 /* The copying of nodes from one level to another. */
@@ -54,12 +57,13 @@ typedef struct kept_nodes {
         kept_column column[EBPO_LEVEL_ARRAYS];
         kept_counts count[EBPO_LEVEL_ARRAYS];
         kept_list list[EBPO_LEVEL_ARRAYS];
-        unsigned columns, counts, lists;
+        unsigned columns, counts, lists; /* lengths of the three arrays */
     } of_type[4];
-    uint64_t next[4];           /* for each type: the next node of `from` */
+    uint64_t next[4];           /* for each type: rank in `from` of the next node to copy or omit */
     uint64_t read[EBPO_COUNTS]; /* for each kind of counts: the first item of the next node */
 } kept_nodes;
 
+/* Returns the kind of arrays with one value for each node of a type. */
 static ebpo_per per_of(ebpo_node_type type)
 {
     static const ebpo_per per[] = { [EBPO_WHITE] = EBPO_PER_WHITE,
@@ -69,6 +73,7 @@ static ebpo_per per_of(ebpo_node_type type)
     return per[type];
 }
 
+/* Returns the number of values for which an array of `to` needs space; see kept_begin. */
 static uint64_t capacity_of(const ebpo_level *from, ebpo_per per, const uint64_t more[4])
 {
     int type = ebpo_schema_node_type(per);
@@ -85,7 +90,8 @@ static void record_column(kept_nodes *kept, int id, int type)
                        .default_value = ebpo_schema[id].default_value };
 }
 
-/* Returns the index of a list's counts in `count`, and adds the counts at their first use. */
+/* Returns the index in kept->of_type[].count of a list's counts; adds the counts if they are new.
+ */
 static unsigned record_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
@@ -110,8 +116,9 @@ static void record_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
                      .size = ebpo_schema[id].held_size };
 }
 
-/* Makes the arrays of `to` for any of `needs`, with space for all of `from` and for `more` nodes of
- * each type. New gray nodes were leaves, so there is also space for the planes of leaves. Returns
+/* Begins to copy nodes. Makes the arrays of `to` that are needed for any of `needs`
+ * (EBPO_NEEDS_...), with space for all nodes of `from` and for `more` nodes of each type. Leaves
+ * may become gray nodes, so the arrays of planes also have space for the planes of leaves. Returns
  * false when out of memory. */
 static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
                        const uint64_t more[4])
@@ -164,7 +171,7 @@ static uint64_t kept_items(const kept_counts *c, uint64_t rank)
     return count;
 }
 
-/* Adds a node to the level's count; returns the index of the node among those of its type. */
+/* Adds a node to the level's count; returns the node's rank. */
 static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 {
     uint64_t index = ebpo_level_count(level, per_of(type));
@@ -172,7 +179,7 @@ static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
     return index;
 }
 
-/* Appends the items of a remaining node. */
+/* Appends the `count` items that the next node of `from` has in this list. */
 static void copy_items(const kept_nodes *kept, const kept_list *list, const kept_counts *c,
                        uint64_t count)
 {
@@ -181,7 +188,7 @@ static void copy_items(const kept_nodes *kept, const kept_list *list, const kept
            count * list->size);
 }
 
-/* Omits the next node of a type. */
+/* Omits the next node of a type in `from`. */
 static void kept_skip(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t rank = kept->next[type]++;
@@ -191,7 +198,7 @@ static void kept_skip(kept_nodes *kept, ebpo_node_type type)
     }
 }
 
-/* Keeps the next node of a type. */
+/* Copies the next node of a type in `from`. */
 static void kept_take(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t index = grow_level(kept->to, type), rank = kept->next[type];
@@ -212,7 +219,7 @@ static void kept_take(kept_nodes *kept, ebpo_node_type type)
     kept_skip(kept, type);
 }
 
-/* Adds a node that is not in `from`, with default values and empty lists. */
+/* Appends a node that is not in `from`, with default values and empty lists. */
 static void kept_add(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t index = grow_level(kept->to, type);
@@ -235,11 +242,11 @@ typedef struct gray {
 typedef struct descent {
     ebpo_cutting *c;
     int level;
-    ebpo_level from, *to;
+    ebpo_level from, *to; /* the needed groups of the source's level; the level of the result */
     kept_nodes kept;      /* copies nodes from `from` to `to` */
     gray *parent, *child; /* gray nodes of the result: of the level above, and of this level */
     ebpo_tolerance_node *tolerance_nodes; /* gray nodes and leaves in order; NULL: no max_error */
-    uint64_t next_tolerance_node;
+    uint64_t next_tolerance_node;         /* index in tolerance_nodes */
     uint64_t parent_count, child_count;
     uint64_t group; /* current group of the result, which is the index of its parent in `parent` */
     uint64_t nonempty_groups; /* number of groups of this level of the result that have nodes */
@@ -260,9 +267,8 @@ static bool may_have_children(const ebpo_cutting *c, int level)
 
 /* --- runs of needed groups --- */
 
-/* Sends prefetch hints for a file with subtrees; the parents are the roots of subtrees. The hints
- * cover all nodes below the parents, and the leaves' lists of faces, from which the faces are
- * found. */
+/* Sends prefetch hints for subtrees; d->parent has the roots of subtrees. The hints cover all nodes
+ * below the roots, and the leaves' lists of faces. (The lists show which faces to read.) */
 static void hint_subtrees(const descent *d)
 {
     const ebpo_cutting *c = d->c;
@@ -280,8 +286,8 @@ static void hint_subtrees(const descent *d)
     free(roots);
 }
 
-/* Reads the groups of the level that are needed to d->from, and sets the groups of their gray
- * nodes' children. */
+/* Reads the needed groups of the level into d->from, and finds for each of their gray nodes the
+ * group of its children. Needed groups that are neighbours in the source are read as one run. */
 static ebpo_status pick_level(descent *d)
 {
     uint64_t count = 0;
@@ -303,8 +309,6 @@ static ebpo_status pick_level(descent *d)
     ebpo_status status =
         ebpo_pick_level(d->c->chunks, d->level, runs, count,
                         d->c->parts | EBPO_NEEDS_SOLID | EBPO_NEEDS_ALWAYS, &d->from, d->c->error);
-    /* The index of the group of a gray node's children is the gray node's rank in the source. The
-     * runs give these ranks. */
     uint64_t next = 0;
     if (status == EBPO_OK) {
         d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
@@ -312,9 +316,10 @@ static ebpo_status pick_level(descent *d)
             status = ebpo_fail_memory(d->c->error,
                                       (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
     }
-    /* These indices are stored at the end of d->child. The front of the array is filled later, with
-     * gray nodes and with leaves that become pruned nodes. An index is never overwritten before it
-     * is read, because each node takes at most one entry. */
+    /* The index of the group of a gray node's children is the gray node's rank in the source, and
+     * the runs give these ranks. They are stored at the end of d->child. The front of the array is
+     * filled later, with gray nodes and with leaves that become pruned nodes. No stored rank is
+     * overwritten before it is read, because each node takes at most one entry. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
@@ -322,6 +327,7 @@ static ebpo_status pick_level(descent *d)
     return status;
 }
 
+/* Makes the arrays of the level of the result. */
 static ebpo_status reserve_space(descent *d)
 {
     const ebpo_level *f = &d->from;
@@ -345,13 +351,14 @@ static void add_child(descent *d, ebpo_cell cell, uint64_t group)
     d->has_next_level = d->has_next_level || group != NO_GROUP;
 }
 
-/* Returns true if the envelope of the next gray node or leaf is close enough to the model. Must be
- * called once for each of these nodes, in their order. */
+/* Returns true if the envelope of the next gray node or leaf is within max_error of the model. Must
+ * be called once for each gray node and leaf, in their order. */
 static bool is_close_enough(descent *d)
 {
     return d->tolerance_nodes && d->tolerance_nodes[d->next_tolerance_node++].enough;
 }
 
+/* Copies the next gray node. It loses its children if they are not needed. */
 static void copy_gray(descent *d, ebpo_cell cell)
 {
     uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
@@ -362,7 +369,8 @@ static void copy_gray(descent *d, ebpo_cell cell)
     add_child(d, cell, group);
 }
 
-/* Adds the planes of the current leaf to the last gray node of the result. */
+/* Adds the stored planes of the next leaf to the last gray node of the result, which replaces it.
+ */
 static void add_leaf_planes(descent *d)
 {
     const ebpo_level *f = &d->from;
@@ -387,9 +395,9 @@ static void add_colour(descent *d)
             d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
 }
 
-/* Copies a leaf. If the leaf is outside the box, it becomes a pruned node with the leaf's planes.
- * If the parent's envelope, cut to the leaf's cell, is close enough to the model, the leaf becomes
- * a pruned node without planes. Returns the type of the copy. */
+/* Copies the next leaf. If the part of the parent's envelope in the leaf's cell is within max_error
+ * of the model, the leaf becomes a pruned node without planes. Otherwise, if the leaf is outside
+ * the box, it becomes a pruned node with the leaf's planes. Returns the type of the copy. */
 static ebpo_node_type copy_leaf(descent *d, ebpo_cell cell)
 {
     bool close_enough = is_close_enough(d);
@@ -406,6 +414,7 @@ static ebpo_node_type copy_leaf(descent *d, ebpo_cell cell)
     return EBPO_GRAY;
 }
 
+/* Copies the next node of this type; returns the type of the copy. */
 static ebpo_node_type copy_node(descent *d, ebpo_node_type type, ebpo_cell cell)
 {
     if (type == EBPO_LEAF)
@@ -417,25 +426,29 @@ static ebpo_node_type copy_node(descent *d, ebpo_node_type type, ebpo_cell cell)
     return type;
 }
 
-/* Returns the cell of an octant of a group of the result. */
-static ebpo_cell child_cell(const descent *d, uint64_t number, unsigned octant)
+/* Returns the cell of an octant of a group of the result. `group` is also the index of the parent.
+ */
+static ebpo_cell child_cell(const descent *d, uint64_t group, unsigned octant)
 {
-    return d->level ? ebpo_cell_child(d->parent[number].cell, octant)
+    return d->level ? ebpo_cell_child(d->parent[group].cell, octant)
                     : (ebpo_cell){ 0, { 0, 0, 0 } };
 }
 
-static void copy_group(descent *d, uint64_t number, uint16_t types)
+/* Copies the nodes of a group of the result; `types` are their types in the source. */
+static void copy_group(descent *d, uint64_t group, uint16_t types)
 {
-    d->group = number;
+    d->group = group;
     for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
         ebpo_node_type type =
-            copy_node(d, ebpo_group_type(types, octant), child_cell(d, number, octant));
-        d->to->types[number] |= ebpo_group_of(type, octant);
+            copy_node(d, ebpo_group_type(types, octant), child_cell(d, group, octant));
+        d->to->types[group] |= ebpo_group_of(type, octant);
     }
 }
 
 /* --- the decision which envelopes of a level are close enough --- */
 
+/* With max_error, tests the envelopes of the level's gray nodes and leaves, as far as the results
+ * are needed. */
 static ebpo_status judge_level(descent *d)
 {
     uint64_t next = 0, count = 0;
@@ -464,7 +477,7 @@ static ebpo_status judge_level(descent *d)
                                 d->c->options->max_error, d->c->error);
 }
 
-/* Cuts a level; its gray nodes are the parents of the next level. */
+/* Makes a level of the result; its gray nodes become the parents of the next level. */
 static ebpo_status cut_level(descent *d)
 {
     ebpo_status status = pick_level(d);
@@ -476,7 +489,7 @@ static ebpo_status cut_level(descent *d)
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
         if (d->parent[i].group == NO_GROUP)
-            for (int k = 0; k < 8; k++) /* a group without nodes has eight white entries */
+            for (int k = 0; k < 8; k++) /* the group of a pruned node has eight white entries */
                 kept_add(&d->kept, EBPO_WHITE);
         else
             copy_group(d, i, d->from.types[next++]);
@@ -513,7 +526,8 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
         d.has_next_level = false;
         status = cut_level(&d);
         if (status == EBPO_OK && d.level && d.nonempty_groups == 0) {
-            /* This happens in a subset of a subset, if no node of this level is in both subsets. */
+            /* No gray node of the level above has children. This happens in a subset of a subset,
+             * if no node of this level is in both subsets. */
             ebpo_level_free(d.to);
             break;
         }
@@ -527,6 +541,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     free(d.parent);
     if (status != EBPO_OK)
         return status;
+    /* cut: nodes of the source are missing; empty: a gray node has no children in the result */
     bool cut = false, empty = false;
     for (int i = 0; i < info->level_count; i++) {
         empty = empty || c->out->level[i].pruned_count;
@@ -542,14 +557,16 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
 
 /* --- volumes of envelopes --- */
 
-/* The computation of volumes, with the index of the next group, node and plane of each level. */
+/* The computation of volumes. The walk visits nodes in stored order. */
 typedef struct measuring {
     ebpo_cutting *c;
+    /* for each level: index of the next group, gray node and leaf, and of their next planes */
     uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
         plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
 } measuring;
 
-/* Cuts the envelope by the planes of the next node, and moves on to the node after it. */
+/* Cuts the envelope by the planes of the node with rank *node, whose first plane is *plane. Then
+ * increases *node and *plane to the next node and its first plane. */
 static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
                          uint64_t *node, uint64_t *plane)
 {
@@ -560,6 +577,8 @@ static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const u
     ++*node;
 }
 
+/* Adds the volumes of the envelopes in the next group of the level, and below it, to the volumes of
+ * the levels. `parent` is the envelope of the group's parent; NULL: the group is the root's. */
 static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
 {
     ebpo_tree *tree = m->c->out;

@@ -1,4 +1,5 @@
-/* Declares what the files that make subsets share. */
+/* Declares what the files that make subsets share. A subset is a smaller file that is made from
+ * another file: some gray nodes lose their children (pruned nodes), or parts are omitted. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
@@ -13,24 +14,26 @@ typedef struct ebpo_cutting {
     const ebpo_file *file;
     const ebpo_info *from; /* the header of `file` */
     const ebpo_subset_options *options;
-    ebpo_chunks *chunks;
-    ebpo_tolerance
-        *tolerance; /* decides which envelopes are close enough; NULL without max_error */
+    ebpo_chunks *chunks; /* reads rows of `file` */
+    /* decides which envelopes are close enough to the model; NULL without max_error */
+    ebpo_tolerance *tolerance;
     ebpo_box box;   /* the root cell */
     int last_level; /* deepest level that may be kept */
-    uint32_t parts; /* parts that are kept and are in the file */
-    ebpo_tree *out;
+    uint32_t parts; /* parts of the file that are kept (EBPO_PART_...) */
+    ebpo_tree *out; /* the subset */
     ebpo_error *error;
 } ebpo_cutting;
 
-/* Makes the levels of the subset (subset_levels.c). Faces keep the numbers of the original file. */
+/* Makes the levels of the subset (subset_levels.c). The lists of faces still have the indices of
+ * the original file. */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
 /* Copies the faces that the remaining leaves list, with their vertices, maps and attributes, and
- * gives them new numbers (subset_faces.c). If no faces remain, removes these parts. */
+ * gives them new indices, also in the lists of the leaves (subset_faces.c). If no faces remain,
+ * removes these parts. */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
-/* Computes the volumes of the envelopes of the nodes that remain. */
+/* Computes the volumes of the levels of the subset from the envelopes of the nodes that remain. */
 void ebpo_cut_volumes(ebpo_cutting *c);
 
 /* Makes the tree of the subset that ebpo_subset would write. Tests call this function, too. */
@@ -40,13 +43,13 @@ EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file
 /* --- counting the bytes that a subset needs of its file, from headers and tables alone --- */
 
 typedef struct ebpo_subset_reads {
-    uint64_t subtrees;    /* subtrees that intersect the box; 0 if the file has none */
-    uint64_t of_subtrees; /* all subtrees of the file; 0 if the file has none */
-    uint64_t bytes;       /* bytes of the chunks that contain the subset, each counted once */
+    uint64_t subtrees;       /* subtrees that intersect the box; 0 if the file has none */
+    uint64_t total_subtrees; /* all subtrees of the file; 0 if the file has none */
+    uint64_t bytes;          /* bytes of the chunks that the subset needs, each counted once */
 } ebpo_subset_reads;
 
-/* Counts the reads. Of the options, only the parts, the box and last_level matter. With the mesh,
- * all levels are included. */
+/* Counts what a subset with these options must read of its file. Only the options parts, box and
+ * last_level are used. If the parts include the mesh, all levels are counted. */
 EBPO_MUST_USE ebpo_status ebpo_subset_count_reads(const ebpo_file *file,
                                                   const ebpo_subset_options *options,
                                                   ebpo_subset_reads *out, ebpo_error *error);

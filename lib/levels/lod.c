@@ -2,10 +2,11 @@
  *
  * The walk goes from the root down; each node's envelope is cut from the parent's envelope by the
  * node's planes. A leaf's planes come from the file, or from its faces (construct/leaf_planes.c),
- * or the leaf keeps its parent's envelope. One thread first walks the top of the tree, down to the
- * split level; all threads then walk the independent subtrees below this level. The split level
- * depends only on the tree, and the results of the walks are joined in order of octcodes
- * (locational codes), so the number of threads does not change the result.
+ * or the leaf keeps the part of its parent's envelope in its cell. One thread first walks the top
+ * of the tree, down to the split level; all threads then walk the independent subtrees below this
+ * level. The split level depends only on the tree, and the results of the walks are joined in a
+ * fixed order (by level, then by octcode, the locational code). So the number of threads does not
+ * change the result.
  *
  * Sections: polyhedra as triangles; the model, which a walk reads; leaves; colours of nodes; the
  * walk. */
@@ -59,7 +60,7 @@ static void add_fan(ebpo_polyhedra *piece, const uint32_t *new_index, const uint
     }
 }
 
-/* Begins a node and makes space for its polytope. */
+/* Appends a node, still without polygons, and reserves space for the polygons of its polytope. */
 static bool begin_node(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo_box *box,
                        ebpo_cell cell, ebpo_node_type type)
 {
@@ -75,7 +76,7 @@ static bool begin_node(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo
     return true;
 }
 
-/* Records a polygon of the last node. */
+/* Records a polygon with this number of corners for the last node. */
 static void end_polygon(ebpo_polyhedra *piece, unsigned corners)
 {
     piece->corners[piece->polygon_count++] = (uint8_t)corners;
@@ -224,8 +225,8 @@ static ebpo_status read_levels(ebpo_lod_model *out, const ebpo_file *file,
 
 /* --- faces of leaves --- */
 
-/* Returns the number of faces in the lists of all leaves; faces in several lists count repeatedly.
- */
+/* Returns the sum of the lengths of all leaves' face lists. A face in several lists counts several
+ * times. */
 static uint64_t count_listed(const ebpo_lod_model *model)
 {
     uint64_t count = 0;
@@ -235,6 +236,7 @@ static uint64_t count_listed(const ebpo_lod_model *model)
     return count;
 }
 
+/* Writes the file indices of the faces in the lists of all leaves to `out`. */
 static void list_faces(const ebpo_lod_model *model, uint32_t *out)
 {
     for (int i = 0; i <= model->target; i++) {
@@ -249,26 +251,28 @@ static void list_faces(const ebpo_lod_model *model, uint32_t *out)
     }
 }
 
-static int compare_numbers(const void *a, const void *b)
+static int compare_indices(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
 }
 
-/* Sorts numbers and removes repeated ones; returns their number. */
-static uint64_t sort_unique(uint32_t *numbers, uint64_t count)
+/* Sorts indices and removes repetitions. Returns how many different indices there are. */
+static uint64_t sort_unique(uint32_t *indices, uint64_t count)
 {
     uint64_t kept = 0;
-    qsort(numbers, count, sizeof *numbers, compare_numbers);
+    qsort(indices, count, sizeof *indices, compare_indices);
     for (uint64_t i = 0; i < count; i++)
-        if (i == 0 || numbers[i] != numbers[i - 1])
-            numbers[kept++] = numbers[i];
+        if (i == 0 || indices[i] != indices[i - 1])
+            indices[kept++] = indices[i];
     return kept;
 }
 
-static uint32_t position_of(uint32_t number, const uint32_t *sorted, uint64_t count)
+/* Returns the position of an index in a sorted array, or UINT32_MAX if the array does not have it.
+ */
+static uint32_t position_of(uint32_t index, const uint32_t *sorted, uint64_t count)
 {
-    const uint32_t *at = bsearch(&number, sorted, count, sizeof *sorted, compare_numbers);
+    const uint32_t *at = bsearch(&index, sorted, count, sizeof *sorted, compare_indices);
     return at ? (uint32_t)(at - sorted) : UINT32_MAX;
 }
 
@@ -306,7 +310,8 @@ static ebpo_status pick_mesh(ebpo_lod_model *out, ebpo_chunks *chunks, unsigned 
 static ebpo_status read_faces(ebpo_lod_model *out, const ebpo_file *file,
                               const ebpo_read_options *read, ebpo_error *error)
 {
-    enum { SHARE = 8, CHUNK_BUDGET = 64 << 20 };
+    /* If the lists have more entries than 1 / SHARE of all faces, the whole mesh is read. */
+    enum { SHARE = 8, CHUNK_BUDGET = 64 << 20 /* bytes */ };
     uint64_t count = count_listed(out);
     ebpo_chunks *chunks = NULL;
     if (count == 0)
@@ -346,7 +351,8 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
 
 /* --- envelopes of leaves --- */
 
-/* Returns false if the mesh has no such face or not all of its vertices. */
+/* Copies the triangle of a face, given by its index in the file. Returns false if the mesh does not
+ * have the face or one of its vertices. */
 static bool copy_face(const ebpo_lod_model *model, uint64_t face, ebpo_triangle *out)
 {
     const ebpo_mesh *mesh = &model->mesh;
@@ -366,8 +372,8 @@ static bool copy_face(const ebpo_lod_model *model, uint64_t face, ebpo_triangle 
     return true;
 }
 
-/* Collects the leaf's faces in the same order as the construction did, which is the order of
- * ascending indices. So referenced faces precede new faces. */
+/* Collects the leaf's faces in order of ascending indices, as the construction did. Referenced
+ * faces (which an earlier leaf of the file lists, too) have lower indices than new faces. */
 ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                 ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error)
 {
@@ -375,22 +381,22 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
     if (!level->leaf_first || !level->leaf_new || !model->ranks[cell.level].ref_first)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: its leaves have no face lists; run ebpo verify", cell.level);
-    uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
-    if (!ebpo_grow(&scratch->faces, &scratch->capacity, refs + fresh, sizeof *scratch->faces))
-        return ebpo_fail_memory(error, (refs + fresh) * sizeof *scratch->faces);
+    uint64_t refs = level->leaf_ref_count[leaf], new_count = level->leaf_new[leaf];
+    if (!ebpo_grow(&scratch->faces, &scratch->capacity, refs + new_count, sizeof *scratch->faces))
+        return ebpo_fail_memory(error, (refs + new_count) * sizeof *scratch->faces);
     const uint32_t *ref =
         level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;
     bool valid = true;
     for (uint64_t i = 0; i < refs && valid; i++)
         valid = copy_face(model, ref[i], &scratch->faces[i]);
-    for (uint64_t i = 0; i < fresh && valid; i++)
+    for (uint64_t i = 0; i < new_count && valid; i++)
         valid = copy_face(model, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
     if (!valid)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: leaf %llu names a face or vertex that the mesh does not have; "
                          "run ebpo verify",
                          cell.level, (unsigned long long)leaf);
-    *count = refs + fresh;
+    *count = refs + new_count;
     return EBPO_OK;
 }
 
@@ -419,15 +425,16 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
                           ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
                                                     winding[leaf], scratch->faces, count)
                           : 0;
-    /* Derived planes need no storage, so the selection is not limited by epsilon, as for the
-     * volumes stated in the file. */
+    /* The 0 is epsilon, the smallest effect of a plane that is kept. Derived planes need no
+     * storage, so no plane is omitted. The volumes in the file's header are computed in this way.
+     */
     *plane_count =
         ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
     return EBPO_OK;
 }
 
-/* Cuts `envelope` (on entry the parent's envelope in this cell) to the envelope of leaf number
- * `leaf` of the cell's level. */
+/* Cuts `envelope` to the envelope of the leaf with rank `leaf` among the leaves of the cell's
+ * level. On entry, `envelope` is the part of the parent's envelope in this cell. */
 static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
                                ebpo_error *error)
@@ -447,8 +454,8 @@ static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint
 
 /* --- colours of nodes --- */
 
-/* Finds the colour of the last gray node on the path from the root to a node. This is the node
- * itself or its parent. Returns false without a colour. */
+/* Finds the colour of the last gray node on the path from the root to a node. This gray node is the
+ * node itself or its parent. Returns false if the file has no colour for the gray node. */
 static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
 {
     int depth = ebpo_cell_of_octcode(octcode).level;
@@ -515,11 +522,12 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
 
 /* --- the walk --- */
 
-/* Gray nodes that are enough to keep all threads busy. */
+/* A level with this many gray nodes has enough subtrees to keep all threads busy. */
 enum { SEEDS_WANTED = 128 };
 
-/* Halves of the envelopes on the path to a node: the envelope's half along z, this half's half
- * along y, and that half's half along x. They are too large for the stack. */
+/* For each node on the path to the current node, parts of its envelope: a half (cut at the middle
+ * of the cell along z), a quarter (cut also along y), and an eighth (also along x). They are too
+ * large for the stack. */
 typedef ebpo_polytope path_halves[EBPO_LEVELS_MAX][3];
 
 /* A gray node at the split level, where the walk of a subtree begins. */
@@ -542,12 +550,14 @@ typedef struct job {
     path_halves *halves;        /* [threads] */
 } job;
 
+/* State of one walk. */
+
 typedef struct walker {
     job *j;
-    ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] */
+    ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] the walk's piece of each level */
     ebpo_leaf_scratch *scratch;
-    ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] */
-    int last_level; /* gray nodes of this level become seeds; -1: the walk has no such level */
+    ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] see path_halves */
+    int seed_level; /* gray nodes of this level become seeds; -1: the walk makes no seeds */
     ebpo_error *error;
 } walker;
 
@@ -566,13 +576,15 @@ static ebpo_status add_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cel
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent);
 
-/* Returns true for a pruned node (whose children are not in the file). The node's envelope
- * represents the node at all deeper levels. Only called above the target level. */
+/* Returns true for a pruned node (whose children are not in the file). Its envelope then represents
+ * it at all deeper levels. `level` must be above the target level. `gray` is the node's rank among
+ * the gray nodes of its level. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;
 }
 
+/* Visits a gray node; `envelope` is the part of the parent's envelope in its cell. */
 static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_polytope *envelope)
 {
     const ebpo_level *level = &w->j->model->level[cell.level];
@@ -581,7 +593,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
                         level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
         return add_polytope(w, envelope, cell, EBPO_GRAY);
-    if (cell.level == w->last_level) {
+    if (cell.level == w->seed_level) {
         seed *s = &w->j->seeds[w->j->seed_count++];
         s->cell = cell;
         ebpo_polytope_copy(&s->envelope, envelope);
@@ -592,7 +604,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
     return visit_group(w, gray, cell, envelope);
 }
 
-/* Visits a gray node or leaf; `envelope` is the parent's, cut to this cell. */
+/* Visits a gray node or leaf; `envelope` is the part of the parent's envelope in its cell. */
 static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_cell cell,
                               ebpo_polytope *envelope)
 {
@@ -627,8 +639,8 @@ static ebpo_status visit_root(walker *w)
     }
 }
 
-/* Visits siblings in octant order. Their envelopes are cut from shared halves of the parent's
- * envelope, as in the construction. */
+/* Visits the eight children of a node in octant order. Their envelopes are cut from the parent's
+ * envelope along z, y and x; siblings share these halves, as in the construction. */
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent)
 {
@@ -705,8 +717,8 @@ static ebpo_status job_walk(job *j, unsigned threads, const ebpo_progress *progr
                              "clipping envelopes", error);
 }
 
-/* Joins the pieces level by level. Within a level, the piece of the walk from the root comes first,
- * then the pieces of the seeds in order. */
+/* Joins the pieces, level by level. Within a level, the piece of the walk from the root comes
+ * first. The pieces of the seeds follow in the order of the seeds. */
 static ebpo_status job_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                             ebpo_error *error)
 {
@@ -749,9 +761,9 @@ void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
     memset(nodes, 0, sizeof *nodes);
 }
 
-/* Adds winding numbers. Joined nodes are sorted by level, then by octcode, and include every leaf
- * and black node of a level. So the number of leaves, or black nodes, before a node is the node's
- * rank. */
+/* Sets the winding numbers of leaves and black nodes. `nodes` is sorted by level, then by octcode,
+ * and has every leaf and black node of a level. So the number of leaves (or black nodes) before a
+ * node in its level is the node's rank. */
 static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     uint64_t leaf = 0, black = 0;
@@ -791,7 +803,8 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
         return status;
     if (nodes && !out)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "nodes of a level are returned only with its polygons");
+                         "nodes of a level are returned only together with its polygons; pass a "
+                         "mesh for the polygons");
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,

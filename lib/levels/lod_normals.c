@@ -1,14 +1,15 @@
 /* Computes normals for the polygons of a level, for shading.
  *
- * A polygon on a plane is nearly parallel to the surface and keeps the plane's direction. A polygon
- * on a cell face is a step between two envelopes and does not represent the surface. Such a polygon
- * gets the direction of the plane polygons around it.
+ * A polygon on a plane of its node's envelope (a "plane polygon") is nearly parallel to the surface
+ * and keeps the plane's direction. A polygon on a cell face is a step between two envelopes and
+ * does not represent the surface. It gets the direction of the plane polygons around it.
  *
- * These directions are computed in six passes, one for each side of cells (lower x, upper x, ...).
- * In each pass, every corner of every drawn cell gets a normal: the mean of the normals, weighted
- * by area, of the plane polygons of the nodes around the corner. Only polygons that face this side
- * count, so that polygons on the other side of a thin part are ignored. A polygon on this side of a
- * cell gets a normal that is interpolated linearly from the normals at the cell's corners. */
+ * The directions for cell faces are computed in six passes, one for each side of cells (lower x,
+ * upper x, ...). In each pass, every corner of every drawn cell gets a normal: the mean of the
+ * normals, weighted by area, of the plane polygons of the nodes around the corner. The mean only
+ * includes polygons that face the side of this pass, so polygons on the other side of a thin part
+ * are ignored. A polygon on this side of a cell gets a normal that is interpolated linearly from
+ * the normals at the cell's corners. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -26,8 +27,9 @@
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 
 static const uint32_t none = UINT32_MAX; /* not a corner index */
-/* A polygon faces a side if the cosine of the angle between their normals is greater than this. The
- * value is below 0, so that a polygon may be turned away slightly. */
+/* A polygon faces a side if the cosine of the angle between the polygon's normal and the side's
+ * outward normal is greater than this. The value is below 0, so a polygon may be turned away
+ * slightly. */
 static const double least_cosine = -0.3;
 
 typedef struct polygon {
@@ -39,10 +41,10 @@ typedef struct polygon {
 typedef struct lighting {
     ebpo_box box;
     const ebpo_lod_nodes *nodes;
-    polygon *polygons; /* [polygon_count] */
-    uint32_t (*at)[8]; /* corner indices of each node */
-    double (*sum)[4];  /* [corner_count] sums of normals and of their lengths */
-    uint64_t *keys;    /* [corner_count] positions (position_key) */
+    polygon *polygons;             /* [polygon_count] */
+    uint32_t (*corner_of_node)[8]; /* [node_count] index of each corner of the node's cell */
+    double (*sum)[4]; /* [corner_count] in the current pass: sum of area vectors, of lengths */
+    uint64_t *keys;   /* [corner_count] positions (position_key) */
     uint64_t corner_count, key_capacity;
 } lighting;
 
@@ -122,7 +124,8 @@ static uint64_t position_key(ebpo_cell cell, unsigned corner)
  * false when out of memory. */
 static bool number_corners(lighting *l)
 {
-    uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), at;
+    /* eight corners for each node; at most three quarters of the slots are used */
+    uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), slot;
     uint32_t *table = ebpo_alloc(slots, sizeof *table);
     bool complete = table != NULL;
     if (complete)
@@ -131,25 +134,26 @@ static bool number_corners(lighting *l)
         ebpo_cell cell = ebpo_cell_of_octcode(l->nodes->nodes[i].octcode);
         for (unsigned c = 0; c < 8 && complete; c++) {
             uint64_t key = position_key(cell, c);
-            EBPO_HASH_FIND(at, ebpo_hash_number(key), slots - 1,
-                           table[at] == none || l->keys[table[at]] == key);
-            if (table[at] == none) {
+            EBPO_HASH_FIND(slot, ebpo_hash_number(key), slots - 1,
+                           table[slot] == none || l->keys[table[slot]] == key);
+            if (table[slot] == none) {
                 complete =
                     l->corner_count < none &&
                     ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
                 if (complete)
-                    l->keys[table[at] = (uint32_t)l->corner_count++] = key;
+                    l->keys[table[slot] = (uint32_t)l->corner_count++] = key;
             }
-            l->at[i][c] = table[at];
+            l->corner_of_node[i][c] = table[slot];
         }
     }
     free(table);
     return complete;
 }
 
-/* --- normals at the corners, side by side --- */
+/* --- normals at the corners, for one side of cells --- */
 
-/* Sums the area vectors, and their lengths, of a node's plane polygons that face a side. */
+/* Sums the area vectors of a node's plane polygons that face a side in out[0..2], and the lengths
+ * of these vectors in out[3]. */
 static void sum_node(const polygon *p, uint32_t count, int side, double out[4])
 {
     double sign = side % 2 ? 1 : -1;
@@ -176,19 +180,19 @@ static void sum_side(lighting *l, int side)
         p += l->nodes->nodes[i].polygon_count;
         for (int c = 0; c < 8 && sum[3] > 0; c++)
             for (int k = 0; k < 4; k++)
-                l->sum[l->at[i][c]][k] += sum[k];
+                l->sum[l->corner_of_node[i][c]][k] += sum[k];
     }
 }
 
 /* Interpolates the mean normals of a cell's corners at a point in the cell. */
-static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8],
+static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t corners[8],
                          const double point[3], double out[3])
 {
     double low[3], high[3];
     ebpo_cell_bounds(&l->box, cell, low, high);
     memset(out, 0, 3 * sizeof *out);
     for (unsigned c = 0; c < 8; c++) {
-        const double *sum = l->sum[at[c]];
+        const double *sum = l->sum[corners[c]];
         double share = 1;
         for (int k = 0; k < 3; k++) {
             double x = (point[k] - low[k]) / (high[k] - low[k]);
@@ -218,7 +222,8 @@ static void light_side(const lighting *l, int side, float *out)
             double direction[3];
             if (p->side != side)
                 continue;
-            direction_at(l, ebpo_cell_of_octcode(node->octcode), l->at[i], p->middle, direction);
+            direction_at(l, ebpo_cell_of_octcode(node->octcode), l->corner_of_node[i], p->middle,
+                         direction);
             put_normal(direction, out);
         }
     }
@@ -228,21 +233,24 @@ static ebpo_status lighting_prepare(lighting *l, ebpo_error *error)
 {
     uint64_t nodes = l->nodes->node_count, polygons = l->nodes->polygon_count;
     l->polygons = ebpo_alloc(polygons, sizeof *l->polygons);
-    l->at = ebpo_alloc(nodes, sizeof *l->at);
-    if (l->polygons && l->at && number_corners(l))
+    l->corner_of_node = ebpo_alloc(nodes, sizeof *l->corner_of_node);
+    if (l->polygons && l->corner_of_node && number_corners(l))
         l->sum = ebpo_alloc(l->corner_count, sizeof *l->sum);
     return l->sum ? EBPO_OK
-                  : ebpo_fail_memory(error, polygons * sizeof *l->polygons +
-                                                nodes * (sizeof *l->at + 8 * sizeof *l->sum));
+                  : ebpo_fail_memory(error,
+                                     polygons * sizeof *l->polygons +
+                                         nodes * (sizeof *l->corner_of_node + 8 * sizeof *l->sum));
 }
 
+/* Checks that the mesh has the triangles of these nodes. */
 static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
                                ebpo_error *error)
 {
     uint64_t triangles = 0;
     if (!mesh->xyz64 && mesh->face_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the mesh has single precision; pass the mesh that belongs to the nodes");
+                         "the mesh has float coordinates, but meshes of levels have doubles; pass "
+                         "the mesh that ebpo_lod_level_nodes returned with these nodes");
     for (uint64_t i = 0; i < nodes->polygon_count; i++)
         triangles += nodes->corners[i] - 2u;
     if (triangles == mesh->face_count)
@@ -271,7 +279,7 @@ ebpo_status ebpo_lod_normals(const ebpo_info *info, const ebpo_mesh *mesh,
         light_side(&l, side, out);
     }
     free(l.polygons);
-    free(l.at);
+    free(l.corner_of_node);
     free(l.keys);
     free(l.sum);
     return status;

@@ -1,10 +1,11 @@
 /* Delivers a file level by level, node by node in order of octcodes (locational codes), for
  * programs that show or process a model while it arrives.
  *
- * Only the types of completed levels stay in memory, and their planes if polygons are requested.
- * This is enough to walk down to the nodes of the next level. Within a level, the depth-first walk
- * from the root visits groups, nodes of each type and planes in stored order. So counts of the
- * visited items give the items' positions, and no tables of sums are needed.
+ * Of a completed level, only the node types and the colours stay in memory, and the planes if
+ * polygons are requested. These arrays are enough to walk down to the nodes of the next level. The
+ * depth-first walk from the root visits groups (eight siblings), nodes of each type and planes of a
+ * level in the order in which the file stores them. So the number of items visited before an item
+ * is its position in the stored array, and no tables of positions are needed.
  *
  * Half-spaces and polygons are converted from cell coordinates to model coordinates with bounded
  * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
@@ -31,7 +32,8 @@
 
 /* --- from cell to model coordinates --- */
 
-/* Let t be the cell's shortest side, and N = t n / size. Then the half-space is
+/* Let corner be the lowest corner of the cell, size its sides, t its shortest side, and
+ * N = t n / size (for each coordinate). Then the half-space is
  *     N . (p - corner) <= t d / 4096.
  * For any normal a, any factor f > 0, and p in the cell:
  *     a . p = a . corner + f N . (p - corner) + (a - f N) . (p - corner)
@@ -76,7 +78,7 @@ static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_
             out[v][k] = ebpo_cell_face_point(box, cell, k, p->vertex[v][k], sides[v]);
 }
 
-/* --- the members of an ebpo_stream_node --- */
+/* --- filling in an ebpo_stream_node --- */
 
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type)
@@ -122,8 +124,8 @@ void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const eb
 typedef struct level_walk_node {
     ebpo_octcode octcode;
     ebpo_node_type type;
-    uint64_t rank;         /* among the nodes of its type in the level */
-    const uint32_t *codes; /* the node's planes */
+    uint64_t rank;         /* position among the nodes of its type in the level */
+    const uint32_t *codes; /* [code_count] the node's plane codes; NULL: none */
     unsigned code_count;
 } level_walk_node;
 
@@ -131,10 +133,10 @@ typedef struct level_walk {
     /* [target + 1], owned by the caller; levels above the target provide only types, plane counts
      * and planes */
     const ebpo_level *level;
-    int target, depth;
-    bool pruned; /* the file is a subset: empty groups have no nodes */
-    struct {
-        /* numbers of groups, nodes of each type, and planes visited so far in this level */
+    int target, depth; /* level whose nodes are returned; level of the next visited node */
+    bool pruned;       /* the file is a subset: an empty group has no nodes */
+    struct {           /* state in each level */
+        /* how many groups, nodes of each type, and planes of gray nodes and leaves were visited */
         uint64_t group, rank[4], plane, leaf_plane;
         unsigned octant; /* next octant of the group */
         /* last visited node; in levels above `depth`, it is the ancestor of the next node */
@@ -186,6 +188,7 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
             w->depth--;
             continue;
         }
+        /* An empty group stores eight white types, but its nodes are not in the file. */
         if (w->pruned && depth && w->level[depth].types[w->at[depth].group] == 0) {
             w->at[depth].rank[EBPO_WHITE] += 8;
             w->at[depth].octant = 8;
@@ -216,9 +219,9 @@ static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
     return ebpo_envelope_put(e, node->octcode, node->codes, node->code_count);
 }
 
-/* Returns the envelope, in cell coordinates, of the last node from level_walk_next. For gray
- * nodes and leaves: the cube, cut by the planes of all ancestors and of the node. For black nodes:
- * the cube. Valid until the next call with these envelopes. */
+/* Returns the envelope, in cell coordinates, of the last node from level_walk_next. The envelope of
+ * a gray node or leaf is the cube, cut by the planes of the node and of all its ancestors. The
+ * envelope of a black node is the cube. The result is valid until the next call with `e`. */
 static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level_walk_node *node,
                                                 ebpo_envelope_stack *e)
 {
@@ -228,7 +231,7 @@ static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level
 
 /* --- the stream --- */
 
-enum { RANGE_NODES = 4096 }; /* number of nodes in a range, the unit of parallel work */
+enum { RANGE_NODES = 4096 }; /* nodes in a range; threads work on different ranges */
 
 struct ebpo_stream {
     const ebpo_file *file;
@@ -240,8 +243,8 @@ struct ebpo_stream {
     uint64_t bytes;                   /* size of the header and of the levels read so far */
     /* volume of the leaves and black nodes in all levels up to `level` */
     double terminal_volume;
-    level_walk walk;
-    ebpo_envelope_stack *envelopes; /* if polygons are requested */
+    level_walk walk;                /* in level `level` */
+    ebpo_envelope_stack *envelopes; /* NULL if no polygons are requested */
     ebpo_node_buffers buffers;
 };
 
@@ -282,6 +285,7 @@ void ebpo_stream_free(ebpo_stream *s)
 
 /* --- reading a level --- */
 
+/* Frees the arrays of a completed level that the walk to deeper levels does not need. */
 static void drop_unneeded_arrays(ebpo_level *level, bool planes)
 {
     ebpo_level_drop(level, ~(uint32_t)(EBPO_NEEDS_ALWAYS | EBPO_NEEDS_COLOURS |
@@ -296,8 +300,8 @@ static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
     return sum;
 }
 
-/* Checks the values that the walk needs: the number of groups, and the counts of nodes and planes.
- */
+/* Checks the values that the walk needs: the numbers of groups, nodes and planes. `number` is the
+ * level's number. */
 static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents,
                                ebpo_error *error)
 {
@@ -311,14 +315,15 @@ static ebpo_status check_level(const ebpo_level *level, int number, uint64_t par
     if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count ||
         count[EBPO_BLACK] != level->black_count || count[EBPO_WHITE] != level->white_count)
         return ebpo_fail(error, EBPO_E_FORMAT,
-                         "level %d: its types and its node counts disagree; run ebpo verify",
+                         "level %d: the node types and the node counts disagree; run ebpo verify",
                          number);
     if (sum_counts(level->plane_counts, level->gray_count) !=
             (level->plane_counts ? level->plane_count : 0) ||
         sum_counts(level->leaf_plane_counts, level->leaf_count) !=
             (level->leaf_plane_counts ? level->leaf_plane_count : 0))
         return ebpo_fail(error, EBPO_E_FORMAT,
-                         "level %d: the counts of its planes do not add up; run ebpo verify",
+                         "level %d: the sum of the nodes' plane counts is not the number of "
+                         "planes; run ebpo verify",
                          number);
     return EBPO_OK;
 }
@@ -326,15 +331,15 @@ static ebpo_status check_level(const ebpo_level *level, int number, uint64_t par
 /* --- volumes --- */
 
 typedef struct volumes {
-    double gray, terminal_volume;
+    double gray, terminal_volume; /* of gray nodes; of leaves and black nodes */
 } volumes;
 
 /* Computation of the volume of a level, in ranges of RANGE_NODES nodes. */
 typedef struct job {
     const ebpo_stream *stream;
-    int target;
-    level_walk *starts;             /* [ranges] */
-    volumes *found;                 /* [ranges] */
+    int target;                     /* the level */
+    level_walk *starts;             /* [ranges] walk to the first node of each range */
+    volumes *sums;                  /* [ranges] */
     ebpo_envelope_stack *envelopes; /* [threads] */
 } job;
 
@@ -349,15 +354,15 @@ static ebpo_status sum_ranges(void *context, uint64_t begin, uint64_t end, unsig
         level_walk_node node;
         for (int k = 0; k < RANGE_NODES && level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
-                *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].terminal_volume) +=
+                *(node.type == EBPO_GRAY ? &j->sums[i].gray : &j->sums[i].terminal_volume) +=
                     ebpo_polytope_volume(level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
                     cell;
     }
     return EBPO_OK;
 }
 
-/* Finds the start of each range with a walk that computes no envelopes. Ranges, and therefore
- * the sum, do not depend on the number of threads. */
+/* Finds the start of each range, by a walk that computes no envelopes. The ranges, and therefore
+ * the rounding of the sum, do not depend on the number of threads. */
 static void find_starts(job *j)
 {
     level_walk walk;
@@ -371,18 +376,18 @@ static void find_starts(job *j)
     } while (level_walk_next(&walk, &node));
 }
 
-/* Computes the volumes of the nodes of level `target` from their envelopes. */
+/* Computes the volumes of level `target`, which has `nodes` nodes, from the nodes' envelopes. */
 static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out,
                                ebpo_error *error)
 {
     unsigned threads = ebpo_thread_count(s->options.threads);
     uint64_t ranges = nodes / RANGE_NODES + 1;
     job j = { s, target, ebpo_alloc(ranges, sizeof *j.starts),
-              ebpo_alloc_zero(ranges, sizeof *j.found),
+              ebpo_alloc_zero(ranges, sizeof *j.sums),
               ebpo_alloc_zero(threads, sizeof *j.envelopes) };
     ebpo_status status = EBPO_OK;
-    if (!j.starts || !j.found || !j.envelopes) {
-        status = ebpo_fail_memory(error, ranges * (sizeof *j.starts + sizeof *j.found) +
+    if (!j.starts || !j.sums || !j.envelopes) {
+        status = ebpo_fail_memory(error, ranges * (sizeof *j.starts + sizeof *j.sums) +
                                              threads * sizeof *j.envelopes);
         goto done;
     }
@@ -390,12 +395,12 @@ static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes,
     status = ebpo_parallel_for(threads, NULL, ranges, 1, sum_ranges, &j, NULL, "cutting envelopes",
                                error);
     for (uint64_t i = 0; i < ranges; i++) {
-        out->gray += j.found[i].gray;
-        out->terminal_volume += j.found[i].terminal_volume;
+        out->gray += j.sums[i].gray;
+        out->terminal_volume += j.sums[i].terminal_volume;
     }
 done:
     free(j.starts);
-    free(j.found);
+    free(j.sums);
     free(j.envelopes);
     return status;
 }
@@ -461,8 +466,8 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
 
 /* --- returning nodes --- */
 
-/* Returns the stored winding number of a node. Without stored numbers, black nodes have 1 and other
- * nodes 0. */
+/* Returns the stored winding number of a node. If the file stores none, the winding number is 1 for
+ * black nodes and 0 for other nodes. */
 static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
 {
     switch (node->type) {

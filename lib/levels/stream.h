@@ -1,5 +1,5 @@
-/* Declares the functions that fill in the nodes of a stream (stream.c): half-spaces and polygons in
- * model coordinates. The subtrees of lib/query return nodes in the same form. */
+/* Declares the functions that fill in the nodes that a stream returns (stream.c): half-spaces and
+ * polygons in model coordinates. Subtrees (lib/query/subtree.c) return nodes in the same form. */
 #ifndef EBPO_LEVELS_STREAM_H
 #define EBPO_LEVELS_STREAM_H
 
@@ -13,16 +13,17 @@
 
 /* --- half-spaces --- */
 
-/* Converts the code's half-space 4096 (n . xi) <= d to out[0..2] . p <= out[3] with a unit normal
- * (to 4 ulps). Every real point p of the cell that satisfies the code satisfies the result. For
- * double p, this is also true when the left side is evaluated in doubles, in any order. The offset
- * exceeds the necessary offset by about 1e-14 of the cell's coordinates. */
+/* Converts the half-space 4096 (n . xi) <= d of a plane code, where xi is a point in cell
+ * coordinates (0 to 1), to out[0..2] . p <= out[3] with a unit normal (to 4 ulps). Every real point
+ * p of the cell in the first half-space is in the second one. For a point p of doubles, this is
+ * also true when the left side is evaluated in doubles, in any order. out[3] is greater than
+ * necessary by about 1e-14 of the cell's coordinates. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4]);
 
 /* --- filling in an ebpo_stream_node: cell, planes, polygons --- */
 
-enum { EBPO_NODE_CODES = 255 };
+enum { EBPO_NODE_CODES = 255 }; /* the most plane codes of a node */
 
 /* Buffers that a node's pointers refer to. */
 typedef struct ebpo_node_buffers {
@@ -31,7 +32,8 @@ typedef struct ebpo_node_buffers {
     uint32_t polygon_first[EBPO_POLYTOPE_FACES + 1], corners[EBPO_POLYTOPE_CORNERS];
 } ebpo_node_buffers;
 
-/* Sets octcode (locational code), type, cell, and a black node's volume. */
+/* Begins a node: sets the octcode (locational code), the type, the cell, and the volume if the node
+ * is black. All other members are cleared. */
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type);
 /* Decodes `count` plane codes, at most EBPO_NODE_CODES, and adds their planes to the node. */

@@ -1,8 +1,10 @@
-/* Reads the model's faces that patches of the simplified surface replace, for drawing.
+/* Reads the model's faces for drawing, in place of patches. A patch of the simplified surface
+ * approximates the faces below a node (format/surface_patches.h).
  *
- * A vertex has the mean normal of the faces that were read, weighted by area. A corner has a
- * separate vertex with the face's normal if the two normals differ by more than 40 degrees, which
- * keeps the edges of machined parts sharp. */
+ * The corners of faces at a vertex of the model share one vertex of the result, with the mean
+ * normal of the faces that were read, weighted by area. If a face's normal differs from the mean by
+ * more than 40 degrees, the face's corner gets a separate vertex with the face's normal. This keeps
+ * the edges of machined parts sharp. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,17 +25,18 @@ static const double LEAST_COSINE = 0.766; /* of 40 degrees */
 
 typedef struct faces_reader {
     ebpo_chunks *chunks;
-    ebpo_patch *out;
-    uint64_t count;
-    uint32_t *face;      /* [count] indices in the file */
-    uint32_t *corner;    /* [count][3] vertices of the file */
-    uint32_t *vertex;    /* [vertex_count] vertices of the file */
-    double (*normal)[3]; /* [count] area vectors of faces */
-    double (*sum)[3];    /* [vertex_count] */
-    uint8_t *colour;     /* [count][3][3], or NULL */
+    ebpo_patch *out;     /* the faces as a patch */
+    uint64_t count;      /* of faces */
+    uint32_t *face;      /* [count] indices of the faces in the file */
+    uint32_t *corner;    /* [count][3] indices in the file of the faces' vertices */
+    uint32_t *vertex;    /* [out->vertex_count] index in the file of each shared vertex */
+    double (*normal)[3]; /* [count] area vectors of faces: normals with twice the area as length */
+    double (*sum)[3];    /* [out->vertex_count] sums of the area vectors around a vertex */
+    uint8_t *colour;     /* [count][3][3] red, green, blue of each corner; NULL: no colours */
 } faces_reader;
 
-/* Numbers the vertices in the order of their first use. */
+/* Makes the shared vertices, in the order of their first use by a face, and sets the triangles.
+ * Returns false when out of memory. */
 static bool number_vertices(faces_reader *r)
 {
     uint64_t slots = ebpo_hash_slots(6 * r->count), at;
@@ -57,20 +60,21 @@ static bool number_vertices(faces_reader *r)
 
 static ebpo_status read_positions(faces_reader *r, ebpo_error *error)
 {
-    uint64_t numbers = 3 * r->out->vertex_count;
+    uint64_t coordinates = 3 * r->out->vertex_count;
     if (r->chunks->file->info.double_coordinates)
         return ebpo_pick_rows(r->chunks, EBPO_A_VERTICES, r->vertex, r->out->vertex_count, 1,
                               r->out->xyz, error);
-    float *single = ebpo_alloc(numbers, sizeof *single);
+    float *single = ebpo_alloc(coordinates, sizeof *single);
     ebpo_status status = single ? ebpo_pick_rows(r->chunks, EBPO_A_VERTICES, r->vertex,
                                                  r->out->vertex_count, 1, single, error)
-                                : ebpo_fail_memory(error, numbers * sizeof *single);
-    for (uint64_t i = 0; i < numbers && status == EBPO_OK; i++)
+                                : ebpo_fail_memory(error, coordinates * sizeof *single);
+    for (uint64_t i = 0; i < coordinates && status == EBPO_OK; i++)
         r->out->xyz[i] = (double)single[i];
     free(single);
     return status;
 }
 
+/* Computes the area vectors of the faces and their sums at the shared vertices. */
 static void add_normals(faces_reader *r)
 {
     for (uint64_t f = 0; f < r->count; f++) {
@@ -90,7 +94,7 @@ static void add_normals(faces_reader *r)
     }
 }
 
-/* Scales to length 1; (0, 0, 1) replaces a normal without direction. */
+/* Scales a normal to length 1. A normal of length 0 becomes (0, 0, 1). */
 static void set_unit(const double n[3], float out[3])
 {
     double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
@@ -102,7 +106,8 @@ static void set_unit(const double n[3], float out[3])
         out[k] = (float)(scaled[k] / length);
 }
 
-/* Gives each corner its vertex: the shared one, or a separate one with the face's normal. */
+/* Gives each corner its final vertex: the shared vertex, or a separate vertex with the face's
+ * normal. */
 static void set_vertices(faces_reader *r)
 {
     ebpo_patch *out = r->out;
@@ -111,14 +116,15 @@ static void set_vertices(faces_reader *r)
         set_unit(r->sum[v], out->normals + 3 * v);
     for (uint64_t i = 0; i < 3 * r->count; i++) {
         uint64_t v = out->triangles[i];
-        float own[3];
-        set_unit(r->normal[i / 3], own);
+        float face_normal[3];
+        set_unit(r->normal[i / 3], face_normal);
         const float *mean = out->normals + 3 * v;
-        if ((double)(own[0] * mean[0] + own[1] * mean[1] + own[2] * mean[2]) < LEAST_COSINE) {
-            uint64_t made = out->vertex_count++;
-            memcpy(out->xyz + 3 * made, out->xyz + 3 * v, 3 * sizeof *out->xyz);
-            memcpy(out->normals + 3 * made, own, sizeof own);
-            out->triangles[i] = (uint32_t)made;
+        if ((double)(face_normal[0] * mean[0] + face_normal[1] * mean[1] +
+                     face_normal[2] * mean[2]) < LEAST_COSINE) {
+            uint64_t separate = out->vertex_count++;
+            memcpy(out->xyz + 3 * separate, out->xyz + 3 * v, 3 * sizeof *out->xyz);
+            memcpy(out->normals + 3 * separate, face_normal, sizeof face_normal);
+            out->triangles[i] = (uint32_t)separate;
         }
         if (r->colour)
             memcpy(out->colours + 3 * (uint64_t)out->triangles[i], r->colour + 3 * i, 3);
@@ -171,7 +177,8 @@ ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *ch
     *out = (ebpo_patch)EBPO_PATCH_INIT;
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
-                              "faces are requested, and the file was written without its mesh");
+                              "faces are requested, but the file was written without its mesh; "
+                              "build it again with the mesh");
     for (uint64_t i = 0; i < count; i++)
         r.count += table->row[EBPO_PATCH_COLUMNS * patches[i] + EBPO_PATCH_FACES];
     if (r.count >= NONE / 3)
@@ -181,14 +188,14 @@ ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *ch
     r.vertex = ebpo_alloc(3 * r.count, sizeof *r.vertex);
     r.normal = ebpo_alloc(r.count, sizeof *r.normal);
     r.sum = ebpo_alloc_zero(3 * r.count, sizeof *r.sum);
-    /* at most one vertex for each corner, and a shared one for each vertex of the file */
+    /* at most 3 * count shared vertices, and 3 * count separate ones */
     out->xyz = ebpo_alloc(6 * r.count, 3 * sizeof *out->xyz);
     out->normals = ebpo_alloc(6 * r.count, 3 * sizeof *out->normals);
     out->triangles = ebpo_alloc(3 * r.count, sizeof *out->triangles);
     ebpo_status status = EBPO_OK;
     if (!r.face || !r.corner || !r.vertex || !r.normal || !r.sum || !out->xyz || !out->normals ||
         !out->triangles)
-        status = ebpo_fail_memory(error, 360 * r.count);
+        status = ebpo_fail_memory(error, 360 * r.count); /* about the sum of the sizes above */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         const uint64_t *row = table->row + EBPO_PATCH_COLUMNS * patches[i];
         for (uint64_t k = 0; k < row[EBPO_PATCH_FACES]; k++)

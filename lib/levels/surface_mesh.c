@@ -1,13 +1,12 @@
-/* Joins patches of the simplified surface to one mesh without cracks.
+/* Joins patches of the simplified surface to one mesh without cracks. A patch approximates the
+ * faces below a node (format/surface_patches.h).
  *
- * The border of a patch passes through cells that are EBPO_PATCH_CELLS levels below the patch's
- * node: its border cells. All vertices of a level's patches in one border cell are one vertex.
- * Patches are joined from coarse to fine: a vertex on the border of a finer patch is replaced by
- * the vertex of the coarsest border cell that contains it and has a vertex. Then both sides of a
- * border have the same vertices, because each vertex of the model on the border is in a border
- * cell, whose only vertex both sides use. Vertices of the model's faces are replaced in the same
- * way.
- * Source: format-spec/surface.md. */
+ * On its border, a patch has at most one vertex in each "border cell". The border cells are the
+ * cells EBPO_PATCH_CELLS levels below the patch's node. Patches are joined from coarse to fine.
+ * A vertex on the border of a finer patch is replaced by the vertex of the coarsest border cell
+ * that contains it, among the border cells in which a patch has a vertex. Each vertex of the model
+ * on the border is in such a border cell, so both sides of a border get the same vertices. Vertices
+ * of the model's faces are replaced in the same way. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,13 +29,15 @@ typedef struct joiner {
     const ebpo_patch_reader *reader;
     ebpo_box box;
     ebpo_surface_mesh *out;
-    uint64_t vertices, triangles; /* so far */
-    uint32_t *slot;               /* hash table of the vertices of cells */
-    uint64_t *key;                /* [slots] level and cell */
+    uint64_t vertices, triangles; /* numbers of vertices and triangles in `out` so far */
+    uint32_t *slot;               /* [slots] hash table: the vertex of a border cell, or NONE */
+    uint64_t *key;                /* [slots] the border cell (make_key) */
     uint64_t slots;
-    bool level_used[EBPO_PATCH_LEVEL + 1];
+    bool level_used[EBPO_PATCH_LEVEL + 1]; /* true: a patch of this level was joined */
 } joiner;
 
+/* Returns the key of a border cell: the level of the patch's node, and 19 bits (EBPO_PATCH_LEVEL +
+ * EBPO_PATCH_CELLS) for each coordinate. */
 static uint64_t make_key(int node_level, const uint32_t cell[3])
 {
     return (uint64_t)node_level << 58 | (uint64_t)cell[2] << 38 | (uint64_t)cell[1] << 19 | cell[0];
@@ -51,6 +52,7 @@ static uint64_t find_slot(const joiner *j, uint64_t key)
     return i;
 }
 
+/* Appends vertex v of a patch to the mesh; returns its new index. */
 static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
 {
     uint32_t to = (uint32_t)j->vertices++;
@@ -65,8 +67,8 @@ static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return to;
 }
 
-/* Searches the border cells that contain the point, on levels 0 to `levels` - 1, from coarse to
- * fine. Returns the vertex of the first cell that has a vertex, or NONE. */
+/* Returns the vertex of the coarsest border cell that contains the point and has a vertex, among
+ * border cells of patches of level 0 to `levels` - 1. Returns NONE if there is none. */
 static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
 {
     for (int level = 0; level < levels; level++) {
@@ -85,11 +87,11 @@ static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
     return NONE;
 }
 
-/* Returns the vertex that replaces a vertex on the border of a patch. */
+/* Returns the vertex of the mesh that replaces vertex v on the border of a patch. */
 static uint32_t join_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
 {
-    const int shift = EBPO_PATCH_GRID - EBPO_PATCH_CELLS;
-    double steps = ldexp(1, patch->level + EBPO_PATCH_GRID);
+    const int shift = EBPO_PATCH_GRID - EBPO_PATCH_CELLS;    /* from grid steps to border cells */
+    double steps = ldexp(1, patch->level + EBPO_PATCH_GRID); /* grid steps along the root cell */
     uint32_t cell[3];
     for (int k = 0; k < 3; k++) {
         double at = (patch->xyz[3 * v + (uint64_t)k] - j->box.origin[k]) / j->box.size[k] * steps;
@@ -98,9 +100,9 @@ static uint32_t join_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     for (int level = 0; level < patch->level; level++) {
         if (!j->level_used[level])
             continue;
-        int up = patch->level - level;
-        uint64_t i = find_slot(j, make_key(level, (uint32_t[3]){ cell[0] >> up, cell[1] >> up,
-                                                                 cell[2] >> up }));
+        int levels_up = patch->level - level;
+        uint32_t coarse[3] = { cell[0] >> levels_up, cell[1] >> levels_up, cell[2] >> levels_up };
+        uint64_t i = find_slot(j, make_key(level, coarse));
         if (j->slot[i] != NONE)
             return j->slot[i];
     }
@@ -112,23 +114,25 @@ static uint32_t join_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return j->slot[i];
 }
 
-static void add_triangles(joiner *j, const ebpo_patch *patch, const uint32_t *number)
+/* Adds the triangles of a patch, except triangles of which two corners became the same vertex.
+ * `mesh_vertex`: for each vertex of the patch, its vertex in the mesh. */
+static void add_triangles(joiner *j, const ebpo_patch *patch, const uint32_t *mesh_vertex)
 {
     for (uint64_t i = 0; i < patch->triangle_count; i++) {
         const uint32_t *t = patch->triangles + 3 * i;
-        uint32_t joined[3] = { number[t[0]], number[t[1]], number[t[2]] };
+        uint32_t joined[3] = { mesh_vertex[t[0]], mesh_vertex[t[1]], mesh_vertex[t[2]] };
         if (joined[0] != joined[1] && joined[1] != joined[2] && joined[2] != joined[0])
             memcpy(j->out->mesh.faces + 3 * j->triangles++, joined, sizeof joined);
     }
     j->out->error = fmax(j->out->error, patch->error);
 }
 
-static void add_patch(joiner *j, const ebpo_patch *patch, const bool *border, uint32_t *number)
+static void add_patch(joiner *j, const ebpo_patch *patch, const bool *border, uint32_t *mesh_vertex)
 {
     for (uint64_t v = 0; v < patch->vertex_count; v++)
-        number[v] = border[v] ? join_vertex(j, patch, v) : add_vertex(j, patch, v);
+        mesh_vertex[v] = border[v] ? join_vertex(j, patch, v) : add_vertex(j, patch, v);
     j->level_used[patch->level] = true;
-    add_triangles(j, patch, number);
+    add_triangles(j, patch, mesh_vertex);
 }
 
 static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
@@ -138,32 +142,32 @@ static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     bool *border = ebpo_alloc(patch.vertex_count, sizeof *border);
-    uint32_t *number = ebpo_alloc(patch.vertex_count, sizeof *number);
-    if (border && number &&
+    uint32_t *mesh_vertex = ebpo_alloc(patch.vertex_count, sizeof *mesh_vertex);
+    if (border && mesh_vertex &&
         ebpo_patch_mark_border(patch.triangles, patch.triangle_count, patch.vertex_count, border))
-        add_patch(j, &patch, border, number);
+        add_patch(j, &patch, border, mesh_vertex);
     else
-        status = ebpo_fail_memory(error, patch.vertex_count * 16);
+        status = ebpo_fail_memory(error, patch.vertex_count * 16); /* with the borders' edges */
     free(border);
-    free(number);
+    free(mesh_vertex);
     ebpo_patch_free(&patch);
     return status;
 }
 
-/* Adds faces of the model; vertices that no face uses any more remain. */
+/* Adds faces of the model. Vertices that no triangle uses after the join stay in the mesh. */
 static ebpo_status join_faces(joiner *j, const ebpo_patch *faces, ebpo_error *error)
 {
-    uint32_t *number = ebpo_alloc(faces->vertex_count, sizeof *number);
-    if (!number)
-        return ebpo_fail_memory(error, faces->vertex_count * sizeof *number);
+    uint32_t *mesh_vertex = ebpo_alloc(faces->vertex_count, sizeof *mesh_vertex);
+    if (!mesh_vertex)
+        return ebpo_fail_memory(error, faces->vertex_count * sizeof *mesh_vertex);
     for (uint64_t v = 0; v < faces->vertex_count; v++) {
-        number[v] = find_vertex(j, faces->xyz + 3 * v, EBPO_PATCH_LEVEL + 1);
-        if (number[v] == NONE)
-            number[v] = add_vertex(j, faces, v);
+        mesh_vertex[v] = find_vertex(j, faces->xyz + 3 * v, EBPO_PATCH_LEVEL + 1);
+        if (mesh_vertex[v] == NONE)
+            mesh_vertex[v] = add_vertex(j, faces, v);
     }
-    add_triangles(j, faces, number);
+    add_triangles(j, faces, mesh_vertex);
     j->out->faces = faces->triangle_count;
-    free(number);
+    free(mesh_vertex);
     return EBPO_OK;
 }
 
@@ -177,7 +181,7 @@ void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh)
     memset(mesh, 0, sizeof *mesh);
 }
 
-/* Counts vertices and triangles, and allocates the arrays. */
+/* Checks the indices of the patches, counts vertices and triangles, and allocates the arrays. */
 static ebpo_status begin_mesh(joiner *j, const uint64_t *patches, uint64_t count,
                               const ebpo_patch *faces, ebpo_error *error)
 {
@@ -186,7 +190,11 @@ static ebpo_status begin_mesh(joiner *j, const uint64_t *patches, uint64_t count
              triangles = faces ? faces->triangle_count : 0;
     for (uint64_t i = 0; i < count; i++) {
         if (patches[i] >= j->reader->count || (i && patches[i] <= patches[i - 1]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "patches: not ascending numbers of patches");
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "patches: item %llu is %llu; indices of patches must ascend, and the "
+                             "surface has %llu patches",
+                             (unsigned long long)i, (unsigned long long)patches[i],
+                             (unsigned long long)j->reader->count);
         const uint64_t *row = j->reader->row + EBPO_PATCH_COLUMNS * patches[i];
         vertices += row[EBPO_PATCH_VERTICES];
         triangles += row[EBPO_PATCH_TRIANGLES];
@@ -230,6 +238,7 @@ ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader, const uint64_t *p
     return status;
 }
 
+/* Patches of a surface in memory. */
 typedef struct decoding {
     const ebpo_surface *surface;
     const ebpo_info *info;
@@ -252,6 +261,7 @@ ebpo_status ebpo_surface_join(const ebpo_surface *surface, const ebpo_info *info
     return ebpo_patches_join(&reader, patches, count, NULL, out, error);
 }
 
+/* Patches of a file. */
 typedef struct reading {
     const ebpo_patch_table *table;
     ebpo_chunks *chunks;
@@ -284,7 +294,9 @@ ebpo_status ebpo_surface_select(const ebpo_surface *surface, int level, uint64_t
         return ebpo_fail_memory(error, surface->patch_count * sizeof **patches);
     for (uint64_t i = 0; i < surface->patch_count; i++) {
         ebpo_octcode code = surface->patch[EBPO_PATCH_COLUMNS * i + EBPO_PATCH_OCTCODE];
-        int of_node = ebpo_octcode_level(code);
+        int patch_level = ebpo_octcode_level(code);
+        /* Patches are sorted by octcode, so the children of patch i follow the children of patch
+         * i - 1. `child` is the first patch that is a child of patch i or of a later patch. */
         while (child < surface->patch_count &&
                ebpo_octcode_parent(
                    surface->patch[EBPO_PATCH_COLUMNS * child + EBPO_PATCH_OCTCODE]) < code)
@@ -292,7 +304,7 @@ ebpo_status ebpo_surface_select(const ebpo_surface *surface, int level, uint64_t
         bool divided = child < surface->patch_count &&
                        ebpo_octcode_parent(
                            surface->patch[EBPO_PATCH_COLUMNS * child + EBPO_PATCH_OCTCODE]) == code;
-        if (of_node == level || (of_node < level && !divided))
+        if (patch_level == level || (patch_level < level && !divided))
             (*patches)[(*count)++] = i;
     }
     return EBPO_OK;

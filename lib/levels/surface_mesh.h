@@ -1,4 +1,5 @@
-/* Joins patches of the simplified surface, and faces of the model, to one mesh. */
+/* Joins patches of the simplified surface, and faces of the model, to one mesh. A patch
+ * approximates the faces below a node by few triangles (format/surface_patches.h). */
 #ifndef EBPO_LEVELS_SURFACE_MESH_H
 #define EBPO_LEVELS_SURFACE_MESH_H
 
@@ -6,24 +7,25 @@
 
 #include "format/patch_table.h"
 
-/* Reads patches by their indices. `row`: [EBPO_PATCH_COLUMNS] of each patch. */
+/* Reads patches by their indices. */
 typedef struct ebpo_patch_reader {
     const ebpo_info *info;
     ebpo_status (*read)(const void *user, uint64_t patch, ebpo_patch *out, ebpo_error *error);
-    const void *user;
-    const uint64_t *row;
-    uint64_t count;
-    bool coloured;
+    const void *user;    /* argument of `read` */
+    const uint64_t *row; /* [count][EBPO_PATCH_COLUMNS] row of each patch in the table of patches */
+    uint64_t count;      /* of all patches */
+    bool coloured;       /* patches have colours */
 } ebpo_patch_reader;
 
-/* Does what ebpo_surface_join does. `faces`: faces that replace other patches, or NULL; its level
- * and position are ignored. */
+/* Joins patches as ebpo_surface_join does. `patches`: [count] ascending indices. `faces`: faces of
+ * the model that replace patches which are not in `patches`, or NULL; faces->level and the position
+ * of this patch are ignored. */
 EBPO_MUST_USE ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader,
                                             const uint64_t *patches, uint64_t count,
                                             const ebpo_patch *faces, ebpo_surface_mesh *out,
                                             ebpo_error *error);
 
-/* The same for patches of a file. */
+/* Joins patches, which are read from a file, as ebpo_patches_join does. */
 EBPO_MUST_USE ebpo_status ebpo_table_join(const ebpo_patch_table *table, ebpo_chunks *chunks,
                                           const uint64_t *patches, uint64_t count,
                                           const ebpo_patch *faces, ebpo_surface_mesh *out,

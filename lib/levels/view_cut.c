@@ -2,13 +2,14 @@
  * without delivered children.
  *
  * - A viewpoint is a prepared observer. It gives the distance of a cell, the cell's size in pixels,
- *   the cell's visibility in the frustum, and the priority key of a node. Comparisons allow for
- *   rounding: a barely visible cell counts as visible.
+ *   the cell's visibility in the frustum, and the priority key of a node. Because of rounding, a
+ *   cell that is just outside the frustum may count as visible.
  * - The partial tree holds the delivered groups (eight siblings each). A group is linked to its
  *   parent after all nodes of the group have been delivered.
- * - The frontier holds the gray nodes of the cut in a binary heap, whose first node is refined
- *   next. Nodes are ordered by turn (visible, not visible, never refined), then by key, then by
- *   octcode (locational code). No two nodes have the same octcode, so the order is deterministic.
+ * - The frontier holds the gray nodes of the cut in a binary heap. The first node of the heap is
+ *   refined next, that is, replaced in the cut by its children. Nodes are ordered by turn (visible,
+ *   not visible, never refined), then by key, then by octcode (locational code). No two nodes have
+ *   the same octcode, so the order is deterministic.
  */
 #include "core/strict_fp.h"
 
@@ -25,8 +26,8 @@
 
 /* --- the observer --- */
 
-/* Bound of the relative rounding error of a sum of three products. The bound has a large margin, so
- * that barely visible cells count as visible. */
+/* A bound, with a large margin, of the relative rounding error of a sum of three products. Within
+ * this error, a cell counts as visible. */
 static const double SLACK = 1e-12;
 
 /* Scales a vector of any length to length 1; returns false for (0, 0, 0). */
@@ -79,7 +80,7 @@ static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, doubl
     if (ebpo_vec3_dot(side[0], side[0]) < 1e-12 || !normalise_vector(side[0], side[0]))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the observer's upward direction is parallel to the viewing direction; "
-                         "give another one");
+                         "give another upward direction");
     ebpo_vec3_cross(side[0], forward, side[1]);
     double tangents[2] = { tangent * ((double)o->width / o->height), tangent };
     for (int i = 0; i < 2; i++)
@@ -101,6 +102,7 @@ ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
     if (status != EBPO_OK)
         return status;
     int exponent;
+    /* the unit: the power of two above the longest side of the root cell */
     (void)frexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), &exponent);
     out->has_observer = true;
     out->unit = ldexp(1, exponent);
@@ -165,26 +167,25 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
     return octant;
 }
 
-/* Returns a key that consists of the octants on the path from the root. Each octant is relative to
- * the octant of the eye (ebpo_viewpoint_octant), so ascending keys give the order from front to
- * back. */
+/* Returns a key for the order from front to back. The key has three bits for each level of the path
+ * from the root: the octant of the path ^ the octant of the eye (ebpo_viewpoint_octant). */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
     uint64_t key = 0;
     for (int i = 0; i < level; i++) {
-        int below = level - i;
-        ebpo_cell above = { i, { cell.at[0] >> below, cell.at[1] >> below, cell.at[2] >> below } };
-        unsigned octant = octcode >> 3 * (below - 1) & 7;
-        key |= (uint64_t)(octant ^ ebpo_viewpoint_octant(s, box, above))
+        int up = level - i;
+        ebpo_cell ancestor = { i, { cell.at[0] >> up, cell.at[1] >> up, cell.at[2] >> up } };
+        unsigned octant = octcode >> 3 * (up - 1) & 7;
+        key |= (uint64_t)(octant ^ ebpo_viewpoint_octant(s, box, ancestor))
                << 3 * (EBPO_MAX_LEVEL - 1 - i);
     }
     return key;
 }
 
-/* Returns the bits of a nonnegative double. As integers, the bits have the same order as the
- * doubles. */
+/* Returns the bits of a nonnegative double as an integer. Integers of greater doubles are greater.
+ */
 static uint64_t double_bits(double v)
 {
     uint64_t out;
@@ -215,11 +216,14 @@ void ebpo_partial_free(ebpo_partial *partial)
     memset(partial, 0, sizeof *partial);
 }
 
+/* Reserves space for one more group with this number of plane codes. */
 static ebpo_status reserve_space(ebpo_partial *g, unsigned codes, ebpo_error *error)
 {
     if (g->group_count >= UINT32_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "more nodes than a view can hold; give a deepest level or a budget");
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "more nodes than a view can hold; set a deepest level, or a limit of nodes "
+            "or bytes, in the view's options");
     if (!ebpo_grow(&g->group, &g->group_capacity, g->group_count + 1, sizeof *g->group) ||
         !ebpo_grow(&g->codes, &g->code_capacity, g->code_count + codes, sizeof *g->codes) ||
         (g->windings &&
@@ -234,11 +238,12 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
 {
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
     uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
-    /* Without this check, a damaged index could assign one group to many parents without end. */
+    /* A damaged index may assign one group to many parents. Without this check, the view would then
+     * never end. */
     if (grays > info->level[level].gray_count - g->grays[level])
         return ebpo_fail(
             error, EBPO_E_FORMAT,
-            "level %d: its index gives more gray nodes than the header states; run ebpo verify",
+            "level %d: the index has more gray nodes than the header states; run ebpo verify",
             level);
     ebpo_status status = reserve_space(g, read->code_count, error);
     if (status != EBPO_OK)
@@ -298,6 +303,7 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_n
 
 /* --- the frontier --- */
 
+/* Returns true if node a is refined before node b. */
 static bool waits_before(const ebpo_waiting *a, const ebpo_waiting *b)
 {
     if (a->turn != b->turn)
@@ -356,9 +362,9 @@ void ebpo_frontier_restore(ebpo_frontier *f)
         sink_down(f, i);
 }
 
-/* Collects in a hash table the blocks that contain children of the frontier's nodes, and for each
- * block its node that is refined first. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of
- * other blocks are skipped. */
+/* Collects the blocks of the frontier's nodes in a hash table, with the node of each block that is
+ * refined first. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of further blocks are
+ * skipped. At the end, sorts the nodes of the table. */
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
                               uint64_t best[EBPO_FRONTIER_BLOCKS])
 {
@@ -373,7 +379,7 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         const ebpo_waiting *w = &f->at[i];
         if (w->turn == EBPO_TURN_NEVER)
             continue;
-        /* The block's number includes the level, so the number is not 0. */
+        /* The block's number includes the level in its lower six bits, so it is never 0. */
         uint64_t block =
             (w->child_group / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at;

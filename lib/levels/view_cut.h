@@ -1,6 +1,7 @@
 /* Declares the state of a view (view_cut.c): the observer, the delivered part of the tree, and the
- * frontier. The cut consists of the delivered nodes whose children are not delivered; the frontier
- * consists of the gray nodes of the cut. */
+ * frontier. The "cut" is the set of the delivered nodes whose children have not been delivered. The
+ * "frontier" is the set of those gray nodes of the cut that have children in the file. To refine a
+ * node means to replace it in the cut by its children. */
 #ifndef EBPO_LEVELS_VIEW_CUT_H
 #define EBPO_LEVELS_VIEW_CUT_H
 
@@ -21,44 +22,49 @@ typedef struct ebpo_viewpoint {
     bool has_observer; /* false: there is no observer */
     bool no_frustum;   /* the observer has no frustum, so every cell is visible */
     double eye[3];     /* in the model's unit */
-    double unit;       /* size of the unit of length, in the model's unit */
+    double unit;       /* the unit of length of the members below, in the model's unit */
     double focal;      /* size in pixels of a length of 1 at a distance of 1 */
-    /* normals of the four side planes of the frustum, and of the plane parallel to the picture; all
-     * five planes pass through the eye */
+    /* inward normals of the four side planes of the frustum, and of the plane parallel to the
+     * picture; all five planes pass through the eye */
     double inward[5][3];
-    double diagonal2[EBPO_LEVELS_MAX]; /* squared diagonal of the cells of each level */
+    double diagonal2[EBPO_LEVELS_MAX]; /* squared diagonal of a cell of each level */
 } ebpo_viewpoint;
 
 /* Prepares an observer; `observer` may be NULL. Returns EBPO_E_ARGUMENT for an invalid observer. */
 EBPO_MUST_USE ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
                                               const ebpo_observer *observer, ebpo_error *error);
 
+/* How a cell is seen by the observer. */
 typedef struct ebpo_seen {
-    double distance2; /* squared distance from the eye to the cell's nearest point */
+    double distance2; /* squared distance from the eye to the cell's nearest point, in `unit`^2 */
     bool seen;        /* false: the cell does not intersect the frustum */
 } ebpo_seen;
+/* Returns how a cell is seen. Without an observer, every cell is seen at distance 0. */
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *box, ebpo_cell cell);
 
 /* Converts a squared distance of ebpo_viewpoint_see to a distance in the model's unit. Returns NAN
  * without an observer. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
-/* Returns the size in pixels of a length at a distance. Returns NAN without an observer. */
+/* Returns the size in pixels of a length (in the model's unit) at a distance. Returns NAN without
+ * an observer. */
 double ebpo_viewpoint_length(const ebpo_viewpoint *viewpoint, double length, double distance2);
 /* Returns the size in pixels of a cell's diagonal at the cell's distance. Returns NAN without an
  * observer. */
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
 
-/* Returns the octant e of the cell that contains the eye or is nearest to it. No ray from the eye
- * to a child p passes through a child o if o ^ e has a bit that p ^ e lacks. */
+/* Returns the octant e of the cell that contains the eye or is nearest to the eye. With children in
+ * ascending order of (octant ^ e), no child hides an earlier one: no ray from the eye to a child p
+ * passes through a child o if o ^ e has a bit that p ^ e lacks. */
 unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                                ebpo_cell cell);
 
-/* Returns the priority key of a node: the node with the least key comes first. Only the keys of
- * cells that do not contain each other may be compared. */
+/* Returns the priority key of a node: the node with the least key comes first. Keys may be compared
+ * only if none of the two cells contains the other one. */
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
 
-/* Makes the mesh of ebpo_view_stream_surface. Reads the table of patches when it is needed. */
+/* Makes the mesh of ebpo_view_stream_surface. Reads the table of patches if `table` is still empty.
+ */
 EBPO_MUST_USE ebpo_status ebpo_view_surface(ebpo_patch_table *table, ebpo_chunks *chunks,
                                             const ebpo_viewpoint *viewpoint,
                                             const ebpo_view_options *options,
@@ -69,20 +75,20 @@ EBPO_MUST_USE ebpo_status ebpo_view_surface(ebpo_patch_table *table, ebpo_chunks
 /* A group of siblings. The group is linked to its parent (`child` of the parent's group) after all
  * nodes of the group have been delivered. */
 typedef struct ebpo_partial_group {
-    uint64_t parent;     /* octcode (locational code); 0: the root's group */
-    uint64_t first_gray; /* rank in its level of the group's first gray node */
-    uint64_t first_code; /* index into codes */
-    uint32_t child[8];   /* index of the group of each octant's children; 0: not delivered */
-    uint16_t types;
-    uint8_t plane_count[8];
+    uint64_t parent;        /* octcode (locational code) of the parent; 0: the root's group */
+    uint64_t first_gray;    /* rank in its level of the group's first gray node */
+    uint64_t first_code;    /* index in `codes` of the group's first plane code */
+    uint32_t child[8];      /* index of the group of each octant's children; 0: not linked */
+    uint16_t types;         /* two bits for each octant (geometry/level_nodes.h) */
+    uint8_t plane_count[8]; /* number of plane codes of each octant */
 } ebpo_partial_group;
 
 typedef struct ebpo_partial {
-    ebpo_partial_group *group; /* group 0 is the root's */
-    uint32_t *codes;
-    int32_t (*winding)[8]; /* winding numbers of each group; NULL: not requested */
+    ebpo_partial_group *group; /* [group_count] group 0 is the root's */
+    uint32_t *codes;           /* [code_count] plane codes of all groups */
+    int32_t (*winding)[8];     /* [group_count] winding numbers of the nodes; see `windings` */
     uint64_t group_count, group_capacity, winding_capacity, code_count, code_capacity;
-    bool windings;
+    bool windings; /* false: no winding numbers are requested, and `winding` is NULL */
     /* number of delivered gray nodes of each level; in a damaged file, it could exceed the number
      * in the header */
     uint64_t grays[EBPO_LEVELS_MAX];
@@ -107,14 +113,16 @@ static inline uint64_t ebpo_partial_octcode(const ebpo_partial *g, ebpo_partial_
     return parent ? ebpo_octcode_child(parent, node.octant) : 1;
 }
 
-/* Returns the group of a gray node's children in the next level of the file. */
+/* Returns the index of the group of a gray node's children among the groups of the next level in
+ * the file. */
 static inline uint64_t ebpo_partial_children(const ebpo_partial *g, ebpo_partial_node gray)
 {
     return g->group[gray.group].first_gray +
            ebpo_group_count(g->group[gray.group].types, EBPO_GRAY, gray.octant);
 }
 
-/* Appends a group, without linking it. */
+/* Appends the group `read` as the children of the node with octcode `parent` (0: as the root's
+ * group), without linking it to its parent. */
 EBPO_MUST_USE ebpo_status ebpo_partial_add(ebpo_partial *partial, const ebpo_info *info,
                                            uint64_t parent, const ebpo_group *read,
                                            ebpo_error *error);
@@ -130,14 +138,16 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_par
 
 /* --- the frontier: the gray nodes of the cut in a heap, the next one to refine on top --- */
 
-/* Class of a node in the order of refinement. */
+/* Class of a node in the order of refinement: visible nodes first, then nodes outside the frustum.
+ * EBPO_TURN_NEVER: the node is not refined, because a limit of the view's options excludes it. */
 typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebpo_turn;
 
+/* A node of the frontier. Nodes are ordered by turn, then by key, then by octcode. */
 typedef struct ebpo_waiting {
-    uint64_t key, octcode; /* nodes are ordered by turn, then by key, then by octcode */
-    uint64_t child_group;  /* index of the children's group in the children's level */
-    uint32_t group;
-    uint8_t octant, turn; /* turn: ebpo_turn */
+    uint64_t key, octcode; /* key: ebpo_viewpoint_key */
+    uint64_t child_group;  /* ebpo_partial_children; view_surface.c: index of a patch */
+    uint32_t group;        /* `group` and `octant` are the node's ebpo_partial_node */
+    uint8_t octant, turn;  /* turn: ebpo_turn */
 } ebpo_waiting;
 
 typedef struct ebpo_frontier {
@@ -154,10 +164,11 @@ void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
 /* Restores the heap after keys or turns have changed. */
 void ebpo_frontier_restore(ebpo_frontier *frontier);
-/* A block is `span` neighbouring groups of a level. A node of the frontier belongs to the block of
- * its children's group. For each block, finds the node that will be refined first. Writes the
- * indices of these nodes in frontier->at to `best`, in the order of refinement, beginning with the
- * top. Returns the number of indices, at most EBPO_FRONTIER_BLOCKS. */
+/* A block is `span` neighbouring groups of a level. A node of the frontier belongs to the block
+ * that has its children's group. For each block, finds the node of the frontier that will be
+ * refined first. Writes the indices of these nodes in frontier->at to `best`, in the order of
+ * refinement, so best[0] is the top. Returns the number of indices, at most EBPO_FRONTIER_BLOCKS.
+ */
 enum { EBPO_FRONTIER_BLOCKS = 1024 };
 unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
                               uint64_t best[EBPO_FRONTIER_BLOCKS]);

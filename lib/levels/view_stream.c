@@ -1,13 +1,15 @@
 /* Delivers a view: one group of siblings after the other, in the order of the view's priority,
  * until the view's limits are reached.
  *
- * Each step takes the top of the frontier (view_cut.h), reads the group of its children, with the
- * faces of leaves if they are requested, and returns the siblings. After the last sibling, the
+ * The cut of the view is the set of the delivered nodes without delivered children; the frontier is
+ * the set of gray nodes of the cut, in the order in which they are refined (view_cut.h). Each step
+ * takes the first node of the frontier, reads the group of its children, with the faces of leaves
+ * if faces are requested, and returns these siblings one by one. After the last sibling, the
  * siblings replace their parent in the cut. When the observer changes, the frontier is sorted
  * again; delivered nodes stay.
  *
  * For remote files, the chunks that a group needs are requested in one batch. The batch also has
- * the chunks of the groups that follow, as far as the reader's memory allows. */
+ * the chunks of the groups that follow, as far as the memory for chunks allows. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,17 +27,17 @@
 #include "geometry/cells.h"
 #include "levels/view_cut.h"
 
-/* Leaves among the current siblings, and flags of delivered faces. */
+/* Faces of the leaves among the current siblings, and flags of delivered faces. */
 typedef struct view_leaves {
     const ebpo_info *info;
     ebpo_slice slice[8]; /* faces of the leaves among the siblings, by octant */
     uint8_t *delivered;  /* bit f: face f was delivered */
     /* Faces of the last returned leaf, valid until the next node is returned. */
     double (*corners)[3][3];
-    uint32_t *numbers; /* indices of the faces in the file */
-    uint8_t *repeated; /* 1: the face was delivered before */
-    uint64_t capacity[3];
-    ebpo_view_faces current; /* refers to the arrays above */
+    uint32_t *numbers;       /* indices of the faces in the file */
+    uint8_t *repeated;       /* 1: the face was delivered before */
+    uint64_t capacity[3];    /* of corners, numbers and repeated, in faces */
+    ebpo_view_faces current; /* refers to these three arrays */
 } view_leaves;
 
 /* A group of siblings; `parent` is an octcode (locational code), 0 for the root's group. */
@@ -44,7 +46,8 @@ typedef struct view_group {
     uint64_t parent;
 } view_group;
 
-/* Function that returns the first level below a node that the view will not visit soon. */
+/* A function that returns the first level below a node (given by its octcode) that the view will
+ * not visit soon. */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
@@ -54,21 +57,21 @@ struct ebpo_view_stream {
     const ebpo_file *file;
     const ebpo_info *info;
     ebpo_box box;
-    ebpo_view_options options; /* observer: NULL, or `observer` below */
+    ebpo_view_options options; /* options.observer is NULL or &observer */
     ebpo_observer observer;
-    ebpo_viewpoint viewpoint;
+    ebpo_viewpoint viewpoint; /* prepared from `observer` */
     ebpo_chunks *chunks;
     ebpo_partial partial;
     ebpo_frontier frontier;     /* gray nodes of the cut, except `parent` */
     bool delivering;            /* true while the last group of `partial` is being delivered */
     ebpo_waiting parent;        /* of the group being delivered; unused for the root's group */
-    unsigned step, octant_mask; /* the next octant is step ^ octant_mask */
+    unsigned step, octant_mask; /* the next sibling to deliver has the octant step ^ octant_mask */
     uint64_t delivered, cut[4]; /* number of delivered nodes; nodes of each type in the cut */
-    ebpo_group read;
-    ebpo_envelope_stack *envelopes; /* if polygons are requested */
-    ebpo_node_buffers buffers;
-    view_leaves *leaves; /* if faces are requested */
-    /* nodes that are deeper than this level, or smaller in pixels, are not prefetched yet */
+    ebpo_group read;            /* the group being delivered, as read from the file */
+    ebpo_envelope_stack *envelopes; /* NULL if no polygons are requested */
+    ebpo_node_buffers buffers;      /* arrays of the last returned node */
+    view_leaves *leaves;            /* NULL if no faces are requested */
+    /* nodes below soon_level, or smaller than soon_pixels pixels, are not prefetched yet */
     int soon_level;
     double soon_pixels;
     ebpo_patch_table patches; /* read by ebpo_view_stream_surface */
@@ -80,7 +83,7 @@ static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebp
     *out = NULL;
     if (!(info->parts & EBPO_PART_MESH))
         return ebpo_fail(error, EBPO_E_ABSENT,
-                         "view options: faces are requested, and the file was written without "
+                         "view options: faces are requested, but the file was written without "
                          "its mesh; build it again with the mesh");
     view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
     if (l)
@@ -112,7 +115,8 @@ static void view_leaves_free(view_leaves *l)
     free(l);
 }
 
-/* Returns the node of an octant in a group that has been read, if it is a leaf. */
+/* If the node of this octant is a leaf, writes the node to *out and returns true. `read` has the
+ * data of `group`. */
 static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsigned octant,
                           ebpo_node *out)
 {
@@ -138,7 +142,7 @@ static ebpo_status reserve_space(view_leaves *l, uint64_t faces, ebpo_error *err
                  : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->numbers + 1));
 }
 
-/* Reads the faces of all leaves of a group. After a failure there are none. */
+/* Reads the faces of all leaves of a group. After a failure, no leaf has faces. */
 static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const view_group *group,
                                     const ebpo_group *read, ebpo_error *error)
 {
@@ -192,7 +196,7 @@ static void set_faces(view_leaves *l, unsigned octant)
 
 /* --- fetching: requests --- */
 
-/* Data that the functions of these sections need. */
+/* Data that the functions of the sections "fetching" need. */
 typedef struct fetching {
     ebpo_chunks *chunks;
     const ebpo_partial *partial;
@@ -208,20 +212,22 @@ static view_group children_of(const ebpo_waiting *w)
     return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->child_group }, w->octcode };
 }
 
-/* Lists the next group (`first`) and groups that follow soon. Lists one group for each block of
- * `block` neighbouring groups. Returns the number of listed groups. */
-static unsigned coming_groups(const fetching *f, const view_group *first, unsigned block,
+/* Lists the group to deliver next (`first`) and groups that follow soon: one group for each block
+ * of `span` neighbouring groups of a level. Returns the number of listed groups. */
+static unsigned coming_groups(const fetching *f, const view_group *first, unsigned span,
                               view_group groups[EBPO_FRONTIER_BLOCKS])
 {
     uint64_t best[EBPO_FRONTIER_BLOCKS];
-    unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
-    groups[0] = *first;
-    for (unsigned i = 0; i < count; i++) /* the first of them is again `first` */
+    unsigned count = ebpo_frontier_blocks(f->frontier, span, best);
+    if (count == 0)
+        groups[0] = *first;              /* the root's group; the frontier is empty */
+    for (unsigned i = 0; i < count; i++) /* groups[0] is `first` */
         groups[i] = children_of(&f->frontier->at[best[i]]);
     return count ? count : 1;
 }
 
-/* Reads all data of a group from memory, only to record which chunks are missing. */
+/* Reads all data of a group that is in memory, only to record which chunks are missing
+ * (ebpo_chunks_collect). */
 static void try_group(const fetching *f, const view_group *group)
 {
     ebpo_group read;
@@ -255,8 +261,8 @@ static uint64_t subtree_of(const fetching *f, const view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-/* SUBTREES_MAX limits a list of subtrees. If the view enters more subtrees than
- * SUBTREES_WITH_FACES, their faces are not collected. */
+/* SUBTREES_MAX: length of a list of subtrees. If faces are requested and the view enters more than
+ * SUBTREES_WITH_FACES subtrees, try_subtrees collects nothing. */
 enum { SUBTREES_MAX = 4096, SUBTREES_WITH_FACES = 64 };
 
 /* A subtree that the view enters, by its index and root. */
@@ -269,8 +275,8 @@ typedef struct subtree_list {
     view_subtree list[SUBTREES_MAX];
 } subtree_list;
 
-/* Lists the subtrees of these groups, each subtree once. Without faces, skips the groups directly
- * below a subtree's root, because list_frontier_subtrees lists their subtrees. */
+/* Lists the subtrees of these groups, each subtree once. If no faces are requested, skips the
+ * groups directly below a subtree's root, because list_frontier_subtrees lists their subtrees. */
 static void list_group_subtrees(const fetching *f, const view_group *groups, unsigned count,
                                 subtree_list *e)
 {
@@ -287,8 +293,9 @@ static void list_group_subtrees(const fetching *f, const view_group *groups, uns
     }
 }
 
-/* Lists the subtrees that the view will enter from a node above them. Where types of intermediate
- * levels are not in memory, their chunks are recorded as missing. */
+/* Lists the subtrees that the view will enter below a node; `children` is the group of the node's
+ * children, above the roots of subtrees or at them. If the node types of a level in between are not
+ * in memory, their chunks are recorded as missing. */
 static void list_descendant_subtrees(const fetching *f, const view_group *children, subtree_list *e)
 {
     int level = children->number.level;
@@ -308,8 +315,8 @@ static void list_descendant_subtrees(const fetching *f, const view_group *childr
     }
 }
 
-/* Lists the subtrees that the view will enter from visible nodes of the frontier. These nodes are
- * at the subtrees' roots or above. */
+/* Lists the subtrees that the view will enter from those visible nodes of the frontier that are
+ * roots of subtrees or above such roots. */
 static void list_frontier_subtrees(const fetching *f, subtree_list *e)
 {
     int level = f->chunks->file->info.subtree_level;
@@ -324,9 +331,9 @@ static void list_frontier_subtrees(const fetching *f, subtree_list *e)
 }
 
 /* Collects all chunks that the view needs from the subtrees of these groups, up to `byte_limit`
- * bytes. Returns false if it collected none. Then the caller collects only the chunks of the next
- * groups. This happens if the groups are in no subtree and, with faces, if the view enters so many
- * subtrees that none will be completed soon. */
+ * bytes. Returns false if it collected none: if the groups are in no subtree, or if faces are
+ * requested and the view enters so many subtrees that none will be completed soon. The caller then
+ * collects only the chunks of the next groups. */
 static bool try_subtrees(const fetching *f, const view_group *groups, unsigned count,
                          const ebpo_chunk_keys *keys, uint64_t byte_limit)
 {
@@ -351,13 +358,14 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
 
 /* --- fetching --- */
 
-/* Collects the missing chunks of the group. Unless all of these were prefetched, also collects the
- * missing chunks of the next groups. So the view uses the chunks of one batch before it requests
- * the next batch. Returns the number of the group's missing chunks. */
+/* Collects the missing chunks of the group in `keys`, and returns their number. If all of these
+ * chunks were prefetched with an earlier batch, collects nothing else: so the view uses the chunks
+ * of one batch before it requests the next batch. Otherwise also collects the missing chunks of the
+ * groups that follow. */
 static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
-    /* With faces, one group of each block of FACES_BLOCK groups is listed. At most TRIED groups are
-     * tried, because each try takes time. */
+    /* With faces, the list of following groups has one group of each FACES_BLOCK neighbouring
+     * groups. At most TRIED groups are tried, because each try takes time. */
     enum { FACES_BLOCK = 64, TRIED = 64 };
     view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys_begin(keys);
@@ -376,8 +384,8 @@ static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_
 }
 
 /* Fetches the chunks in passes, because the chunks of one pass show which chunks the next pass
- * needs: face lists, references, faces, vertices, and the ranks between them. Chunks that are
- * missing after the last pass are read one by one. */
+ * needs: face lists, then the faces that they name, then the faces' vertices, and the ranks in
+ * between. Chunks that are missing after the last pass are read one by one. */
 static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_error *error)
 {
     enum { PASSES = 12 };
@@ -407,10 +415,10 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
     return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
 }
 
-/* Fetches the missing chunks of a remote file that have the wanted data (EBPO_GROUP_...) of the
- * group and, with `faces`, of its leaves. Also prefetches the chunks of the next groups of the
- * frontier. If the file has a table of subtrees, prefetches all chunks of the groups' subtrees.
- * When the limit of bytes is exceeded, returns EBPO_E_LIMIT as ebpo_group_read does. */
+/* Fetches the missing chunks of a remote file that have the `wanted` data (EBPO_GROUP_...) of the
+ * group and, with `faces`, the faces of its leaves. Also prefetches the chunks of the groups that
+ * follow. If the file has a table of subtrees, prefetches all chunks of the groups' subtrees. When
+ * the limit of bytes is exceeded, returns EBPO_E_LIMIT as ebpo_group_read does. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                const ebpo_frontier *frontier, const view_group *group,
                                unsigned wanted, bool faces, const view_depth *depth,
@@ -424,8 +432,8 @@ static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                                                     : status;
 }
 
-/* Least memory of a view, in bytes. With less memory than for one group's chunks and their
- * neighbours, every group would read all of these chunks again. */
+/* Least memory of a view, in bytes. With less memory than one group's chunks need, every group
+ * would read all chunks again. */
 enum { MEMORY_LEAST = 1 << 20 };
 
 /* --- options --- */
@@ -453,6 +461,8 @@ static ebpo_status check_options(const ebpo_view_options *o, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Checks the options and copies them, with the observer, to the stream. After a failure, the stream
+ * is unchanged. */
 static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *options,
                                 ebpo_error *error)
 {
@@ -519,7 +529,7 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
 
 /* --- the next group --- */
 
-/* Returns a node's class in the order of refinement, from its level and its sight. */
+/* Returns the class of a node (of this level, and seen like this) in the order of refinement. */
 static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen sight)
 {
     const ebpo_view_options *o = &s->options;
@@ -567,6 +577,7 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
+/* Reads a group and the faces of its leaves; missing chunks are read one by one. */
 static ebpo_status read_now(ebpo_view_stream *s, const view_group *group, unsigned wanted,
                             ebpo_error *error)
 {
@@ -588,9 +599,9 @@ static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned 
     return status == EBPO_OK && missing.count == 0;
 }
 
-/* If a view ends at a number of bytes or nodes, the depth at which it will end is unknown. Then a
+/* If a view ends at a number of bytes or nodes, the level at which it will end is unknown. Then a
  * node is not prefetched yet if it is more than SOON_LEVELS levels deeper than the next node, or
- * smaller in pixels by more than this power of two. */
+ * (in the order of pixels) smaller than the next node by a factor of more than 2^SOON_LEVELS. */
 enum { SOON_LEVELS = 2 };
 
 /* Sets the limits of what is prefetched; `next` is the octcode of the next node to refine. */
@@ -615,8 +626,8 @@ static bool is_distant(const ebpo_view_stream *s, int level, ebpo_seen sight)
             ebpo_viewpoint_pixels(&s->viewpoint, level, sight.distance2) < s->soon_pixels);
 }
 
-/* Returns the first level at which no descendant of the node will be refined soon, even at the
- * node's own distance from the eye. */
+/* Returns the first level at which no descendant of the node will be refined soon, even if the
+ * descendant is as near to the eye as the node. */
 static int depth_of_view(const void *user, uint64_t octcode)
 {
     const ebpo_view_stream *s = user;
@@ -646,9 +657,10 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
-/* Begins to deliver the root, or the children of the frontier's top. Sets `end` if the view ends
- * here. If the top is a pruned node (whose children are not in the file), only takes it from the
- * frontier: the node stays in the cut, and the caller calls this function again. */
+/* Begins to deliver the root, or the children of the frontier's first node. Sets `end` if the view
+ * ends here. If the first node is a pruned node (whose children are not in the file), only removes
+ * the node from the frontier; the node stays in the cut, and the caller calls this function again.
+ */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
@@ -657,6 +669,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         *end = EBPO_VIEW_DONE;
         return EBPO_OK;
     }
+    /* The group would exceed the limit of nodes. */
     if (s->options.nodes &&
         (root ? 1 : 8) > s->options.nodes -
                              (s->delivered < s->options.nodes ? s->delivered : s->options.nodes)) {
@@ -665,8 +678,8 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     }
     if (!root)
         group = children_of(&s->frontier.at[0]);
-    ebpo_error why = EBPO_ERROR_INIT;
-    ebpo_status status = read_group(s, &group, &why);
+    ebpo_error failure = EBPO_ERROR_INIT;
+    ebpo_status status = read_group(s, &group, &failure);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {
         *end = EBPO_VIEW_BYTES;
         return EBPO_OK;
@@ -676,13 +689,13 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         return EBPO_OK;
     }
     if (status == EBPO_OK)
-        status = ebpo_frontier_reserve(&s->frontier, 8, &why);
+        status = ebpo_frontier_reserve(&s->frontier, 8, &failure);
     if (status == EBPO_OK)
         status = ebpo_partial_add(&s->partial, s->info, root ? 0 : s->frontier.at[0].octcode,
-                                  &s->read, &why);
+                                  &s->read, &failure);
     if (status != EBPO_OK) {
         if (error)
-            *error = why;
+            *error = failure;
         return status;
     }
     s->octant_mask = 0;
@@ -697,7 +710,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     return EBPO_OK;
 }
 
-/* Replaces the parent in the cut by its children, which have all been delivered. */
+/* Replaces the parent in the cut by its children, after all of them have been delivered. */
 static void end_group(ebpo_view_stream *s)
 {
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
@@ -725,7 +738,7 @@ static void end_group(ebpo_view_stream *s)
 
 /* --- nodes --- */
 
-/* Fills in a node of `partial`; the caller sets `complete`. */
+/* Fills in *out for a delivered node; the caller sets out->complete. */
 static void fill_node(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
 {
     ebpo_node_type type = ebpo_partial_type(&s->partial, node);
@@ -777,13 +790,13 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
 
 typedef struct visitor {
     ebpo_view_stream *stream;
-    ebpo_view_visit_fn visit;
+    ebpo_view_visit_fn visit; /* called with `user` and a node */
     void *user;
-    ebpo_view_node node;
+    ebpo_view_node node; /* filled in for the call of `visit` */
 } visitor;
 
-/* Visits the nodes of the cut below a node, or the node itself, from front to back. Returns false
- * to stop. */
+/* Visits the node if it is in the cut, otherwise the nodes of the cut below it, from front to back.
+ * Returns false if `visit` returned false; then no further node is visited. */
 static bool visit_node(visitor *v, ebpo_partial_node node)
 {
     const ebpo_partial *partial = &v->stream->partial;
@@ -810,7 +823,7 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
         (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
 }
 
-/* Adds a gray node of the cut to the statistics. */
+/* Adds a gray node of the cut to the greatest size in pixels and the number of waiting nodes. */
 static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);

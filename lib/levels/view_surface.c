@@ -1,9 +1,11 @@
 /* Chooses patches of the simplified surface for an observer, reads them, and joins them to a mesh.
+ * A patch approximates the faces below a node (format/surface_patches.h).
  *
  * The choice begins with the patch of the root. The patch with the greatest error in the image is
  * replaced by the patches of its node's children, until no error is greater than options.pixels.
- * The errors are in the table of patches, so only chosen patches are read. With a limit of bytes,
- * the choice ends before the chunks of the next patches would exceed it. */
+ * A patch without patches below is replaced by the model's faces, if options.faces is true. The
+ * errors are in the table of patches, so only chosen patches are read. With a limit of bytes, the
+ * choice ends before the chunks of the next patches would exceed the limit. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,9 +24,9 @@ typedef struct choosing {
     const ebpo_view_options *options;
     const ebpo_info *info;
     ebpo_box box;
-    ebpo_frontier frontier;
-    ebpo_chunk_keys *keys; /* chunks of the patches so far; NULL: no limit of bytes */
-    uint64_t *chosen;      /* [chosen_count] patches that are drawn */
+    ebpo_frontier frontier; /* (view_cut.h) patches so far; child_group is the patch's index */
+    ebpo_chunk_keys *keys;  /* missing chunks of the patches so far; NULL: no limit of bytes */
+    uint64_t *chosen;       /* [chosen_count] patches that are drawn */
     uint64_t *replaced; /* [replaced_count] patches whose faces are drawn, greatest error first */
     uint64_t chosen_count, replaced_count;
     double pixels; /* greatest error of a visible patch that is drawn */
@@ -40,6 +42,7 @@ static ebpo_seen see_patch(const choosing *c, uint64_t patch)
     return ebpo_viewpoint_see(c->viewpoint, &c->box, ebpo_cell_of_octcode(octcode_of(c, patch)));
 }
 
+/* Returns the error of a patch in pixels; NAN without an observer. */
 static double pixels_of(const choosing *c, uint64_t patch, ebpo_seen sight)
 {
     double error = ebpo_patch_table_error(c->table, c->info, patch);
@@ -48,6 +51,8 @@ static double pixels_of(const choosing *c, uint64_t patch, ebpo_seen sight)
                : 0;
 }
 
+/* Returns EBPO_TURN_NEVER for a patch that is drawn, and otherwise the class in the order in which
+ * patches are replaced. */
 static ebpo_turn turn_of(const choosing *c, uint64_t patch, ebpo_seen sight)
 {
     const ebpo_view_options *o = c->options;
@@ -63,7 +68,7 @@ static ebpo_turn turn_of(const choosing *c, uint64_t patch, ebpo_seen sight)
     return o->unseen == EBPO_UNSEEN_NEVER ? EBPO_TURN_NEVER : EBPO_TURN_UNSEEN;
 }
 
-/* Adds a patch to the frontier, or to the chosen ones if it will not be replaced. */
+/* Adds a patch to the frontier. */
 static ebpo_status offer_patch(choosing *c, uint64_t patch, ebpo_error *error)
 {
     ebpo_seen sight = see_patch(c, patch);
@@ -72,7 +77,9 @@ static ebpo_status offer_patch(choosing *c, uint64_t patch, ebpo_error *error)
                        .turn = (uint8_t)turn_of(c, patch, sight) };
     if (c->viewpoint->has_observer) {
         double pixels = pixels_of(c, patch, sight);
-        memcpy(&w.key, &pixels, sizeof w.key); /* bits of nonnegative doubles have their order */
+        /* Bits of nonnegative doubles, read as integers, have the order of the doubles. The
+         * greatest error gets the least key. */
+        memcpy(&w.key, &pixels, sizeof w.key);
         w.key = ~w.key;
     }
     ebpo_status status = ebpo_frontier_reserve(&c->frontier, 1, error);
@@ -81,7 +88,8 @@ static ebpo_status offer_patch(choosing *c, uint64_t patch, ebpo_error *error)
     return status;
 }
 
-/* Returns true if the patches that replace a patch are within the limit of bytes. */
+/* Returns true if the view stays within the limit of bytes when it reads the patches `first` to
+ * `end` - 1, which replace a patch. Adds their missing chunks to c->keys. */
 static bool is_affordable(choosing *c, uint64_t first, uint64_t end)
 {
     if (!c->keys)
@@ -93,6 +101,7 @@ static bool is_affordable(choosing *c, uint64_t first, uint64_t end)
            c->keys->bytes <= c->options->bytes - taken;
 }
 
+/* Replaces patches until a limit is reached. Fills c->chosen and c->replaced. */
 static ebpo_status choose_patches(choosing *c, ebpo_error *error)
 {
     ebpo_status status = offer_patch(c, 0, error);
@@ -112,15 +121,15 @@ static ebpo_status choose_patches(choosing *c, ebpo_error *error)
     return status;
 }
 
-static int compare_numbers(const void *a, const void *b)
+static int compare_indices(const void *a, const void *b)
 {
     uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return (x > y) - (x < y);
 }
 
-static void sort_numbers(uint64_t *numbers, uint64_t count)
+static void sort_indices(uint64_t *indices, uint64_t count)
 {
-    qsort(numbers, count, sizeof *numbers, compare_numbers);
+    qsort(indices, count, sizeof *indices, compare_indices);
 }
 
 /* Requests the chunks of the chosen patches together. */
@@ -137,9 +146,9 @@ static ebpo_status fetch_patches(choosing *c, ebpo_error *error)
     return status;
 }
 
-/* Reads the faces of replaced patches. Requests their chunks together, in passes, as faces show
- * which vertices are needed. Beyond the limit of bytes, the patches with the least errors are drawn
- * instead. */
+/* Reads the faces of replaced patches. Requests their chunks together, in passes, because the faces
+ * of one pass show which vertices are needed. If the faces exceed the limit of bytes, draws half of
+ * the replaced patches (those with the least errors) instead of their faces, and tries again. */
 static ebpo_status read_faces(choosing *c, ebpo_patch *faces, ebpo_error *error)
 {
     enum { PASSES = 4 };
@@ -151,7 +160,7 @@ static ebpo_status read_faces(choosing *c, ebpo_patch *faces, ebpo_error *error)
     while (c->replaced_count && status == EBPO_OK && sorted) {
         unsigned missing = 1;
         memcpy(sorted, c->replaced, c->replaced_count * sizeof *sorted);
-        sort_numbers(sorted, c->replaced_count);
+        sort_indices(sorted, c->replaced_count);
         bool remote = ebpo_input_prefetches(&c->chunks->file->in);
         for (int pass = 0; remote && pass < PASSES && missing && status == EBPO_OK; pass++) {
             ebpo_chunk_keys_begin(keys);
@@ -181,6 +190,8 @@ static ebpo_status read_faces(choosing *c, ebpo_patch *faces, ebpo_error *error)
     return status;
 }
 
+/* Returns the greatest error in pixels of a visible patch that is drawn; NAN without an observer.
+ */
 static double greatest_pixels(const choosing *c)
 {
     double pixels = c->viewpoint->has_observer ? 0 : NAN;
@@ -196,7 +207,7 @@ static ebpo_status make_surface(choosing *c, ebpo_surface_mesh *out, ebpo_error 
 {
     ebpo_patch faces = EBPO_PATCH_INIT;
     ebpo_status status = EBPO_OK;
-    if (c->options->bytes) { /* the bytes of chunks are known when the first ones were read */
+    if (c->options->bytes) { /* the sizes of chunks are known after the first chunks were read */
         ebpo_patch root;
         status = ebpo_patch_read(c->table, c->chunks, 0, &root, error);
         ebpo_patch_free(&root);
@@ -208,7 +219,7 @@ static ebpo_status make_surface(choosing *c, ebpo_surface_mesh *out, ebpo_error 
     if (status == EBPO_OK)
         status = read_faces(c, &faces, error);
     if (status == EBPO_OK) {
-        sort_numbers(c->chosen, c->chosen_count);
+        sort_indices(c->chosen, c->chosen_count);
         status = ebpo_table_join(c->table, c->chunks, c->chosen, c->chosen_count,
                                  c->replaced_count ? &faces : NULL, out, error);
     }
