@@ -66,7 +66,7 @@ static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, boo
     size_t count = 0;
     for (uint64_t i = 0; box && number && i < c->count; i++) {
         const ebpo_catalogue_entry *e = &c->entry[i];
-        if (seen && e->unseen)
+        if (seen && e->only_caps)
             continue;
         memcpy(box[count].min, e->min, sizeof e->min);
         memcpy(box[count].max, e->max, sizeof e->max);
@@ -143,8 +143,8 @@ static const char *fault_of_entry(const ebpo_catalogue_entry *e)
 {
     if (!e->path || !*e->path)
         return "has no path";
-    if (e->surface && (!*e->surface || e->unseen))
-        return "has a path of a surface that is empty or contradicts `unseen`";
+    if (e->surface && (!*e->surface || e->only_caps))
+        return "has no surface, but a path of a surface";
     if (e->numbers && !*e->numbers)
         return "has an empty path of face indices";
     if ((unsigned)e->rule >= RULES)
@@ -347,7 +347,7 @@ static ebpo_status read_paths(const reader *r, const json_t *model, ebpo_catalog
         status = read_path(r, model, "numbers", &e->numbers);
     if (status == EBPO_OK && !e->path)
         return bad_model(r, "has no path");
-    e->unseen = json_is_null(json_object_get(model, "surface"));
+    e->only_caps = json_is_null(json_object_get(model, "surface"));
     return status;
 }
 

@@ -130,7 +130,7 @@ static void write_entry(FILE *to, const ebpo_catalogue_entry *e, const char *fol
     }
     write_corner(to, "box_min", e->min);
     write_corner(to, "box_max", e->max);
-    if (e->unseen)
+    if (e->only_caps)
         fputs(",\n      \"surface\": null", to);
     if (e->surface) {
         write_path(to, ",", "surface", e->surface, folder);

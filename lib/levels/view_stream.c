@@ -34,9 +34,9 @@ typedef struct view_leaves {
     uint8_t *delivered;  /* bit f: face f was delivered */
     /* Faces of the last returned leaf, valid until the next node is returned. */
     double (*corners)[3][3];
-    uint32_t *numbers;       /* indices of the faces in the file */
+    uint32_t *file_faces;    /* indices of the faces in the file */
     uint8_t *repeated;       /* 1: the face was delivered before */
-    uint64_t capacity[3];    /* of corners, numbers and repeated, in faces */
+    uint64_t capacity[3];    /* of corners, file_faces and repeated, in faces */
     ebpo_view_faces current; /* refers to these three arrays */
 } view_leaves;
 
@@ -110,7 +110,7 @@ static void view_leaves_free(view_leaves *l)
     drop_slices(l);
     free(l->delivered);
     free(l->corners);
-    free(l->numbers);
+    free(l->file_faces);
     free(l->repeated);
     free(l);
 }
@@ -136,10 +136,11 @@ static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsig
 static ebpo_status reserve_space(view_leaves *l, uint64_t faces, ebpo_error *error)
 {
     bool grown = ebpo_grow(&l->corners, &l->capacity[0], faces, sizeof *l->corners) &&
-                 ebpo_grow(&l->numbers, &l->capacity[1], faces, sizeof *l->numbers) &&
+                 ebpo_grow(&l->file_faces, &l->capacity[1], faces, sizeof *l->file_faces) &&
                  ebpo_grow(&l->repeated, &l->capacity[2], faces, sizeof *l->repeated);
-    return grown ? EBPO_OK
-                 : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->numbers + 1));
+    return grown
+               ? EBPO_OK
+               : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->file_faces + 1));
 }
 
 /* Reads the faces of all leaves of a group. After a failure, no leaf has faces. */
@@ -174,7 +175,7 @@ static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
         uint64_t at = 3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3;
         l->corners[face][i / 3][i % 3] = mesh->xyz32 ? (double)mesh->xyz32[at] : mesh->xyz64[at];
     }
-    l->numbers[face] = (uint32_t)number;
+    l->file_faces[face] = (uint32_t)number;
     l->repeated[face] = l->delivered[number / 8] >> number % 8 & 1;
     l->delivered[number / 8] |= (uint8_t)(1u << number % 8);
     l->current.new_count += !l->repeated[face];
@@ -188,7 +189,7 @@ static void set_faces(view_leaves *l, unsigned octant)
     clear_faces(l);
     l->current.face_count = slice->mesh.face_count;
     l->current.corners = (const double(*)[3][3])l->corners;
-    l->current.numbers = l->numbers;
+    l->current.file_faces = l->file_faces;
     l->current.repeated = l->repeated;
     for (uint32_t face = 0; face < slice->mesh.face_count; face++)
         take_face(l, slice, face);

@@ -51,7 +51,7 @@ struct ebpo_subtree {
     ebpo_mesh mesh;
     float *corners32;
     double *corners64;
-    uint32_t *numbers, *source, *list_first, *list;
+    uint32_t *file_faces, *source, *list_first, *list;
     uint64_t memory;
     subtree_scratch *scratch; /* made for the first node that is described */
 };
@@ -117,7 +117,8 @@ static ebpo_status reserve_space(ebpo_subtree *s, uint64_t planes, ebpo_error *e
 
 /* --- one level --- */
 
-/* Position in a level's arrays: the numbers of nodes of each type, planes and leaf planes so far.
+/* Position in a level's arrays: the file_faces of nodes of each type, planes and leaf planes so
+ * far.
  */
 typedef struct level_position {
     uint64_t rank[4], plane, leaf_plane;
@@ -188,7 +189,7 @@ static void copy_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
     }
 }
 
-/* Copies nodes, winding numbers and planes from the slice. */
+/* Copies nodes, winding file_faces and planes from the slice. */
 static ebpo_status copy_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t planes;
@@ -248,12 +249,12 @@ static ebpo_status copy_lists(ebpo_subtree *s, const ebpo_slice *slice, ebpo_err
 static ebpo_status copy_indices(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t count = s->mesh.face_count;
-    s->numbers = ebpo_alloc(count, sizeof *s->numbers);
-    s->memory += count * sizeof *s->numbers * (s->source ? 2 : 1);
-    if (!s->numbers)
-        return ebpo_fail_memory(error, count * sizeof *s->numbers);
+    s->file_faces = ebpo_alloc(count, sizeof *s->file_faces);
+    s->memory += count * sizeof *s->file_faces * (s->source ? 2 : 1);
+    if (!s->file_faces)
+        return ebpo_fail_memory(error, count * sizeof *s->file_faces);
     for (uint32_t i = 0; i < count; i++)
-        s->numbers[i] = (uint32_t)ebpo_slice_file_face(slice, i);
+        s->file_faces[i] = (uint32_t)ebpo_slice_file_face(slice, i);
     return EBPO_OK;
 }
 
@@ -329,7 +330,7 @@ ebpo_status ebpo_subtree_get_faces(const ebpo_subtree *s, ebpo_subtree_faces *ou
     faces.faces = s->mesh.faces;
     faces.corners32 = s->corners32;
     faces.corners64 = s->corners64;
-    faces.numbers = s->numbers;
+    faces.file_faces = s->file_faces;
     faces.source = s->source;
     faces.list_first = s->list_first;
     faces.list = s->list;
@@ -624,7 +625,7 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
         REFERENCE = 52, /* of a reference: in the slice, in the list, and in the table that numbers
                          * the shared faces */
         FACE = 24,      /* of a face: corners, number, number in the source, list */
-        OLDER = 36,     /* of each corner: the table that numbers vertices of earlier faces */
+        OLDER = 36,     /* of each corner: the table that file_faces vertices of earlier faces */
         ALWAYS = 1 << 20
     };
     uint64_t number = info->double_coordinates ? sizeof(double) : sizeof(float),
@@ -796,7 +797,7 @@ void ebpo_subtree_close(ebpo_subtree *s)
     ebpo_mesh_free(&s->mesh);
     free(s->corners32);
     free(s->corners64);
-    free(s->numbers);
+    free(s->file_faces);
     free(s->source);
     free(s->list_first);
     free(s->list);

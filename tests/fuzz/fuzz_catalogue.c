@@ -25,7 +25,7 @@ static const char *written(const uint8_t *data, size_t size)
 static void check_entry(const ebpo_catalogue_entry *e)
 {
     fuzz_must(e && e->path && e->path[0]);
-    fuzz_must(!e->surface || (e->surface[0] && !e->unseen));
+    fuzz_must(!e->surface || (e->surface[0] && !e->only_caps));
     fuzz_must(!e->numbers || e->numbers[0]);
     fuzz_must((unsigned)e->rule <= EBPO_RULE_POSITIVE);
     for (int k = 0; k < 3; k++)

@@ -148,7 +148,7 @@ class Parts(Case):
             first = whole.children[node]
             np.testing.assert_array_equal(whole.octcode[first:first + 8], whole.octcode[node] * 8 + np.arange(8))
         part = m.subtree(m.octcode([.9, .1, .1], 3))
-        np.testing.assert_array_equal(part.vertices[part.faces], (mesh.vertices[mesh.faces])[part.number])
+        np.testing.assert_array_equal(part.vertices[part.faces], (mesh.vertices[mesh.faces])[part.file_faces])
         leaf = int(np.flatnonzero(part.type == ebpo.NodeType.LEAF)[0])
         self.assertTrue(len(part.faces_of(leaf)) > 0)
         n, d = ebpo.half_spaces(whole.planes[:100])

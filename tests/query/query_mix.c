@@ -305,7 +305,7 @@ static ebpo_status query_subtree(const mix_session *a, uint64_t number, uint64_t
         status = ebpo_subtree_get_faces(subtree, &faces, error);
     if (status == EBPO_OK) {
         *hash = add(*hash, nodes.octcodes, nodes.node_count * sizeof *nodes.octcodes);
-        *hash = add(*hash, faces.numbers, faces.face_count * sizeof *faces.numbers);
+        *hash = add(*hash, faces.file_faces, faces.face_count * sizeof *faces.file_faces);
         *hash = faces.xyz64 ? add(*hash, faces.xyz64, 3 * faces.vertex_count * sizeof(double))
                             : add(*hash, faces.xyz32, 3 * faces.vertex_count * sizeof(float));
     }

@@ -384,7 +384,7 @@ START_TEST(test_catalogue_of_caps_has_no_surface)
     ebpo_distance_result distance;
     uint64_t number;
     const double middle[3] = { 0.5, 0.5, 0.5 };
-    caps.unseen = true;
+    caps.only_caps = true;
     open_catalogue a = query_entries(&caps, 1, 0);
     ASSERT_OK(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, &where, error));
     ck_assert_int_eq(where.where, EBPO_IN);

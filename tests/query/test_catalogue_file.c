@@ -48,7 +48,7 @@ START_TEST(test_catalogue_file_round_trip)
     some[0].max[0] = 1.2345678901234568e17;
     some[0].max[1] = 1.7976931348623157e308;
     some[1].path = "sub/quote\" \\ \n.h5";
-    some[1].unseen = true;
+    some[1].only_caps = true;
     some[2].surface = "other.h5";
     some[2].numbers = "/n.npy";
     some[2].file_bytes = 0;
@@ -68,7 +68,7 @@ START_TEST(test_catalogue_file_round_trip)
         ck_assert(memcmp(a->min, b->min, sizeof a->min) == 0 &&
                   memcmp(a->max, b->max, sizeof a->max) == 0 &&
                   memcmp(a->digest, b->digest, sizeof a->digest) == 0);
-        ck_assert(a->solid == b->solid && a->unseen == b->unseen && a->rule == b->rule);
+        ck_assert(a->solid == b->solid && a->only_caps == b->only_caps && a->rule == b->rule);
         ck_assert(!a->surface == !b->surface && (!a->surface || !strcmp(a->surface, b->surface)));
         ck_assert(!a->numbers == !b->numbers && (!a->numbers || !strcmp(a->numbers, b->numbers)));
         ck_assert(i == 2 || a->face_count == b->face_count);

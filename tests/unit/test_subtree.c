@@ -173,7 +173,7 @@ static void compare_list(pair *p, const ebpo_level *l, const reference_node *n, 
     for (uint32_t k = 0; k < refs + fresh; k++) {
         uint64_t face = k < refs ? l->leaf_refs[n->refs + k] : l->leaf_first[rank] + (k - refs);
         ck_assert(p->faces.list[first + k] < p->faces.face_count);
-        ck_assert(p->faces.numbers[p->faces.list[first + k]] == face);
+        ck_assert(p->faces.file_faces[p->faces.list[first + k]] == face);
         if (p->listed[face] < 2)
             p->listed[face] = k < refs ? 1 : 2;
     }
@@ -225,7 +225,7 @@ static void compare_corner(const pair *p, uint64_t face, int corner)
 {
     const ebpo_mesh *mesh = &p->t->tree.mesh;
     uint64_t ours = p->faces.faces[3 * face + (uint64_t)corner],
-             theirs = mesh->faces[3 * (uint64_t)p->faces.numbers[face] + (uint64_t)corner];
+             theirs = mesh->faces[3 * (uint64_t)p->faces.file_faces[face] + (uint64_t)corner];
     ck_assert(ours < p->faces.vertex_count);
     ck_assert(!p->faces.xyz32 == !mesh->xyz32 && !p->faces.xyz64 == !mesh->xyz64);
     if (mesh->xyz32) {
@@ -248,11 +248,11 @@ static void compare_faces(const pair *p)
     }
     ck_assert(p->faces.face_count == listed && p->faces.shared_count == listed - fresh);
     for (uint64_t i = 0; i < listed; i++) {
-        ck_assert(i == 0 || p->faces.numbers[i] > p->faces.numbers[i - 1]);
-        ck_assert(p->listed[p->faces.numbers[i]] == (i < p->faces.shared_count ? 1 : 2));
+        ck_assert(i == 0 || p->faces.file_faces[i] > p->faces.file_faces[i - 1]);
+        ck_assert(p->listed[p->faces.file_faces[i]] == (i < p->faces.shared_count ? 1 : 2));
         ck_assert(!p->faces.source == !p->t->tree.face_source);
         if (p->faces.source)
-            ck_assert(p->faces.source[i] == p->t->tree.face_source[p->faces.numbers[i]]);
+            ck_assert(p->faces.source[i] == p->t->tree.face_source[p->faces.file_faces[i]]);
         for (int corner = 0; corner < 3; corner++)
             compare_corner(p, i, corner);
     }

@@ -79,7 +79,7 @@ static void check_corners(const reference *t, const ebpo_view_faces *f)
     for (uint64_t i = 0; i < f->face_count; i++)
         for (int k = 0; k < 3; k++) {
             double corner[3];
-            ebpo_test_point(&t->mesh, t->mesh.faces[3 * (uint64_t)f->numbers[i] + (uint64_t)k],
+            ebpo_test_point(&t->mesh, t->mesh.faces[3 * (uint64_t)f->file_faces[i] + (uint64_t)k],
                             corner);
             ck_assert(memcmp(corner, f->corners[i][k], sizeof corner) == 0);
         }
@@ -97,14 +97,14 @@ static void check_leaf(reference *t, const ebpo_file *file, uint64_t octcode,
         ck_assert(ebpo_subtree_get_faces(subtree, &own, NULL) == EBPO_OK);
         ck_assert(own.face_count == f->face_count);
         for (uint64_t i = 0; i < own.face_count; i++)
-            ck_assert(own.numbers[i] == f->numbers[i]);
+            ck_assert(own.file_faces[i] == f->file_faces[i]);
         ebpo_subtree_close(subtree);
     }
     for (uint64_t i = 0; i < f->face_count; i++) {
-        ck_assert(f->numbers[i] < t->mesh.face_count);
-        ck_assert(f->repeated[i] == t->given[f->numbers[i]]);
+        ck_assert(f->file_faces[i] < t->mesh.face_count);
+        ck_assert(f->repeated[i] == t->given[f->file_faces[i]]);
         fresh += !f->repeated[i];
-        t->given[f->numbers[i]] = 1;
+        t->given[f->file_faces[i]] = 1;
     }
     ck_assert(fresh == f->new_count);
     t->fresh += fresh;

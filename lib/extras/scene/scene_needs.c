@@ -316,7 +316,7 @@ ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model
     ebpo_status status = ebpo_subset_count_reads(file, &o, &reads, needs->error);
     out->bytes = reads.bytes;
     out->subtrees = reads.subtrees;
-    out->of_subtrees = reads.of_subtrees;
+    out->total_subtrees = reads.total_subtrees;
     return status;
 }
 

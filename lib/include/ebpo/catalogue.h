@@ -80,7 +80,7 @@ typedef struct ebpo_catalogue_entry {
      * True for a part without faces of the model, only with caps. Distances and rays ignore this
      * part.
      */
-    bool unseen;
+    bool only_caps;
 
     uint64_t reserved[4];
 } ebpo_catalogue_entry;
@@ -372,7 +372,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
  *
  * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no face is found
  *
- * EBPO_E_ABSENT: all entries are parts with only caps (`unseen`).
+ * EBPO_E_ABSENT: all entries are parts with only caps (`only_caps`).
  *
  * Threads: any.
  */
@@ -389,7 +389,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
  *
  * model   as for ebpo_catalogue_distance
  *
- * EBPO_E_ABSENT: all entries are parts with only caps (`unseen`).
+ * EBPO_E_ABSENT: all entries are parts with only caps (`only_caps`).
  *
  * Threads: any.
  */

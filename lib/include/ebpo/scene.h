@@ -847,10 +847,10 @@ typedef struct ebpo_scene_need {
     uint64_t users;
 
     /*
-     * subtrees: number of the file's subtrees that intersect the box. of_subtrees: number of all
+     * subtrees: number of the file's subtrees that intersect the box. total_subtrees: number of all
      * subtrees of the file. 0, 0: the file is not divided into subtrees.
      */
-    uint64_t subtrees, of_subtrees;
+    uint64_t subtrees, total_subtrees;
 
     /* Size of the required chunks, each counted once, and size of the file; in bytes. */
     uint64_t bytes, file_bytes;

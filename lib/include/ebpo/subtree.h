@@ -238,7 +238,7 @@ typedef struct ebpo_subtree_faces {
     const double *corners64;
 
     /* [face_count] index of each face in the file, ascending */
-    const uint32_t *numbers;
+    const uint32_t *file_faces;
 
     /* [face_count] source indices; NULL: not requested, or not in the file (EBPO_PART_MAPS) */
     const uint32_t *source;

@@ -258,7 +258,7 @@ typedef struct ebpo_view_faces {
     const double (*corners)[3][3];
 
     /* [face_count] index of each face in the file, ascending */
-    const uint32_t *numbers;
+    const uint32_t *file_faces;
 
     /*
      * [face_count] 1: an earlier leaf has delivered this face; 0: new. A viewer that draws only the

@@ -46,7 +46,7 @@ static void need_json(json *j, const ebpo_scene *scene, const ebpo_scene_need *n
     json_reals(j, "min", need->min, 3);
     json_reals(j, "max", need->max, 3);
     json_uint(j, "subtrees", need->subtrees);
-    json_uint(j, "of_subtrees", need->of_subtrees);
+    json_uint(j, "total_subtrees", need->total_subtrees);
     json_uint(j, "bytes", need->bytes);
     json_uint(j, "file_bytes", need->file_bytes);
 }
@@ -56,7 +56,7 @@ static void need_words(const plan *p, const ebpo_scene_need *n)
     char bytes[32], whole[32], parts[64], levels[32], subtrees[64];
     snprintf(levels, sizeof levels, "0 to %d of %d", n->last_level, n->level_count);
     snprintf(subtrees, sizeof subtrees, "%llu of %llu", (unsigned long long)n->subtrees,
-             (unsigned long long)n->of_subtrees);
+             (unsigned long long)n->total_subtrees);
     printf("%10s %10s  %-13s %13s  %s: ", words_bytes(bytes, sizeof bytes, n->bytes),
            words_bytes(whole, sizeof whole, n->file_bytes), levels, subtrees,
            name_of(p->scene, n->model));

@@ -53,7 +53,7 @@ static bool put_faces(ebpo_js_object *object, const ebpo_subtree_faces *f, uint6
     return put_items(object, VERTICES, f->xyz32, f->vertex_count, 12) &&
            put_items(object, VERTICES, f->xyz64, f->vertex_count, 24) &&
            put_items(object, FACES, f->faces, f->face_count, 12) &&
-           put_items(object, NUMBERS, f->numbers, f->face_count, 4) &&
+           put_items(object, NUMBERS, f->file_faces, f->face_count, 4) &&
            put_items(object, SOURCE, f->source, f->face_count, 4) &&
            put_items(object, LIST_FIRST, f->list_first, nodes + 1, 4) &&
            put_items(object, LIST, f->list, f->list_first[nodes], 4);

@@ -94,7 +94,8 @@ static bool put_faces(ebpo_js_object *object)
     uint32_t count = (uint32_t)f.face_count;
     return ebpo_js_put(object, FACE_COUNTS, &count, sizeof count) == EBPO_OK &&
            ebpo_js_put(object, FACE_CORNERS, f.corners, count * sizeof *f.corners) == EBPO_OK &&
-           ebpo_js_put(object, FACE_NUMBERS, f.numbers, count * sizeof *f.numbers) == EBPO_OK &&
+           ebpo_js_put(object, FACE_NUMBERS, f.file_faces, count * sizeof *f.file_faces) ==
+               EBPO_OK &&
            ebpo_js_put(object, FACE_REPEATED, f.repeated, count) == EBPO_OK;
 }
 

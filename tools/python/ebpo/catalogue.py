@@ -289,13 +289,13 @@ def entry_of(entry: Any) -> Entry:
     """Return the Entry of an ebpo_catalogue_entry."""
     surface, numbers = os.fsdecode(entry.surface or b""), os.fsdecode(entry.numbers or b"")
     return Entry(os.fsdecode(entry.path), bytes(entry.digest).hex(), entry.solid, tuple(entry.min), tuple(entry.max),
-                 None if entry.unseen else surface, bytes(entry.surface_digest).hex() if surface else "", numbers)
+                 None if entry.only_caps else surface, bytes(entry.surface_digest).hex() if surface else "", numbers)
 
 
 def fill_entry(struct: Any, entry: Entry) -> None:
     """Set an ebpo_catalogue_entry from an Entry. The struct refers to new copies of the texts."""
     struct.path, struct.digest = path_bytes(entry.path), bytes.fromhex(entry.content_sha256)
-    struct.solid, struct.min, struct.max, struct.unseen = entry.solid, entry.low, entry.high, entry.surface is None
+    struct.solid, struct.min, struct.max, struct.only_caps = entry.solid, entry.low, entry.high, entry.surface is None
     if entry.surface:
         struct.surface, struct.surface_digest = path_bytes(entry.surface), bytes.fromhex(entry.surface_sha256)
     if entry.numbers:

@@ -336,7 +336,7 @@ class Subtree:
     vertices: (v, 3) float32 or float64.
     faces: (f, 3) uint32, indices in `vertices`.
     shared_count: the number of shared faces, which are the first ones; other subtrees own them.
-    number: (f,) uint32, the index of each face in the file.
+    file_faces: (f,) uint32, the index of each face in the file.
     source: (f,) uint32, the index of each face in the source, or None.
     list_first: (n + 1,) uint32, the index of each leaf's first face in `list`.
     """
@@ -353,7 +353,7 @@ class Subtree:
         lib.ebpo_subtree_get_nodes(self._handle, ctypes.byref(nodes))
         self._set_nodes(nodes)
         none: Any = None
-        self.vertices = self.faces = self.number = self.source = self.list_first = self.list = none
+        self.vertices = self.faces = self.file_faces = self.source = self.list_first = self.list = none
         self.shared_count = 0
         faces = made(c.ebpo_subtree_faces)
         from .errors import AbsentError
@@ -388,7 +388,7 @@ class Subtree:
         dtype = np.float64 if faces.xyz64 else np.float32
         self.vertices = self._array(faces.xyz64 or faces.xyz32, (faces.vertex_count, 3), dtype)
         self.faces = self._array(faces.faces, (faces.face_count, 3), np.uint32)
-        self.number = self._array(faces.numbers, (faces.face_count,), np.uint32)
+        self.file_faces = self._array(faces.file_faces, (faces.face_count,), np.uint32)
         self.source = self._array(faces.source, (faces.face_count,), np.uint32)
         self.shared_count = faces.shared_count
         self.list_first = self._array(faces.list_first, (self.node_count + 1,), np.uint32)
