@@ -177,8 +177,7 @@ ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *ch
     *out = (ebpo_patch)EBPO_PATCH_INIT;
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
-                              "faces are requested, but the file was written without its mesh; "
-                              "build it again with the mesh");
+                              "faces are requested, and the file was written without its mesh");
     for (uint64_t i = 0; i < count; i++)
         r.count += table->row[EBPO_PATCH_COLUMNS * patches[i] + EBPO_PATCH_FACES];
     if (r.count >= NONE / 3)

@@ -190,11 +190,7 @@ static ebpo_status begin_mesh(joiner *j, const uint64_t *patches, uint64_t count
              triangles = faces ? faces->triangle_count : 0;
     for (uint64_t i = 0; i < count; i++) {
         if (patches[i] >= j->reader->count || (i && patches[i] <= patches[i - 1]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "patches: item %llu is %llu; indices of patches must ascend, and the "
-                             "surface has %llu patches",
-                             (unsigned long long)i, (unsigned long long)patches[i],
-                             (unsigned long long)j->reader->count);
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "patches: not ascending numbers of patches");
         const uint64_t *row = j->reader->row + EBPO_PATCH_COLUMNS * patches[i];
         vertices += row[EBPO_PATCH_VERTICES];
         triangles += row[EBPO_PATCH_TRIANGLES];

@@ -5,10 +5,10 @@
  * blocks (block_bounds.c), child tables and leaf records (here). Leaf kinds are found later
  * (leaf_kinds.c).
  *
- * Memory is estimated from counts, before anything is read. Three estimates hold for ordinary
- * models only: those of blocks, of the hierarchy over blocks, and of the faces that a subtree
- * shares with other subtrees. ebpo_accel_make_within and ebpo_slice_read_within refuse models that
- * exceed these estimates. */
+ * Memory is estimated from counts, before anything is read. Three estimates are upper bounds for
+ * ordinary models only: the estimates of blocks, of the hierarchy over blocks, and of the faces
+ * that a subtree shares with other subtrees. ebpo_accel_make_within and ebpo_slice_read_within
+ * refuse models that exceed these estimates. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -27,9 +27,9 @@
 
 /* --- memory --- */
 
-/* Returns the maximum number of entries of leaves' lists. Each reference (a face that an earlier
- * leaf lists, too) takes at most one entry. The n new faces of a leaf are in one block if n is at
- * most 8, else in at most 2 n / 9 blocks. */
+/* Returns the maximum number of entries of all leaves' lists. Each reference (a listed face that an
+ * earlier leaf lists, too) takes at most one entry. The new faces of a leaf (all other listed
+ * faces) are in one block if they are at most 8; if they are n > 8, in at most 2 n / 9 blocks. */
 static inline uint64_t list_max(uint64_t refs, uint64_t leaves, uint64_t faces)
 {
     return refs + leaves + faces / 9 * 2 + 2;
@@ -52,12 +52,13 @@ static uint64_t lesser_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* --- sizes from counts --- */
 
-/* Counts of what a subtree or the whole model has. */
+/* How many groups of siblings, leaves, ... a subtree or the whole model has. */
 typedef struct counts {
-    uint64_t groups, leaves, refs, uniform, planes, leaf_planes;
-    uint64_t faces, shared, vertices; /* faces include the shared ones */
-    bool is_subtree;                  /* false: the whole model */
-    bool keeps_planes;
+    uint64_t groups, leaves, refs, uniform; /* refs: references; uniform: white and black nodes */
+    uint64_t planes, leaf_planes;           /* of gray nodes, of leaves */
+    uint64_t faces, shared, vertices;       /* `faces` includes the shared faces */
+    bool is_subtree;                        /* false: the whole model */
+    bool keeps_planes;                      /* the accel keeps the planes of gray nodes */
 } counts;
 
 /* Sizes in bytes, computed from counts. */
@@ -77,15 +78,16 @@ static bool has_windings(const ebpo_info *info)
     return info->solid || info->parts & EBPO_PART_BORDER;
 }
 
-/* Returns the bytes of the grid that skips the first levels of a whole model: 5 for each cell. */
+/* Returns the bytes of the grid from which searches in a whole model start several levels below the
+ * root: 5 for each cell of the grid. */
 static uint64_t grid_bytes(uint64_t groups)
 {
     int bits = ebpo_node_grid_bits(groups);
     return bits ? (UINT64_C(1) << 3 * bits) * 5 : 0;
 }
 
-/* Returns the bytes of the table of older vertices, which faces before the subtree use first
- * (slice.c): at most six for each shared face, in ordinary models. */
+/* Returns the bytes of the table of older vertices, that is, vertices that a face before the
+ * subtree uses (slice.c). In ordinary models there are at most six for each shared face. */
 static uint64_t older_vertices_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->shared); }
 
 static sizes sizes_of(const counts *c, const ebpo_info *info)
@@ -145,15 +147,16 @@ static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
 }
 
 /* Estimates the counts of a subtree. In ordinary models, the number of shared faces is about three
- * times the square root of the number of owned faces. The estimate is `roots` times this root plus
- * `more`, and at most the number of references. */
+ * times the square root of the number of owned faces. The estimate is `roots` times this square
+ * root plus `more`, and at most the number of references. */
 static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info, double roots,
                              uint64_t more)
 {
     uint64_t owned = size->new_faces, nodes = 8 * size->groups,
              shared = lesser_of(size->refs, (uint64_t)(roots * sqrt((double)owned)) + more),
              faces = owned + shared, vertices = faces / 4 * 3 + 64;
-    double of_face = info->face_count ? (double)info->vertex_count / (double)info->face_count : 0;
+    double vertices_per_face =
+        info->face_count ? (double)info->vertex_count / (double)info->face_count : 0;
     return (counts){ .groups = size->groups,
                      .leaves = size->leaves,
                      .refs = size->refs,
@@ -161,18 +164,19 @@ static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info,
                      .planes = size->planes,
                      .faces = faces,
                      .shared = shared,
-                     .vertices = greater_of(vertices, (uint64_t)(1.25 * of_face * (double)faces)),
+                     .vertices =
+                         greater_of(vertices, (uint64_t)(1.25 * vertices_per_face * (double)faces)),
                      .is_subtree = true,
                      .keeps_planes = size->planes > 0 };
 }
 
-/* --- sizes that are known once blocks are made --- */
+/* --- sizes that are known after blocks are made --- */
 
 typedef struct block_sizes {
     uint64_t blocks, bounds, units; /* numbers of blocks, nodes of the hierarchy, and units */
 } block_sizes;
 
-/* Returns upper bounds for ordinary models. */
+/* Returns upper bounds that are valid for ordinary models. */
 static block_sizes ordinary_sizes(const counts *c, const ebpo_info *info)
 {
     uint64_t bytes = c->faces * (accel_needs_doubles(info) ? 56 : 32);
@@ -181,34 +185,38 @@ static block_sizes ordinary_sizes(const counts *c, const ebpo_info *info)
                           .units = bytes / EBPO_MESHLET_UNIT + 64 };
 }
 
-static uint64_t kept_bytes(const sizes *t, const block_sizes *f)
+/* Returns the memory that an accel keeps. */
+static uint64_t kept_bytes(const sizes *size, const block_sizes *count)
 {
-    return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->shared + t->nodes + t->list +
-           t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
-           (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder));
+    return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->maps + size->shared + size->nodes +
+           size->list + size->planes + size->rows + (count->units + 1) * EBPO_MESHLET_UNIT +
+           (count->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder));
 }
 
-/* Returns the maximum memory while an accel is made. In addition to the memory that is kept, memory
- * is needed first for the mesh and the corners of blocks, then for extents, then for the nodes.
- * During all of this, memory is needed for the layout, whose arrays may have more space than they
- * use, because they grow by half of their size.
+/* Returns the most memory that exists at a time while an accel is made. In addition to the memory
+ * that is kept, memory is needed first for the mesh and the corners of blocks (`early`), then for
+ * extents, then for the nodes (`late`). In all of these stages, memory is needed for the layout
+ * (ebpo_layout), whose arrays may have more space than they use, because they grow by half of their
+ * size.
  *
- * The layout of a refused model fits into this maximum, too. It takes 12 bytes for each block and
- * 60 for each bound (node of the hierarchy). There are at most as many blocks as faces, and 7
- * bounds for 13 blocks, because join_parts (blocks.c) wraps at least five members first, then four,
- * three, two, two ... With the 8 bytes for each face in renumber_blocks, this is less than the
- * 56 bytes a face that ordinary records, bounds and layouts take. */
-static uint64_t peak_bytes(const sizes *t, const block_sizes *f)
+ * If a model is refused after its layout was made, this layout fits into the returned maximum, too.
+ * It takes 12 bytes for each block and 60 for each bound (node of the hierarchy). There are at most
+ * as many blocks as faces, and 7 bounds for 13 blocks, because join_parts (blocks.c) wraps at least
+ * five members first, then four, three, two, two ... With the 8 bytes for each face in
+ * renumber_blocks, this is less than the 56 bytes a face that ordinary records, bounds and layouts
+ * take. */
+static uint64_t peak_bytes(const sizes *size, const block_sizes *count)
 {
     enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, CORNERS = 25, EXTENT = 72 }; /* bytes of each */
-    uint64_t layout = f->blocks * LAYOUT_BLOCK + f->bounds * LAYOUT_BOUND,
-             early = t->mesh + f->blocks * CORNERS, extents = (f->blocks + f->bounds) * EXTENT,
-             late = t->nodes + t->list, after = t->nodes + t->list + t->planes + t->rows,
-             kept = kept_bytes(t, f) - after,
-             read = t->levels + t->mesh + t->shared + t->maps + t->only_read;
+    uint64_t layout = count->blocks * LAYOUT_BLOCK + count->bounds * LAYOUT_BOUND,
+             early = size->mesh + count->blocks * CORNERS,
+             extents = (count->blocks + count->bounds) * EXTENT, late = size->nodes + size->list,
+             after = size->nodes + size->list + size->planes + size->rows,
+             kept = kept_bytes(size, count) - after,
+             read = size->levels + size->mesh + size->shared + size->maps + size->only_read;
     uint64_t made =
-        t->levels + kept + greater_of(greater_of(early, extents), late + t->slots) + layout;
-    return greater_of(greater_of(read, made), t->levels + kept + after) + t->reserve;
+        size->levels + kept + greater_of(greater_of(early, extents), late + size->slots) + layout;
+    return greater_of(greater_of(read, made), size->levels + kept + after) + size->reserve;
 }
 
 /* --- estimates --- */
@@ -216,24 +224,24 @@ static uint64_t peak_bytes(const sizes *t, const block_sizes *f)
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak)
 {
     counts c = counts_of_all(info);
-    sizes t = sizes_of(&c, info);
-    block_sizes f = ordinary_sizes(&c, info);
-    *keep = kept_bytes(&t, &f);
-    *peak = peak_bytes(&t, &f);
+    sizes size = sizes_of(&c, info);
+    block_sizes count = ordinary_sizes(&c, info);
+    *keep = kept_bytes(&size, &count);
+    *peak = peak_bytes(&size, &count);
 }
 
-void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
-                                 uint64_t *peak)
+void ebpo_accel_estimate_subtree(const ebpo_slice_size *slice_size, const ebpo_info *info,
+                                 uint64_t *keep, uint64_t *peak)
 {
-    counts c = counts_of_size(size, info, 8, 64);
-    sizes t = sizes_of(&c, info);
-    block_sizes f = ordinary_sizes(&c, info);
-    *keep = kept_bytes(&t, &f);
-    *peak = peak_bytes(&t, &f);
+    counts c = counts_of_size(slice_size, info, 8, 64);
+    sizes size = sizes_of(&c, info);
+    block_sizes count = ordinary_sizes(&c, info);
+    *keep = kept_bytes(&size, &count);
+    *peak = peak_bytes(&size, &count);
 }
 
-/* Uses averages: blocks and nodes of the hierarchy are fuller than the proven minimum, and an entry
- * of a leaf's list has several faces. */
+/* Uses measured averages: blocks and nodes of the hierarchy are fuller than the proven minimum, and
+ * an entry of a leaf's list has several faces. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info, uint64_t subtrees)
 {
     uint64_t n = subtrees ? subtrees : 1;
@@ -243,17 +251,17 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
                              .new_faces = all->new_faces / n + 1,
                              .planes = all->planes / n + 1 };
     counts c = counts_of_size(&mean, info, 3.5, 2);
-    sizes t = sizes_of(&c, info);
+    sizes size = sizes_of(&c, info);
     uint64_t bytes = c.faces * (accel_needs_doubles(info) ? 48 : 27);
-    block_sizes f = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
-    t.list = ((c.refs + c.leaves) / 2 + c.faces / 16 + 4) * sizeof(ebpo_listed_block);
-    return kept_bytes(&t, &f);
+    block_sizes count = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
+    size.list = ((c.refs + c.leaves) / 2 + c.faces / 16 + 4) * sizeof(ebpo_listed_block);
+    return kept_bytes(&size, &count);
 }
 
-/* Blocks are at least half full, except the only block of a leaf with few faces if the neighbouring
- * leaves fill their own blocks. The 64 bytes for each leaf cover the excess of such blocks, and the
- * planes of leaf kinds in a subtree. Lists have at most one entry for each listed face. A record
- * has at most three vertices a face, or four if it has space for more than 16. */
+/* Blocks are at least half full, with one exception: a leaf with few faces has a block of its own
+ * if its neighbours fill their blocks. The 64 bytes for each leaf cover the additional size of such
+ * blocks, and the planes of leaves in a subtree (ebpo_leaf_kinds). Lists have at most one entry for
+ * each listed face. A record has at most three vertices a face, or four if it has 24 vertices. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
@@ -270,9 +278,9 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
 
 /* --- limits --- */
 
-/* Returns EBPO_E_LIMIT if making the accel takes more memory, slice included, than the quota
- * `space` (NULL: no limit). Without a layout, the numbers of blocks and units are those of an
- * ordinary model. */
+/* Returns EBPO_E_LIMIT if making the accel takes more memory, including the slice, than the quota
+ * `space` (NULL: no limit). units: number of units of the blocks. Before the layout is made, the
+ * numbers of blocks and units are those of an ordinary model. */
 static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, uint64_t units,
                               ebpo_error *error)
 {
@@ -280,11 +288,11 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
         return EBPO_OK;
     const ebpo_layout *layout = plan->layout;
     counts c = counts_of_slice(plan->slice, plan->with_planes);
-    sizes t = sizes_of(&c, plan->info);
-    t.only_read = 0; /* the slice has been read */
-    block_sizes f = layout ? (block_sizes){ layout->block_count, layout->bound_count, units }
-                           : ordinary_sizes(&c, plan->info);
-    uint64_t peak = peak_bytes(&t, &f);
+    sizes size = sizes_of(&c, plan->info);
+    size.only_read = 0; /* the slice has been read */
+    block_sizes count = layout ? (block_sizes){ layout->block_count, layout->bound_count, units }
+                               : ordinary_sizes(&c, plan->info);
+    uint64_t peak = peak_bytes(&size, &count);
     ebpo_quota all = { .most = space->most };
     ebpo_status status = ebpo_quota_check(&all, peak, error);
     space->needed = all.needed;
@@ -296,18 +304,20 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
 typedef struct walk {
     ebpo_accel *s;
     const ebpo_slice *slice;
-    const uint32_t *slot_of;               /* [local face] */
-    uint64_t rank[EBPO_LEVELS_MAX][4];     /* nodes of each level and type, visited so far */
-    uint64_t refs[EBPO_LEVELS_MAX];        /* references of each level's leaves, visited so far */
-    uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
+    const uint32_t *slot_of;           /* [local face] */
+    uint64_t rank[EBPO_LEVELS_MAX][4]; /* number of visited nodes of each level and type */
+    uint64_t refs[EBPO_LEVELS_MAX];    /* number of visited references of each level's leaves */
+    /* index in the accel of the first group, and of the first leaf, of each level */
+    uint64_t group_begin[EBPO_LEVELS_MAX];
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
     uint64_t list_capacity;
     ebpo_status status;
     ebpo_error *error;
 } walk;
 
-/* Reserves `more` list entries, an upper bound for one leaf. (reserve_space has reserved the
- * minimum for all leaves; trim_list frees the excess.) Returns false after an error. */
+/* Reserves `more` list entries, an upper bound for one leaf. (reserve_space has already reserved
+ * the entries that ordinary leaves need; trim_list frees the excess.) Returns false after an error.
+ */
 static bool reserve_list(walk *w, uint64_t more)
 {
     ebpo_accel *s = w->s;
@@ -328,32 +338,33 @@ typedef struct listing {
     uint64_t last;  /* the last entry */
 } listing;
 
-/* Adds a face to the leaf's list. Faces come in ascending order, so consecutive faces of one block
- * become one entry. Branch-free, because a branch on a new entry is unpredictable. */
+/* Adds a face to the leaf's list. Faces are added in ascending order, so consecutive faces of one
+ * block become one entry. There is no branch on new entries, because the processor could not
+ * predict it. */
 static inline void list_face(const walk *w, uint64_t face, listing *l)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
     uint64_t lane = UINT64_C(1) << (slot % EBPO_BLOCK + EBPO_LISTED_LANES);
-    bool begins = block != l->block;
-    l->last = (begins ? block : l->last) | lane;
-    l->count += begins;
+    bool is_new = block != l->block;
+    l->last = (is_new ? block : l->last) | lane;
+    l->count += is_new;
     l->block = block;
     ebpo_list(&l->list[l->count - 1], l->last);
 }
 
-/* Fills a leaf record. The list has first the references, then the leaf's new faces, whose indices
- * are greater. */
-static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
+/* Fills in leaf `index` of the accel, which has this rank in its level. Its list has first the
+ * references, then the leaf's new faces, whose indices are greater. */
+static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t index)
 {
-    ebpo_accel_leaf *leaf = &w->s->leaf[number];
-    uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
-    if (!reserve_list(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
+    ebpo_accel_leaf *leaf = &w->s->leaf[index];
+    uint64_t refs = level->leaf_ref_count[rank], new_count = level->leaf_new[rank];
+    if (!reserve_list(w, refs + (new_count > EBPO_BLOCK ? 2 * new_count / 9 : 1)))
         return;
     listing l = { .list = w->s->list + w->s->list_count, .block = UINT32_MAX };
     const uint32_t *ref = refs ? level->leaf_refs + w->refs[depth] : NULL;
     for (uint64_t i = 0; i < refs; i++)
         list_face(w, ref[i], &l);
-    for (uint64_t i = level->leaf_first[rank], end = i + fresh; i < end; i++)
+    for (uint64_t i = level->leaf_first[rank], end = i + new_count; i < end; i++)
         list_face(w, i, &l);
     if (!l.count) /* a leaf without faces gets block 0 without lanes */
         l.count = 1;
@@ -367,7 +378,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
 }
 
-/* Returns the entry of a white or black node. */
+/* Returns the table entry of a white or black node. `windings`: [rank], or NULL. */
 static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank,
                               int32_t default_winding)
 {
@@ -379,8 +390,8 @@ static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank,
     return entry;
 }
 
-/* Fills the tables below a node, which is the next one of its level and type, and returns the
- * node's entry. */
+/* Fills the tables below the next node of this level (`depth`) and type. Returns the node's entry.
+ */
 static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
 {
     const ebpo_level *level = &w->slice->level[depth];
@@ -392,15 +403,15 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     if (type == EBPO_BLACK)
         return uniform_entry(w, level->black_winding, rank, 1);
     if (type == EBPO_LEAF) {
-        uint32_t number = (uint32_t)(w->leaf_begin[depth] + rank);
-        fill_leaf(w, level, depth, rank, number);
-        return ebpo_entry(EBPO_ENTRY_LEAF, number);
+        uint32_t index = (uint32_t)(w->leaf_begin[depth] + rank);
+        fill_leaf(w, level, depth, rank, index);
+        return ebpo_entry(EBPO_ENTRY_LEAF, index);
     }
     uint64_t group = w->group_begin[depth + 1] + rank;
     if (w->slice->pruned &&
         (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
-            w->rank[depth + 1][EBPO_WHITE] += 8; /* the group of a pruned node counts as white */
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* the file stores eight white nodes for it */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
         return ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)group);
@@ -479,8 +490,8 @@ static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
 
 /* --- the stages --- */
 
-/* Returns the constant part of the error bound of a cross product of differences of coordinates in
- * floats (see query/inside_kernels.c). */
+/* Returns the constant part of the error bound of a cross product of differences of coordinates,
+ * computed in floats (see "turn" in query/inside_kernels.c). */
 static double turn_error_constant(const ebpo_box *box)
 {
     double coordinate = 0, size = 0; /* the greatest of each */
@@ -492,8 +503,8 @@ static double turn_error_constant(const ebpo_box *box)
     return 0x1p-43 * coordinate * size;
 }
 
-/* Sets the frame: the cell's centre, and a power of two that scales the cell's longest side to 1
- * .. 2. */
+/* Sets the frame (accel.h): the cell's centre, and a power of two that scales the cell's longest
+ * side to 1 .. 2. */
 static void make_frame(ebpo_accel *s)
 {
     double longest = 0, low[3], high[3];
@@ -508,6 +519,7 @@ static void make_frame(ebpo_accel *s)
     s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
 }
 
+/* Copies the planes of gray nodes from the slice. */
 static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t grays = 0, planes = 0, at = 0;
@@ -540,9 +552,9 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
     return EBPO_OK;
 }
 
-/* Returns the maximum number of rows of leaf planes (ebpo_kind_row). In a subtree it is small,
- * because few of its leaves are queried, and count_bytes counts these rows as used from the
- * beginning. */
+/* Returns the maximum number of rows of leaf planes (ebpo_kind_row). For a subtree the maximum is
+ * small, because few of its leaves are queried often, and count_bytes counts all these rows as used
+ * from the beginning. */
 static uint64_t rows_max(const ebpo_accel *s)
 {
     return s->root.cell.level ? s->leaf_count : 5 * (uint64_t)s->leaf_count;
@@ -562,6 +574,7 @@ static uint64_t count_bytes(const ebpo_accel *s)
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
+/* Makes all parts of the accel, in stages. Checks the quota when more about the size is known. */
 static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info,
                                ebpo_quota *space, unsigned threads, ebpo_error *error)
 {

@@ -6,11 +6,11 @@
 #include "core/cpu.h"
 #include "query/accel.h"
 
-/* The layout assigns faces to blocks (at most eight faces) and blocks to a hierarchy. It is made in
- * one walk through the tree, without coordinates. */
+/* The layout assigns faces to blocks (at most eight faces each), and blocks to a hierarchy. It is
+ * made in one walk through the tree, without coordinates. */
 typedef struct ebpo_layout {
-    /* [block_count] first face of each block, and one past its last face, as local indices (in the
-     * slice); the blocks together contain all faces, in order */
+    /* [block_count] first face of each block, and one past its last face, as local indices
+     * (accel.h); the blocks together contain all faces, in order */
     uint32_t *block_begin;
     uint32_t *block_end;
     uint64_t block_count, block_capacity;
@@ -18,18 +18,21 @@ typedef struct ebpo_layout {
      * (EBPO_MESHLET_UNIT); set by ebpo_accel_number_blocks */
     uint32_t *block_number;
     struct ebpo_block_corners *corners; /* [block_count] valid until the blocks are filled */
-    uint32_t (*child)[8];               /* [bound_count] as in ebpo_bound */
+    uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound, but blocks by index in the layout */
     /* [bound_count] the blocks below a node are contiguous: the first one, and one past the last
      * one */
     uint32_t *first_block;
     uint32_t *last_block;
-    uint64_t bound_count, bound_capacity, bound_capacity2, bound_capacity3, block_capacity2;
+    uint64_t bound_count;
+    /* capacities of child, first_block, last_block, block_end */
+    uint64_t bound_capacity, bound_capacity2, bound_capacity3, block_capacity2;
     uint32_t top; /* index in `child` of the hierarchy's root */
 } ebpo_layout;
 
-/* Returns EBPO_E_LIMIT for more than `most` blocks; `most` is EBPO_BLOCKS_MAX except in tests. */
-EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
-                                           ebpo_error *error);
+/* Makes the layout of a slice. Returns EBPO_E_LIMIT for more than `blocks_max` blocks, which is
+ * EBPO_BLOCKS_MAX except in tests. */
+EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice,
+                                           uint64_t blocks_max, ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
 /* What an accel is made from. */
@@ -40,18 +43,17 @@ typedef struct ebpo_accel_plan {
     ebpo_layout *layout; /* NULL: not made yet */
 } ebpo_accel_plan;
 
-/* ebpo_accel_number_blocks computes the sizes of blocks, numbers the blocks and sets s->units.
- * ebpo_accel_fill_blocks fills the blocks. Both functions use `threads` threads. */
+/* ebpo_accel_number_blocks computes the sizes of blocks, and sets their numbers (positions in
+ * units) and s->units. ebpo_accel_fill_blocks then fills the blocks. */
 EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                    unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                  unsigned threads, ebpo_error *error);
-/* Computes the boxes and bounding cylinders of the hierarchy from the blocks, with `threads`
- * threads. */
+/* Computes the boxes and bounding cylinders of the hierarchy from the filled blocks. */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
-/* Allocates storage for at most `rows_max` rows of leaf planes (ebpo_kind_row). Returns NULL
- * without memory. */
+/* Makes an empty store of at most `rows_max` rows of leaf planes (ebpo_kind_row). Returns NULL when
+ * out of memory. */
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
@@ -71,10 +73,11 @@ typedef struct ebpo_block_extent {
 /* Coordinates in which a bounding cylinder is measured. */
 typedef struct ebpo_cylinder_view {
     float origin_high[3], origin_low[3]; /* their sum is the origin, in the model's unit */
-    float scale;                         /* scale of the subtree's frame (ebpo_bound) */
-    float axis[3], length2_defect;       /* axis, and 1 - (its squared length) */
+    float scale;                         /* scale of the subtree's frame (ebpo_accel) */
+    float axis[3], length2_defect;       /* axis, and 1 minus its squared length */
 } ebpo_cylinder_view;
 
+/* The measured cylinder. */
 typedef struct ebpo_cylinder_extent {
     float from, to; /* extent along the axis, in the subtree's frame */
     float aside2;   /* square of the greatest distance from the axis */

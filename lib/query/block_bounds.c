@@ -1,9 +1,10 @@
-/* Computes the bounds of the hierarchy over faces: boxes and bounding cylinders around the blocks
- * below each child.
+/* Computes the bounds of the hierarchy over blocks of faces (accel.h): for each child of a node, a
+ * box and a bounding cylinder around all blocks below the child.
  *
- * All bounds are computed in doubles, in the subtree's frame, then rounded outward to 8 and 16
- * bits. Blocks of floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md
- * proves that the bounds still hold when kernels read them in single precision. */
+ * Bounds are computed in doubles, in the subtree's frame (coordinates in which the subtree's cell
+ * has a size of 1 to 2), and then rounded outward: boxes to 8 bits, cylinders to 16 bits. Blocks of
+ * floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md proves that the
+ * bounds are still valid when kernels read them in single precision. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -20,21 +21,22 @@
 #include "core/parallel.h"
 #include "query/accel_parts.h"
 
-/* Maximum number of blocks in a bounding cylinder: larger patches (all faces below a node) are too
- * curved. */
+/* Maximum number of blocks in a bounding cylinder: the faces of more blocks are usually too curved
+ * for a thin cylinder. */
 enum { CYLINDER_BLOCKS_MAX = 1024 };
 /* Enlargement of boxes, relative to the largest coordinate of their faces. */
 static const double box_slack = 0x1p-19;
-/* Enlargement of bounding cylinders, relative to the node's size. (It is not relative to the
- * largest coordinate, because patches may be much thinner than their distance from the origin.) */
+/* Enlargement of bounding cylinders, relative to the node's size. (Not relative to the largest
+ * coordinate, because a node's faces may be in a layer that is much thinner than its distance from
+ * the origin.) */
 static const double cylinder_slack = 0x1p-19;
-/* Searches test the cylinders of a node only if their squared limit exceeds this share of the
- * node's squared size (ebpo_bound.cylinder_limit2). */
+/* A search tests the cylinders of a node only if its squared distance limit exceeds this share of
+ * the node's squared size (ebpo_bound.cylinder_limit2). */
 static const double cylinder_share = 0.01;
 /* Enlargement of boxes whose coordinates are all 0. */
 static const double least_slack = 0x1p-60;
-/* AXIS_UNIT: stored value of an axis' coordinate 1. SHORT_MAX: greatest stored value of 16 bits;
- * one less than possible, as values are rounded outward. */
+/* AXIS_UNIT: the coordinate 1 of an axis is stored as this value. SHORT_MAX: the greatest stored
+ * value before it is rounded outward, so one less than 16 bits can hold. */
 enum { AXIS_UNIT = 1 << 15, SHORT_MAX = 32766 };
 
 /* Extent of vertices in the subtree's frame, and the sum of the normals of their faces. */
@@ -45,8 +47,8 @@ typedef struct extent {
 typedef struct job {
     ebpo_accel *s;
     const ebpo_layout *layout;
-    const ebpo_block_measures *measures;
-    extent *of_block, *of_node; /* [block_count], [bound_count] */
+    const ebpo_block_measures *measures; /* kernels for blocks of floats */
+    extent *of_block, *of_node; /* [block_count] and [bound_count] extents of blocks and nodes */
 } job;
 
 /* Two lanes of doubles. */
@@ -68,12 +70,11 @@ static inline pair greater_pair(pair a, pair b) { return pick_pair(a > b, a, b);
 static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
 static double max_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
 
-/* Vertices of a block of doubles, in the frame (coordinates in which the subtree's cell has a size
- * of 1 to 2). */
+/* Vertices of a block of doubles, in the subtree's frame. */
 enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
 typedef struct vertices {
     pair x[3][PAIRS];
-    unsigned pairs; /* number of pairs; the last vertex may occur twice */
+    unsigned pairs; /* number of pairs; if the number of vertices is odd, the last one is twice */
 } vertices;
 
 static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
@@ -90,9 +91,9 @@ static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
 
 /* --- extents --- */
 
-static const extent nothing = { { INFINITY, INFINITY, INFINITY },
-                                { -INFINITY, -INFINITY, -INFINITY },
-                                { 0, 0, 0 } };
+static const extent empty_extent = { { INFINITY, INFINITY, INFINITY },
+                                     { -INFINITY, -INFINITY, -INFINITY },
+                                     { 0, 0, 0 } };
 
 static void add_vertices(const vertices *v, extent *e)
 {
@@ -126,7 +127,7 @@ static void extend_wide(const ebpo_accel *s, uint32_t block, extent *e)
 {
     vertices v;
     load_vertices(s, block, &v);
-    *e = nothing;
+    *e = empty_extent;
     add_vertices(&v, e);
     add_normals(s, block, e->normal);
 }
@@ -168,6 +169,7 @@ static ebpo_status extend_blocks(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
+/* Returns the extent of a child, which is a block or a node of the hierarchy. */
 static const extent *extent_of(const job *j, uint32_t child)
 {
     return child & EBPO_IS_BLOCK ? &j->of_block[child & ~EBPO_IS_BLOCK] : &j->of_node[child];
@@ -177,7 +179,7 @@ static const extent *extent_of(const job *j, uint32_t child)
 static void extend_nodes(job *j)
 {
     for (uint64_t n = 0; n < j->layout->bound_count; n++) {
-        j->of_node[n] = nothing;
+        j->of_node[n] = empty_extent;
         for (int lane = 0; lane < 8 && j->layout->child[n][lane] != EBPO_NO_CHILD; lane++)
             add_extent(extent_of(j, j->layout->child[n][lane]), &j->of_node[n]);
     }
@@ -185,11 +187,11 @@ static void extend_nodes(job *j)
 
 /* --- boxes --- */
 
-/* Returns fmax of values that are not NaN, without a call. */
+/* Returns fmax of values that are not NaN; the compiler needs no function call for it. */
 static double larger_of(double a, double b) { return a > b ? a : b; }
 
-/* Chooses origin and step of one axis so that 255 steps cover the range. Returns the slack by which
- * boxes must be enlarged on both sides. */
+/* Chooses origin and step of one axis so that 255 steps cover low .. high. Returns the slack by
+ * which boxes must be enlarged on both sides. */
 static double choose_grid(double low, double high, float *origin, float *step)
 {
     double slack = larger_of(fabs(low), fabs(high)) * box_slack + least_slack;
@@ -200,7 +202,7 @@ static double choose_grid(double low, double high, float *origin, float *step)
     return slack;
 }
 
-/* Return floor and ceil of values that fit an int, without a call. */
+/* Return floor and ceil of values that fit into an int, without a function call. */
 static int round_down(double x)
 {
     int whole = (int)x;
@@ -214,6 +216,7 @@ static int round_up(double x)
 
 static double to_byte(double x) { return x < 0 ? 0 : x > 255 ? 255 : x; }
 
+/* Sets the boxes of a node's children, and cylinder_limit2. `all`: extent of the node. */
 static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
 {
     for (int k = 0; k < 3; k++) {
@@ -244,13 +247,14 @@ static double greatest_coordinate(const ebpo_bound *b)
 
 /* --- bounding cylinders --- */
 
+/* A bounding cylinder before it is rounded to 16 bits, in the subtree's frame. */
 typedef struct cylinder {
-    double middle[3], axis[3];
-    double from, to, radius2;
+    double middle[3], axis[3]; /* middle: of the child's box; axis: as it is stored */
+    double from, to, radius2;  /* extent along the axis from the middle; squared radius */
 } cylinder;
 
-/* Chooses the axis, rounded towards zero, so that the decoded axis is never longer than 1: the
- * formula of ebpo_bound_cylinder is valid only then. */
+/* Chooses the axis along the mean normal of the faces. The axis is rounded towards zero, so the
+ * decoded axis is never longer than 1. The formula of ebpo_bound_cylinder is valid only then. */
 static void choose_axis(const extent *e, ebpo_bound_cylinder *b, int lane, cylinder *out)
 {
     double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
@@ -262,6 +266,7 @@ static void choose_axis(const extent *e, ebpo_bound_cylinder *b, int lane, cylin
     }
 }
 
+/* As `cylinder`, for two lanes. */
 typedef struct cylinder_pairs {
     pair middle[3], axis[3], from, to, radius2;
 } cylinder_pairs;
@@ -281,9 +286,9 @@ static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
     }
 }
 
-/* Sets the extent of a cylinder around all vertices of the blocks begin .. end - 1 of the layout.
- * The extent along the axis need not contain 0, because the middle of the box of a tilted patch may
- * be off the patch. */
+/* Sets from, to and radius2 of a cylinder around all vertices of the blocks begin .. end - 1 of the
+ * layout. The interval from .. to need not contain 0: if the faces are tilted against the axes of
+ * coordinates, the middle of their box may be on one side of all of them. */
 static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     cylinder_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
@@ -301,8 +306,9 @@ static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *o
     out->radius2 = max_of(p.radius2);
 }
 
-/* Does the same as enclose_wide, in single precision. Coordinates are relative to the sum of two
- * floats near the middle; the difference of this sum from the middle is added at the end. */
+/* Does the same as enclose_wide for blocks of floats, in single precision. The kernel's coordinates
+ * are relative to an origin near the middle, which is the sum of two floats. The difference of this
+ * origin from the middle (`off`) is added at the end. */
 static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     const ebpo_accel *s = j->s;
@@ -329,7 +335,8 @@ static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder 
     out->radius2 = aside * aside;
 }
 
-/* Sets a cylinder without axis, as wide as the box: it bounds no better than the box. */
+/* Sets a cylinder without an axis, which contains the box, so that it excludes nothing more than
+ * the box. half: half of the sides of the box. */
 static void set_no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[3], cylinder *out)
 {
     for (int k = 0; k < 3; k++) {
@@ -338,6 +345,9 @@ static void set_no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[
     }
 }
 
+/* Returns the bounding cylinder of a child of node n, and stores its axis. `e`: extent of the
+ * child.
+ */
 static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const extent *e)
 {
     const ebpo_bound *b = &j->s->bound[n];
@@ -365,15 +375,16 @@ static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const exten
     return out;
 }
 
-/* Returns the longest side of the box of all children, at least 2^-18 of its largest coordinate. */
+/* Returns the longest side of the box of all children, which is at least 2^-18 of the largest
+ * coordinate of this box. */
 static double size_of(const ebpo_bound *b)
 {
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
 }
 
-/* Returns false if some faces are so far from their leaf that squares overflow, which is possible
- * in untrusted files. Steps of 16-bit values would then be infinite or NaN, so set_cylinders gives
- * the node cylinders that exclude nothing. */
+/* Returns false if squares have overflowed, because some faces are very far from their leaf. This
+ * is possible in untrusted files. The steps of 16-bit values would then be infinite or NaN, so
+ * set_cylinders gives the node cylinders that exclude nothing. */
 static bool are_finite(int count, const cylinder child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)
@@ -409,7 +420,8 @@ static void set_cylinders(ebpo_bound_cylinder *b, int count, double size, const 
 
 /* --- all nodes --- */
 
-/* Returns the number by which the accel (acceleration structure of a subtree) refers to a child. */
+/* Converts a child as in the layout to a child as in ebpo_bound, which names a block by its number.
+ */
 static uint32_t child_number(const job *j, uint32_t child)
 {
     return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)
@@ -465,6 +477,7 @@ static ebpo_status reserve_space(job *j, ebpo_error *error)
     return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->cylinder));
 }
 
+/* Sets the parent of each node. */
 static void link_parents(ebpo_accel *s)
 {
     for (uint32_t n = 0; n < s->bound_count; n++)
@@ -473,6 +486,7 @@ static void link_parents(ebpo_accel *s)
                 s->bound[s->bound[n].child[lane]].parent = n;
 }
 
+/* Computes all extents, then all boxes and cylinders. */
 static ebpo_status fill_levels(job *j, unsigned threads, ebpo_error *error)
 {
     ebpo_status status = ebpo_parallel_for(threads, NULL, j->layout->block_count, 512,

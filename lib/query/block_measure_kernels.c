@@ -1,5 +1,5 @@
-/* Measures blocks of floats for block_bounds.c, eight vertices at a time: the extent of
- * a block, and its extent along an axis and around it.
+/* Measures blocks of floats for block_bounds.c, eight vertices at a time: the box of a block, and
+ * how far its vertices extend along an axis and away from the axis.
  *
  * Compiled for several instruction sets (core/cpu.h), with the same operations in the same order.
  * Error bounds: docs/develop/bounds.md, "How bounding cylinders are measured". */
@@ -14,11 +14,12 @@ static const float lane_number[8] = { 0, 1, 2, 3, 4, 5, 6, 7 };
 
 EBPO_EIGHT float max_of(f8 x) { return -f8_least(f8_sub(f8_all(0), x)); }
 
-/* Loads a coordinate of the vertices at .. at + 7. Lanes beyond the last vertex get vertex 0. */
-EBPO_EIGHT f8 load_vertices(const float *x, unsigned at, unsigned count)
+/* Loads one coordinate of the vertices first .. first + 7. Lanes beyond the last vertex get vertex
+ * 0. x: [count] this coordinate of all vertices. */
+EBPO_EIGHT f8 load_vertices(const float *x, unsigned first, unsigned count)
 {
-    f8 used = f8_less(f8_load(lane_number), f8_all((float)count - (float)at));
-    return f8_pick(used, f8_load(x + at), f8_all(x[0]));
+    f8 used = f8_less(f8_load(lane_number), f8_all((float)count - (float)first));
+    return f8_pick(used, f8_load(x + first), f8_all(x[0]));
 }
 
 /* Sums the normals of the block's faces, each as long as twice the face's area. */
@@ -57,12 +58,13 @@ static void measure_extent(const ebpo_accel *s, uint32_t block, ebpo_block_exten
     measure_normals(&b, out->normal);
 }
 
-typedef struct cylinder_sums {
+/* ebpo_cylinder_extent of the vertices so far, in eight lanes. */
+typedef struct cylinder_lanes {
     f8 from, to, aside2;
-} cylinder_sums;
+} cylinder_lanes;
 
-/* Extends the sums by eight vertices. */
-EBPO_EIGHT void measure_eight(const ebpo_cylinder_view *view, const f8 x[3], cylinder_sums *sum)
+/* Extends the cylinders by eight vertices. */
+EBPO_EIGHT void measure_eight(const ebpo_cylinder_view *view, const f8 x[3], cylinder_lanes *lanes)
 {
     f8 d[3], along, aside2;
     for (int k = 0; k < 3; k++)
@@ -76,15 +78,15 @@ EBPO_EIGHT void measure_eight(const ebpo_cylinder_view *view, const f8 x[3], cyl
         f8 aside = f8_sub(d[k], f8_mul(along, f8_all(view->axis[k])));
         aside2 = f8_add(aside2, f8_mul(aside, aside));
     }
-    sum->from = f8_min(along, sum->from);
-    sum->to = f8_max(along, sum->to);
-    sum->aside2 = f8_max(aside2, sum->aside2);
+    lanes->from = f8_min(along, lanes->from);
+    lanes->to = f8_max(along, lanes->to);
+    lanes->aside2 = f8_max(aside2, lanes->aside2);
 }
 
 static void measure_cylinder(const ebpo_accel *s, const uint32_t *block, uint32_t count,
                              const ebpo_cylinder_view *view, ebpo_cylinder_extent *out)
 {
-    cylinder_sums sum = { f8_all(INFINITY), f8_all(-INFINITY), f8_all(0) };
+    cylinder_lanes lanes = { f8_all(INFINITY), f8_all(-INFINITY), f8_all(0) };
     for (uint32_t i = 0; i < count; i++) {
         const ebpo_meshlet *m = ebpo_accel_meshlet(s, block[i]);
         const float *v = ebpo_meshlet_floats(m);
@@ -92,12 +94,12 @@ static void measure_cylinder(const ebpo_accel *s, const uint32_t *block, uint32_
             f8 x[3];
             for (unsigned k = 0; k < 3; k++)
                 x[k] = load_vertices(v + k * m->vertices, at, m->vertices);
-            measure_eight(view, x, &sum);
+            measure_eight(view, x, &lanes);
         }
     }
-    out->from = f8_least(sum.from);
-    out->to = max_of(sum.to);
-    out->aside2 = max_of(sum.aside2);
+    out->from = f8_least(lanes.from);
+    out->to = max_of(lanes.to);
+    out->aside2 = max_of(lanes.aside2);
 }
 
 const ebpo_block_measures EBPO_KERNEL(ebpo_block_measures) = { measure_extent, measure_cylinder };

@@ -1,10 +1,12 @@
-/* Makes blocks: at most eight faces, with the vertices that they share.
+/* Makes blocks, which have at most eight faces each, with the vertices that these faces share, and
+ * the hierarchy over the blocks (accel.h).
  *
- * The layout decides which faces share a block and builds the hierarchy of blocks; it uses no
- * coordinates. The hierarchy follows the octree. The new faces of a node are one range of numbers,
- * so neighbouring children with few faces share a block, and nodes with few blocks are passed up
- * until eight come together. The blocks are then measured, numbered and filled in parallel;
- * block_bounds.c computes their bounds. The encoding is that of ebpo_meshlet (accel.h). */
+ * First, the layout decides which faces are in one block, and builds the hierarchy; it uses no
+ * coordinates. The new faces of a node (faces that no leaf before the node lists) have consecutive
+ * local indices. So neighbouring children with few new faces can share a block. The hierarchy
+ * follows the octree: the blocks below an octree node are passed up to its parent until there are
+ * more than eight, which are then joined in nodes of the hierarchy. Then the blocks are measured,
+ * numbered and filled in parallel; block_bounds.c computes their bounds. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -17,10 +19,10 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* Result of the walk below a node: either at most eight faces that have no block yet, or at most
- * eight members (blocks or nodes of the hierarchy). */
+/* The result of the walk below a node of the octree: either at most eight faces that have no block
+ * yet, or at most eight members (blocks or nodes of the hierarchy), which contain its faces. */
 typedef struct bundle {
-    uint32_t begin, end; /* range of faces */
+    uint32_t begin, end; /* range of faces, as local indices */
     int members;         /* number of members; 0: the faces have no block yet */
     uint32_t member[8];  /* as in ebpo_bound.child */
 } bundle;
@@ -28,16 +30,17 @@ typedef struct bundle {
 typedef struct walk {
     ebpo_layout *out;
     const ebpo_slice *slice;
-    uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* nodes of each level, visited so far */
-    uint64_t most;                                         /* maximum number of blocks */
-    bool failed;
+    /* number of visited gray nodes, and of visited leaves, of each level */
+    uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
+    uint64_t blocks_max;
+    bool failed; /* too many blocks, or out of memory */
 } walk;
 
-/* Adds a block of the faces begin .. end - 1. Returns its number as a member. */
+/* Adds a block of the faces begin .. end - 1. Returns the block as a member of a bundle. */
 static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
 {
     ebpo_layout *o = w->out;
-    if (o->block_count >= w->most ||
+    if (o->block_count >= w->blocks_max ||
         !ebpo_grow(&o->block_begin, &o->block_capacity, o->block_count + 1,
                    sizeof *o->block_begin) ||
         !ebpo_grow(&o->block_end, &o->block_capacity2, o->block_count + 1, sizeof *o->block_end)) {
@@ -49,8 +52,8 @@ static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
     return (uint32_t)o->block_count++ | EBPO_IS_BLOCK;
 }
 
-/* Adds a node of the hierarchy. Its first_block and last_block are indices of faces until
- * renumber_blocks. Returns its number as a member. */
+/* Adds a node of the hierarchy with the members of a bundle. Returns the node as a member. Until
+ * renumber_blocks, its first_block and last_block are the range of its faces. */
 static uint32_t add_bound(walk *w, const bundle *b)
 {
     ebpo_layout *o = w->out;
@@ -68,7 +71,7 @@ static uint32_t add_bound(walk *w, const bundle *b)
     return (uint32_t)o->bound_count++;
 }
 
-/* Makes a block of the bundle's faces, if they have none. */
+/* Makes a block of the bundle's faces, if they have no block yet. */
 static void close_bundle(walk *w, bundle *b)
 {
     if (b->members == 0 && b->end > b->begin) {
@@ -77,13 +80,14 @@ static void close_bundle(walk *w, bundle *b)
     }
 }
 
-/* Consecutive bundles begin .. end - 1, and the number of their members. */
+/* The consecutive bundles begin .. end - 1 of an array, and the number of their members. */
 typedef struct run {
     int begin, end, members;
 } run;
 
-/* Returns the consecutive bundles, none of them wrapped yet, that have the most members, at most
- * eight. Without this choice the hierarchy would become deep. */
+/* Chooses the bundles that join_parts wraps in a node next: consecutive bundles, none of them
+ * wrapped yet, with as many members as possible, but at most eight. With emptier nodes, the
+ * hierarchy would become deeper. */
 static run choose_run(const bundle *part, int parts, const bool wrapped[8])
 {
     run best = { 0, 0, 0 };
@@ -109,8 +113,8 @@ static bundle gather_parts(const bundle *part, int parts)
     return out;
 }
 
-/* Wraps consecutive bundles in nodes, as full as possible, until at most eight members remain.
- * Changes `part`. */
+/* Joins consecutive bundles to one bundle of at most eight members. If they have more members,
+ * wraps some of the bundles in nodes of the hierarchy. Changes `part`. */
 static bundle join_parts(walk *w, bundle *part, int parts)
 {
     bool wrapped[8] = { false };
@@ -135,7 +139,8 @@ static bundle join_parts(walk *w, bundle *part, int parts)
                      : gather_parts(part, parts);
 }
 
-/* Splits a range of faces into consecutive blocks of about equal size, eight under each node. */
+/* Splits a range of faces into consecutive blocks of about equal size, with at most eight blocks or
+ * nodes below each node of the hierarchy. */
 static bundle split_range(walk *w, uint32_t begin, uint32_t end)
 {
     uint64_t count = end - begin;
@@ -154,6 +159,7 @@ static bundle split_range(walk *w, uint32_t begin, uint32_t end)
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin);
 
+/* Walks the children of the next gray node of the level. The node's faces begin at `begin`. */
 static bundle walk_gray(walk *w, int depth, uint32_t begin)
 {
     const ebpo_level *level = &w->slice->level[depth + 1];
@@ -177,23 +183,24 @@ static bundle walk_gray(walk *w, int depth, uint32_t begin)
     return parts == 1 ? part[0] : join_parts(w, part, parts);
 }
 
+/* Walks the next node of this type in its level. A gray node whose next level is not in the slice
+ * is pruned, so it has no faces. */
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
 {
-    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* if the next level is not in the
-                                                                 * slice, the node is pruned */
+    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count)
         return walk_gray(w, depth, begin);
     if (type == EBPO_LEAF)
         return split_range(w, begin, begin + w->slice->level[depth].leaf_new[w->leaf[depth]++]);
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Renumbers blocks in the order of their faces, so that the blocks below a node are one range.
- * Before, blocks are numbered in the order in which the walk made them. Returns false without
+/* Sorts blocks in the order of their faces (until now they are in the order in which the walk made
+ * them), so that the blocks below a node of the hierarchy are one range. Returns false when out of
  * memory. */
 static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
 {
-    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face), /* block that begins at a face */
-        *end = ebpo_alloc(o->block_count, sizeof *end);
+    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face), /* block that begins at this face */
+        *end = ebpo_alloc(o->block_count, sizeof *end);         /* new block_end */
     if (!at_face || !end) {
         free(at_face);
         free(end);
@@ -205,7 +212,7 @@ static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
     for (uint64_t face = 0; face < faces; number++) {
         uint32_t old = at_face[face];
         end[number] = o->block_end[old];
-        o->block_end[old] = number; /* from here on, block_end[old] is the block's new number */
+        o->block_end[old] = number; /* from now on, block_end[old] is the block's new index */
         at_face[face] = number;
         face = end[number];
     }
@@ -225,11 +232,11 @@ static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
     return true;
 }
 
-ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
+ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t blocks_max,
                              ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
-    walk w = { .out = out, .slice = slice, .most = most };
+    walk w = { .out = out, .slice = slice, .blocks_max = blocks_max };
     bundle part[2];
     int parts = 0;
     if (slice->shared_count)
@@ -246,7 +253,7 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
     }
     if (!w.failed)
         return EBPO_OK;
-    bool full = out->block_count >= most;
+    bool full = out->block_count >= blocks_max;
     ebpo_layout_free(out);
     return full ? ebpo_fail(error, EBPO_E_LIMIT,
                             "the model has too many faces to be held in memory at once; give a "
@@ -268,10 +275,11 @@ void ebpo_layout_free(ebpo_layout *layout)
 
 /* --- blocks --- */
 
-/* For each corner of a block's faces, [face][corner]: index of its vertex in the block. Vertices
- * are in the order in which the faces first use them. */
+/* The vertices of a block's corners. A block's vertices are in the order in which its faces first
+ * use them. */
 struct ebpo_block_corners {
-    uint8_t at[EBPO_MESHLET_VERTICES], count;
+    uint8_t at[EBPO_MESHLET_VERTICES]; /* [face][corner] index of the vertex in the block */
+    uint8_t count;                     /* number of different vertices */
 };
 
 typedef struct job {
@@ -287,12 +295,11 @@ typedef struct block_vertices {
     unsigned faces, count;
 } block_vertices;
 
-/* Hash table with open addressing. An entry is the index of a vertex in the block plus one; 0:
- * free. */
+/* A hash table of vertices. An entry is the index of a vertex in the block plus one; 0: free. */
 enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
 
-/* Returns the vertices of the corners of the block's faces, in the slice's mesh, and their number.
- */
+/* Returns the vertex of each corner of the block's faces, as indices in the slice's mesh, and the
+ * number of corners. */
 static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
 {
     uint32_t begin = j->layout->block_begin[block];
@@ -300,7 +307,7 @@ static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
     return j->mesh->faces + 3 * (uint64_t)begin;
 }
 
-/* Finds the distinct vertices of a block: sets layout->corners[block]. */
+/* Finds the different vertices of a block, and sets layout->corners[block]. */
 static void find_vertices(const job *j, uint64_t block)
 {
     unsigned corners, count = 0;
@@ -309,7 +316,8 @@ static void find_vertices(const job *j, uint64_t block)
     uint8_t table[TABLE] = { 0 };
     for (unsigned i = 0; i < corners; i++) {
         unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS), at;
-        /* branch-free, because a branch on a new corner is unpredictable; collisions are rare */
+        /* The vertex is stored before it is known to be new, so that a free slot compares as equal:
+         * a branch on new vertices would be unpredictable. Collisions are rare. */
         vertex[count] = corner[i];
         for (;; slot = (slot + 1) % TABLE) {
             at = table[slot] ? table[slot] - 1u : count;
@@ -334,7 +342,7 @@ static void copy_block(const job *j, uint64_t block, block_vertices *out)
         out->vertex[out->at[i]] = corner[i];
 }
 
-/* Returns the size of the record, in units. */
+/* Returns the size of a block's record in units (EBPO_MESHLET_UNIT). */
 static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
 {
     if (vertices > EBPO_MESHLET_SHARED)
@@ -344,6 +352,7 @@ static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
     return (uint32_t)((bytes + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT);
 }
 
+/* Finds the vertices of blocks, and stores the size of each block in layout->block_number. */
 static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
@@ -357,8 +366,8 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-/* Replaces the size of each block by its number: the sum of the sizes of the blocks before it.
- * Returns false if there are too many units. */
+/* Replaces the size of each block by its number, which is the sum of the sizes of the blocks before
+ * it. Returns false if there are too many units. */
 static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 {
     for (uint64_t b = 0; b < layout->block_count; b++) {
@@ -371,8 +380,8 @@ static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 
 /* --- filling --- */
 
-/* Makes each corner of each lane a separate vertex, for a block with more than EBPO_MESHLET_SHARED
- * vertices. */
+/* Gives each corner of each lane a separate vertex, as in a record with more than
+ * EBPO_MESHLET_SHARED vertices. */
 static void spread_corners(block_vertices *v)
 {
     uint32_t corner[EBPO_MESHLET_VERTICES];
@@ -430,8 +439,8 @@ static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Allocates records. Kernels always read 16 vertices, so one more unit is allocated after the last
- * record. */
+/* Allocates the records. Kernels always read 16 vertices, which may be beyond a record's end, so
+ * one more unit is allocated after the last record. */
 static ebpo_status reserve_space(ebpo_accel *s, ebpo_error *error)
 {
     uint64_t bytes = s->units * EBPO_MESHLET_UNIT;

@@ -1,10 +1,10 @@
 /* Divides the memory budget of a model.
  *
- * A model is completely in memory if the budget allows that. If not, the budget is divided between
- * the top of the tree (levels 0 to the cut level, query_top.c), a cache of decoded chunks,
- * skeletons (upper nodes of the hierarchies over faces, skeleton.c) and a cache of subtrees. The
- * cut level is chosen so that subtrees are small enough. The plan uses only the counts in the file
- * header; no chunks are read.
+ * A model is held completely in memory if the budget allows that ("whole model"). If not, the
+ * budget is divided between the top of the tree (levels 0 to the cut level, query_top.c), a cache
+ * of decoded chunks, skeletons (upper nodes of subtrees' hierarchies over faces, skeleton.c) and a
+ * cache of subtrees, whose roots are at the cut level. The cut level is chosen so that subtrees are
+ * small enough. The plan uses only the counts in the file header; no chunks are read.
  *
  * Several models may share a budget: the bytes that each model takes permanently are subtracted,
  * and the caches of all models share the remaining bytes. Any thread may use a shared budget. */
@@ -32,9 +32,9 @@ uint64_t ebpo_chunk_budget(uint64_t budget)
                                           : budget / 8;
 }
 
-/* Returns the maximum bytes of skeletons: a quarter of the bytes above the minimum budget, so that
- * the minimum does not grow. Searches over the whole model gain more from skeletons than from a few
- * more subtrees. */
+/* Returns the maximum bytes of skeletons: a quarter of the bytes above the minimum budget. (With
+ * the minimum budget there are no skeletons, so they do not increase the minimum.) Searches over
+ * the whole model gain more from skeletons than from a few more subtrees in memory. */
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
 {
     const uint64_t least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
@@ -47,9 +47,9 @@ uint64_t ebpo_bytes_besides_subtrees(const ebpo_model_options *o, uint64_t budge
 }
 
 struct ebpo_budget {
-    uint64_t bytes;
-    ebpo_cache_pool *subtrees, *chunks;
-    pthread_mutex_t lock;      /* protects the following fields */
+    uint64_t bytes;                     /* of the budget */
+    ebpo_cache_pool *subtrees, *chunks; /* for the caches of all models that share the budget */
+    pthread_mutex_t lock;               /* protects the following fields */
     uint64_t whole, skeletons; /* bytes still available for whole models and for skeletons */
 };
 
@@ -59,11 +59,12 @@ ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error
     ebpo_model_options default_options = EBPO_MODEL_OPTIONS_INIT;
     uint64_t chunks = ebpo_chunk_budget(bytes), least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
     if (bytes == 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the budget is 0 bytes");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the budget is 0 bytes; give at least %" PRIu64,
+                         least);
     if (bytes < least)
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "a budget of %" PRIu64 " bytes is too small for any model; give %" PRIu64
-                         " at least",
+                         "a budget of %" PRIu64
+                         " bytes is too small for any model; give at least %" PRIu64,
                          bytes, least);
     ebpo_budget *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b)
@@ -110,7 +111,7 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *b) { return b->chunks; }
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *b) { return b->bytes; }
 
-/* Returns the bytes that are not taken permanently. */
+/* Returns the bytes of the budget that no model has taken permanently. */
 static uint64_t budget_left(const ebpo_budget *b)
 {
     uint64_t now, peak, taken;
@@ -158,8 +159,9 @@ void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
 
 /* --- the plan of a model --- */
 
-/* Number of subtrees that a cache must have space for: a path needs the current subtree, its
- * neighbours, and memory to load the next one. If the budget allows SUBTREES_WANTED, the subtrees
+/* SUBTREES_NEEDED: number of subtrees for which the cache must have space. Queries along a path
+ * need the current subtree, its neighbours, and memory to load the next one. SUBTREES_WANTED:
+ * number for which it has space if the budget allows; the cut level is then deeper, and subtrees
  * are smaller and load faster. */
 enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
 
@@ -176,9 +178,9 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
     return size;
 }
 
-/* Returns true if the budget is sufficient for the top of the tree, which takes `top` bytes. The
- * levels may take a quarter of the budget, and the caps of a surface (faces that close holes) half
- * of the budget. */
+/* Returns true if the budget is sufficient for the top of the tree, which takes `top` bytes. Of
+ * these, the levels may take a quarter of the budget, and the data about a surface's holes
+ * (holes.h) half of the budget. */
 static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                      uint64_t top)
 {
@@ -187,9 +189,9 @@ static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_
            top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget;
 }
 
-/* Returns the lowest cut level for which half the budget holds `subtrees` subtrees of average size,
- * or -1 if the budget is too small. At the deepest level, subtrees are single leaves, for which
- * less is sufficient. */
+/* Returns the first cut level for which half the budget holds `subtrees` subtrees of average size,
+ * or -1 if the budget is too small. If there is no such level, returns the deepest level: its
+ * subtrees are single leaves, for which less memory is sufficient. */
 static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                    uint64_t subtrees)
 {
@@ -207,13 +209,14 @@ static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t 
                : info->level_count - 1;
 }
 
+/* Returns the cut level for a budget, or -1 if the budget is too small. */
 static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
 {
     int cut = cut_for(info, o, budget, SUBTREES_WANTED);
     return cut < 0 ? cut_for(info, o, budget, SUBTREES_NEEDED) : cut;
 }
 
-/* Returns a budget that choose_cut accepts, slightly above the minimum. */
+/* Returns a budget that choose_cut accepts, at most an eighth above the least such budget. */
 static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
 {
     uint64_t budget = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
@@ -222,8 +225,8 @@ static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
     return budget;
 }
 
-/* Remote files are read in parts, as queries rarely need a whole file. REMOTE_MEMORY: the default
- * budget. REMOTE_WHOLE_BYTES: smaller files may be read completely. */
+/* Remote files are read in parts, because queries rarely need a whole file. REMOTE_MEMORY: the
+ * default budget in bytes. REMOTE_WHOLE_BYTES: smaller files may be read completely. */
 enum { REMOTE_MEMORY = 256 << 20, REMOTE_WHOLE_BYTES = 2 << 20 };
 
 /* Returns true if the file is remote and must be read in parts, even if the budget holds the whole
@@ -245,8 +248,9 @@ bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
     return is_default;
 }
 
-/* Returns the level of the roots of the file's subtrees, if it is deeper than `cut` and the budget
- * allows it, because each of these subtrees is read at once. If not, returns `cut`. */
+/* Returns the better cut level: `cut`, or the level of the roots of the subtrees into which the
+ * file is divided. The latter is better if it is deeper and the budget allows it, because the file
+ * stores each of its subtrees together. */
 static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;
@@ -256,6 +260,7 @@ static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, i
 
 /* --- applying the plan --- */
 
+/* Chooses the cut level of a model that is not held completely in memory. */
 static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options *o,
                                 ebpo_model_plan *out, ebpo_error *error)
 {
@@ -269,6 +274,8 @@ static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options 
     return EBPO_OK;
 }
 
+/* Decides if the model is held completely in memory (out->resident), and otherwise chooses the cut
+ * level. */
 static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *o,
                                bool default_memory, ebpo_model_plan *out, ebpo_error *error)
 {
@@ -315,7 +322,7 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
     uint64_t keep, least;
     *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
     if (o->loading > EBPO_LOAD_NODES)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "model options: unknown load mode %d",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "model options: load mode %d does not exist",
                          (int)o->loading);
     if (o->budget && o->loading != EBPO_LOAD_CACHE)
         return ebpo_fail(error, EBPO_E_ARGUMENT,

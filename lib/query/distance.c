@@ -1,11 +1,11 @@
 /* Computes the distance to the surface, the nearest point and the normal (EBP 2017, 4.4).
  *
- * nearest_subtrees.c finds the exact minimum. The three modes of the thesis, whose result is not
- * always the minimum, search the leaf around the point, all leaves below the deepest gray node
- * around the point, or the envelope of a node. With a level, a query returns an interval for the
- * distance, from the envelopes of that level's nodes. If a deadline passes, the query returns an
- * interval from the nodes searched by then. In a subset, a query fails with EBPO_E_ABSENT if an
- * omitted face might be nearer than the found face. */
+ * nearest_subtrees.c finds the exact minimum. The result of the three modes of the thesis is not
+ * always the minimum: they search only the leaf that contains the point, all leaves below the
+ * deepest gray node that contains it, or the envelope of a node. With a level, a query returns an
+ * interval for the distance, from the envelopes of that level's nodes. If a deadline passes, the
+ * query returns an interval from the nodes that were searched until then. In a subset, a query
+ * fails with EBPO_E_ABSENT if an omitted face might be nearer than the found face. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -50,8 +50,8 @@ static ebpo_status search_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node nod
     return status;
 }
 
-/* Searches the leaf around p. If no leaf contains p, finds nothing (LEAVES), or searches all leaves
- * below the deepest gray node around p (RECURSIVE). */
+/* Searches the leaf that contains p. If p is not in a leaf, finds nothing (EBPO_DISTANCE_LEAVES),
+ * or searches all leaves below the deepest gray node that contains p (EBPO_DISTANCE_RECURSIVE). */
 static ebpo_status distance_around(ebpo_context *c, const double p[3],
                                    const ebpo_distance_options *o, ebpo_distance_result *out,
                                    ebpo_error *error)
@@ -84,7 +84,7 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
     return status == EBPO_OK ? ebpo_give_sign(c, p, o, out, error) : status;
 }
 
-/* Converts the coordinates xi (0 .. 1 in the cell) to a point. */
+/* Converts coordinates in the cell (xi, 0 .. 1) to a point of the model. */
 static void point_at(const ebpo_box *box, ebpo_cell cell, const double xi[3], double out[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -93,7 +93,7 @@ static void point_at(const ebpo_box *box, ebpo_cell cell, const double xi[3], do
     }
 }
 
-/* Finds the nearest point of the polygons of the envelope `e`, each divided into triangles. */
+/* Finds the nearest point of the polygons of the envelope `e`, which are divided into triangles. */
 static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_cell cell,
                             const double p[3], ebpo_distance_result *out)
 {
@@ -126,10 +126,10 @@ typedef struct node_chain {
     ebpo_node node[EBPO_LEVELS_MAX];
     int count;
     const ebpo_node *pruned; /* &child, if `child` is a pruned node without envelope; else NULL */
-    ebpo_node child;         /* the node below the last node of `node` */
+    ebpo_node child;         /* the next node on the way down, if the last node is gray */
 } node_chain;
 
-/* Follows the nodes that contain the cell `at` of the deepest level, down to `level` (-1: no
+/* Finds the chain of nodes that contain the cell `at` of the deepest level, down to `level` (-1: no
  * limit). */
 static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level, node_chain *out,
                                 ebpo_error *error)
@@ -166,9 +166,9 @@ static unsigned octant_of(ebpo_cell cell)
     return (cell.at[0] & 1) | (cell.at[1] & 1) << 1 | (cell.at[2] & 1) << 2;
 }
 
-/* Cuts the envelope of the chain's last node that has one, into cutting[0]; returns the node's
- * index in the chain. A node's envelope is cut from its parent's envelope, so the cut starts at the
- * deepest node whose envelope is kept. */
+/* Computes the envelope of the chain's last node that has one, in c->cutting[0]; returns the node's
+ * index in the chain. A node's envelope is cut from its parent's envelope, so the computation
+ * starts at the deepest node whose envelope the context has kept from an earlier query. */
 static int cut_envelope(ebpo_context *c, const node_chain *chain)
 {
     ebpo_polytope *out = &c->cutting[0], *above = &c->cutting[1];
@@ -194,8 +194,8 @@ static int cut_envelope(ebpo_context *c, const node_chain *chain)
     return at - 1;
 }
 
-/* Computes the distance to the polygons of the envelope of the deepest gray node around p, at most
- * at options->level. */
+/* Computes the distance to the polygons of one envelope: that of the deepest gray node that
+ * contains p, at level o->level or above. */
 static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
                                         const ebpo_distance_options *o, ebpo_distance_result *out,
                                         ebpo_error *error)
@@ -222,9 +222,10 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
 
 /* --- subsets: an omitted face may be nearer than the found one --- */
 
-/* Visits nodes with bounds within the search's limit. Before the deadline, fails with EBPO_E_ABSENT
- * at the first pruned node. After the deadline, lowers *nearest to the bounds of pruned nodes and
- * of subtrees, which are not entered. `lower`: bound of `node`. */
+/* Visits the nodes at or below `node` whose lower bound of the distance is within the search's
+ * limit. Before the deadline, fails with EBPO_E_ABSENT at the first pruned node. After the
+ * deadline, does not fail and enters no subtrees, but lowers *nearest to the bounds of pruned nodes
+ * and subtrees. `lower`: bound of `node`. */
 static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
                                  const ebpo_ranking *ranking, ebpo_node node, double lower,
                                  double *nearest, ebpo_error *error)
@@ -249,8 +250,9 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
     return status;
 }
 
-/* Fails with EBPO_E_ABSENT if an omitted part may change the result. After the deadline it does not
- * fail: the bound of the omitted part widens the interval. */
+/* In a subset, fails with EBPO_E_ABSENT if an omitted part of the model may change the result.
+ * After the deadline, does not fail, but widens the interval of the result by the bound of that
+ * part. */
 static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_ranking ranking = ebpo_ranking_of(c->model, n->p, &n->far);
@@ -264,12 +266,15 @@ static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
     return status;
 }
 
+/* Prefetches the subtrees that queries near p will need. */
 static void prefetch_around(ebpo_context *c, const double p[3], double search_distance)
 {
     if (ebpo_model_prefetches(c->model))
         ebpo_context_prefetch(c, p, search_distance);
 }
 
+/* Finds the nearest face, or an interval for the distance if the deadline passes. A warm search
+ * starts from the face that the context's last query found. */
 static ebpo_status exact_distance(ebpo_context *c, const double p[3],
                                   const ebpo_distance_options *o, ebpo_distance_result *out,
                                   ebpo_error *error)
@@ -289,8 +294,8 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        /* With a very short deadline nothing may have been found. The root cell has a face, so
-         * its farthest point is an upper bound. */
+        /* If no face was found before the deadline, the distance of the farthest point of the root
+         * cell is an upper bound, because a face is in the root cell. */
         ebpo_box box = ebpo_model_box(c->model);
         double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
                lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
@@ -316,13 +321,14 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
 typedef struct interval {
     ebpo_context *c;
     const ebpo_distance_options *o;
-    ebpo_ranking ranking;
-    ebpo_far far;
-    uint64_t deadline;
-    double lo, hi; /* bounds so far: distances, or keys if the point is far (point_bounds.h) */
+    ebpo_ranking ranking; /* computes bounds of nodes */
+    ebpo_far far;         /* the point, if it is far from the model (point_bounds.h) */
+    uint64_t deadline;    /* a time of ebpo_clock; 0: none */
+    double lo, hi;        /* bounds so far: distances, or keys if the point is far */
 } interval;
 
-/* Improves the interval by the envelopes below a node. `lower`: bound of `node`. */
+/* Improves the interval by the envelopes at or below `node`. `lower`: lower bound of the distance
+ * to `node`. */
 static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, ebpo_error *error)
 {
     if (lower > v->hi || ebpo_node_is_uniform(&node))
@@ -346,6 +352,7 @@ static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, eb
     return status;
 }
 
+/* Computes an interval for the distance from the envelopes of a level. */
 static ebpo_status distance_interval(ebpo_context *context, const double p[3],
                                      const ebpo_distance_options *options, double *lo, double *hi,
                                      ebpo_error *error)
@@ -367,6 +374,7 @@ static ebpo_status distance_interval(ebpo_context *context, const double p[3],
     return status;
 }
 
+/* Sets the result of a query with a level: only an interval. */
 static ebpo_status limited_distance(ebpo_context *c, const double p[3],
                                     const ebpo_distance_options *o, ebpo_distance_result *out,
                                     ebpo_error *error)
@@ -401,8 +409,8 @@ static ebpo_status check_values(const ebpo_distance_options *o, ebpo_error *erro
 /* Returns EBPO_E_ARGUMENT if the mode does not support the given level or deadline. */
 static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
 {
-    bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
-    if (around && (o->level >= 0 || o->deadline_ns))
+    bool by_leaves = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
+    if (by_leaves && (o->level >= 0 || o->deadline_ns))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the recursive and leaves modes of distance support neither level nor "
                          "deadline; omit these, or use the exact mode");
@@ -413,8 +421,8 @@ static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Adds a batch to the model's counts. `searched`, `loaded`: counts of the context before the batch.
- */
+/* Adds the work of a batch to the model's statistics. `searched`, `loaded`: c->searched and
+ * c->loaded before the batch. */
 static void count_work(ebpo_context *c, uint64_t queries, uint64_t searched, uint64_t loaded)
 {
     if (c->model->whole)
@@ -442,7 +450,8 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)
         status = ebpo_check_mesh(context->model, error);
-    /* planes tighten the bounds of levels, deadlines and, in a subset, of omitted parts */
+    /* Planes improve the bounds of nodes, which matter with a level, with a deadline and, in a
+     * subset, for omitted parts. */
     context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
                       context->model->info->pruned;
     ebpo_batch batch = { .context = context,

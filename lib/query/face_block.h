@@ -1,7 +1,7 @@
-/* Reads a block (at most eight faces, accel.h) for kernels: one face in each of eight lanes, one
- * axis after the other. Lanes without a face repeat the block's first face. So a kernel that
- * computes bounds needs no mask; a kernel that counts faces uses ebpo_face_block_lanes. This header
- * is included by files that are compiled for several processors. */
+/* Reads a block (at most eight faces, accel.h) for kernels: one face in each of eight lanes, for
+ * one axis of coordinates at a time. Lanes without a face repeat the block's first face. So a
+ * kernel that computes bounds needs no mask; a kernel that counts faces uses ebpo_face_block_lanes.
+ * This header is included by files that are compiled for several processors. */
 #ifndef EBPO_QUERY_FACE_BLOCK_H
 #define EBPO_QUERY_FACE_BLOCK_H
 
@@ -9,8 +9,8 @@
 #include "core/simd.h"
 
 typedef struct ebpo_face_block {
-    const ebpo_meshlet *m;
-    n8 corner[3]; /* [corner] each lane's vertex; not used in blocks without shared vertices */
+    const ebpo_meshlet *m; /* the block's record */
+    n8 corner[3];          /* [corner] each lane's vertex; not used if the record has 24 vertices */
 } ebpo_face_block;
 
 EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t block)

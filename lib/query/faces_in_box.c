@@ -1,10 +1,11 @@
 /* Finds the faces that intersect a box: their indices, or their triangles in batches.
  *
- * The walk visits the accels (acceleration structures of subtrees) that intersect the box, depth
- * first. In an accel it tests the boxes of the hierarchy and skips boxes that are certainly
- * outside. Then it tests triangles exactly. In remote files the walk sends prefetch hints for the
- * subtrees that it will enter. A face that several subtrees list is returned once. In a subset the
- * query fails if a pruned node intersects the box. */
+ * The walk visits the accels (acceleration structures of subtrees, accel.h) whose cells intersect
+ * the box, depth first. In an accel, it skips the boxes of the bounding hierarchy that are
+ * certainly outside the query's box, and tests the remaining triangles exactly. In remote files the
+ * walk sends prefetch hints for the subtrees that it will enter. A face that several subtrees list
+ * is returned once. In a subset, the query fails if a pruned node (whose children are not in the
+ * file) intersects the box. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,14 +23,15 @@
 typedef struct box_walk box_walk;
 struct box_walk {
     ebpo_context *context;
-    const double *min, *max;
-    /* slots of the current accel's faces that intersect the box; sorted when `take` is called */
+    const double *min, *max; /* [3] corners of the query's box */
+    /* [count] slots of the current accel's faces that intersect the box; sorted when `take` is
+     * called */
     uint32_t *slot;
     uint64_t count, capacity;
     ebpo_node subtree_root; /* of the current subtree; not set if the accel is the whole tree */
     bool no_memory;
     bool enough; /* ends the walk; set by `take` */
-    /* for a remote file: the subtrees that the walk will enter, in order */
+    /* [ahead_count] for a remote file: the subtrees that the walk will enter, in order */
     uint32_t *ahead;
     uint64_t ahead_count, ahead_capacity;
     uint64_t entered; /* number of subtrees entered so far */
@@ -43,7 +45,8 @@ static ebpo_status check_box(const double min[3], const double max[3], ebpo_erro
     for (int k = 0; k < 3; k++)
         if (!isfinite(min[k]) || !isfinite(max[k]) || !(min[k] <= max[k]))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "a box needs finite corners, the lower one first on each axis");
+                             "a box needs two finite corners, and the first corner must not be "
+                             "above the second one on any axis");
     return EBPO_OK;
 }
 
@@ -67,8 +70,8 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
 }
 
 /* Adds the slots of the faces that intersect the box and are below `child`, a node of the hierarchy
- * or a block. low, high: the query's box in the subtree's frame. The hierarchy's boxes were
- * enlarged by more than the rounding error of floats here. */
+ * or a block. low, high: the query's box in the subtree's frame. No slack is needed, because the
+ * hierarchy's boxes were enlarged by more than the rounding errors here. */
 static void gather_child(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
@@ -123,8 +126,9 @@ static bool intersects_box(void *user, const ebpo_box *box, const ebpo_node *nod
     return ebpo_cell_intersects(box, node->cell, w->min, w->max);
 }
 
-/* Lists the subtrees that the walk will enter. If there is no memory for the whole list, the other
- * subtrees get prefetch hints only when they are read. */
+/* Lists the subtrees that the walk will enter at or below a node. If there is not enough memory,
+ * the list is shorter, and subtrees that are not listed get prefetch hints only when they are read.
+ */
 static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
     if (ebpo_node_is_uniform(&node) || !intersects_box(w, box, &node) || w->no_memory)
@@ -198,11 +202,11 @@ static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const do
     return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Finds, depth first below `node`, the first accel (decoded subtree) whose cell intersects both the
- * box of the query and the triangle. Returns false if there is none. *entry: index of the accel's
- * root in the tree (ebpo_node). Several accels can list one face: those with a cell that the face
- * intersects, and some with a cell that the face is only near (format-spec, section 7). The query
- * takes the face from this first accel only, so it needs no list of visited faces. */
+/* Finds, depth first below `node`, the first accel whose cell intersects both the query's box and
+ * the triangle. Returns false if there is none. *entry: entry of the accel's root (ebpo_node).
+ * Several accels can list one face: those whose cells the face intersects, and some whose cells it
+ * is only near (format-spec, section 7). The query takes a face from this first accel only, so it
+ * needs no list of the faces that it has already found. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
@@ -226,8 +230,8 @@ static bool box_walk_is_first(const box_walk *w, bool owned, const double triang
     uint32_t entry = 0;
     if (m->whole)
         return true;
-    /* No earlier accel lists an owned face. If the face is only near this accel's cell, a later
-     * accel takes it. */
+    /* No accel before the current one lists an owned face. If the face is only near the current
+     * accel's cell, a later accel is the first one. */
     if (owned)
         return intersects_cell(&box, &w->subtree_root, triangle);
     return find_first(w, &box, ebpo_model_root(m), triangle, &entry) &&
@@ -247,6 +251,7 @@ typedef struct gathering {
     uint64_t count, capacity;
 } gathering;
 
+/* Appends the indices of the faces that the walk found in an accel (box_walk.take). */
 static ebpo_status receive_face_indices(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     gathering *g = (gathering *)walk;
@@ -266,6 +271,7 @@ static int compare_pairs(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
+/* Sorts the found faces, removes repetitions, and stores the source indices in the context. */
 static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *count,
                                 ebpo_error *error)
 {
@@ -315,8 +321,8 @@ typedef struct batch {
 typedef struct delivery {
     box_walk walk; /* must be the first member */
     batch *batch;
-    uint64_t count; /* triangles in the batch */
-    ebpo_triangles_fn take;
+    uint64_t count;             /* triangles in the batch */
+    ebpo_triangles_fn function; /* of the caller, called with `user` */
     void *user;
 } delivery;
 
@@ -328,10 +334,12 @@ static void pass_batch(delivery *d)
                            .faces = d->batch->faces,
                            .file_faces = d->batch->file_faces };
     if (d->count && !d->walk.enough)
-        d->walk.enough = !d->take(d->user, &all);
+        d->walk.enough = !d->function(d->user, &all);
     d->count = 0;
 }
 
+/* Appends the faces that the walk found in an accel to the batch (box_walk.take), except those that
+ * belong to another accel. */
 static ebpo_status receive_triangles(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;
@@ -356,13 +364,13 @@ ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], co
     EBPO_DEFAULT_FP;
     delivery d = {
         .walk = { .context = context, .min = min, .max = max, .take = receive_triangles },
-        .take = function,
+        .function = function,
         .user = user
     };
     ebpo_status status = check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);
-    /* before the first triangle is passed to the caller */
+    /* checked before the first triangle is passed to the caller */
     if (status == EBPO_OK)
         status = box_walk_check(&d.walk, error);
     if (status == EBPO_OK && !(d.batch = ebpo_alloc(1, sizeof *d.batch)))

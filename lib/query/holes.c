@@ -1,17 +1,21 @@
-/* Decides points inside a surface with holes, by the caps of its border.
+/* Decides if points are inside a surface with holes, by the caps of its border: faces that close
+ * the loops of border edges.
  *
- * The octree of a surface has the winding numbers k of the surface with its caps, which are
- * integers. The winding number of the surface is w = k + w_D, where w_D is the winding number of
- * the discs D (geometry/cap_tree.h). Bounds of w_D for all points of a cell often decide for the
- * whole cell. The error of a bound shows that no cap touches the cell, so k changes in the cell at
- * faces only. If |w_D| is below t and below 1 - t for the threshold t, the rule for w equals the
- * rule for k; the rules are then equal in all cells below too. Other white nodes have one result if
- * the bounds of k + w_D are on one side of the rule's boundary. Near a cap, the value of w at the
- * centre and a bound of its variation decide. Points of the remaining cells are decided one by one
+ * The octree of a surface has the winding numbers k of the closed mesh of surface and caps, which
+ * are integers. The winding number of the surface alone is w_S = k + w_D, where w_D is the winding
+ * number of the discs D: the caps, turned the other way (geometry/cap_tree.h). A point is inside if
+ * w_S satisfies the rule with the threshold t.
+ *
+ * Bounds of w_D for all points of a cell often decide for the whole cell. The size of their error
+ * also shows that no cap touches the cell, so k changes in the cell at faces only. If |w_D| is
+ * below t and below 1 - t, the rule for w_S gives the same result as the rule for k, in this cell
+ * and in all cells below it. Another white node has one result if the bounds of k + w_D are on one
+ * side of the rule's boundary. Near a cap, the value of w_S at the cell's centre and a bound of its
+ * variation in the cell decide. Points of the remaining cells are decided one by one
  * (cap_winding.c).
  *
- * Discs that are far from a cell are bounded once for all cells below. Each cell has a list of the
- * other discs, which is made from the list of its parent (cap_bounds.c). */
+ * Discs that are far from a cell are bounded once for all cells below it. Each cell has a list of
+ * the other (near) discs, which is made from the list of its parent (cap_bounds.c). */
 #include "core/strict_fp.h"
 
 #include <limits.h>
@@ -68,19 +72,20 @@ uint64_t ebpo_holes_bytes(const ebpo_holes *holes)
 typedef struct marking {
     const ebpo_holes *holes;
     const ebpo_marked_table *m;
-    ebpo_cap_lists lists;
-    bool fits;       /* winding numbers are small enough */
-    bool has_memory; /* for lists */
+    ebpo_cap_lists lists; /* of the near discs of all cells on the path to the current cell */
+    bool fits;            /* all winding numbers so far are small enough */
+    bool has_memory;      /* false: the lists are incomplete, because memory was not available */
     uint64_t split_capacity, near_capacity, disc_capacity;
-    uint64_t bytes; /* left for the table */
-    ebpo_cap_front front;
+    uint64_t bytes;       /* how many more bytes may be added to the table */
+    ebpo_cap_front front; /* for bounds of w_D that are refined step by step */
 } marking;
 
-/* What is known of the discs in a cell: bounds of the far ones, and a list of the others. */
+/* The discs as seen from a cell: bounds of the sum of the far discs, and a list of the near discs.
+ */
 typedef struct near_discs {
-    uint64_t begin, end; /* in marking.lists */
-    ebpo_bounded far;
-    bool decided; /* the rule for k decides in the whole cell */
+    uint64_t begin, end; /* the list: marking.lists.entry[begin .. end - 1] */
+    ebpo_bounded far;    /* sum of the half angles (2 pi w_D) of the far discs */
+    bool decided;        /* the rule for k decides in the whole cell */
 } near_discs;
 
 static ebpo_cap_box box_of(const marking *w, ebpo_cell cell)
@@ -90,14 +95,14 @@ static ebpo_cap_box box_of(const marking *w, ebpo_cell cell)
     return ebpo_cap_box_of(low, high);
 }
 
-/* Bounds w_D in a cell step by step: lists[begin .. end) are the near discs. */
+/* Begins to bound w_D in a cell, step by step (ebpo_cap_front_refine). */
 static void begin_front(marking *w, const ebpo_cap_box *box, const near_discs *near)
 {
     ebpo_cap_front_begin(&w->front, &w->holes->caps, box, w->lists.entry + near->begin,
                          near->end - near->begin, near->far);
 }
 
-/* Returns true if |w_D| is certainly below t and 1 - t. */
+/* Returns true if |w_D| is certainly below t and 1 - t. `angles`: bounds of 2 pi w_D. */
 static bool is_small(const marking *w, ebpo_bounded angles)
 {
     const double t = fmin(w->holes->rule.threshold, 1 - w->holes->rule.threshold);
@@ -105,7 +110,7 @@ static bool is_small(const marking *w, ebpo_bounded angles)
     return fabs(b.middle) + b.error < t - 0x1p-40;
 }
 
-/* Returns true if a disc of the list is large compared with the box. */
+/* Returns true if a single disc of the list is large compared with the box. */
 static bool has_large_disc(const marking *w, const ebpo_cap_box *box, const near_discs *near)
 {
     for (uint64_t i = near->begin; i < near->end; i++) {
@@ -117,6 +122,7 @@ static bool has_large_disc(const marking *w, const ebpo_cap_box *box, const near
     return false;
 }
 
+/* Returns false if certainly no cap touches the cell. */
 static bool caps_touch(const marking *w, ebpo_cell cell)
 {
     double low[3], high[3];
@@ -124,7 +130,8 @@ static bool caps_touch(const marking *w, ebpo_cell cell)
     return ebpo_caps_near(&w->holes->caps, low, high);
 }
 
-/* Returns true if |w_D| is small in the cell, by at most `steps` refinements. */
+/* Returns true if at most `steps` refinements of the bounds show that |w_D| is small in the cell.
+ */
 static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, int steps)
 {
     bool apart;
@@ -136,9 +143,9 @@ static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, 
     return false;
 }
 
-/* Begins bounds of w_D at the centre of a cell. *variation: how much 2 pi w_S at most differs from
- * its value at the centre if no face touches the cell; and also 2 pi w_D, if no cap touches it.
- * Returns false if this is not bounded. */
+/* Begins to bound w_D at the centre of a cell. *variation: if no face touches the cell, 2 pi w_S at
+ * any point of the cell differs from its value at the centre by at most this; if no cap touches the
+ * cell, the same is true of 2 pi w_D. Returns false if there is no such bound. */
 static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variation)
 {
     const ebpo_cap_box centre = ebpo_cap_point(box->centre);
@@ -149,7 +156,8 @@ static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variati
     return true;
 }
 
-/* Returns true if |w_D| is small in a leaf that no cap touches, by the value at the centre. */
+/* Returns true if the value of w_D at the centre shows that |w_D| is small in the whole cell of a
+ * leaf that no cap touches. */
 static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
 {
     double variation;
@@ -165,8 +173,8 @@ static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
     return false;
 }
 
-/* Returns 1 or 0 if all points of a cell without faces have this result, else -1. `winding`: that
- * of the lowest corner. */
+/* Returns 1 if all points of a cell without faces are certainly inside, 0 if all are outside, else
+ * -1. `winding`: k at the lowest corner. */
 static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, const near_discs *near,
                        int32_t winding)
 {
@@ -196,7 +204,7 @@ static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, cons
     return -1;
 }
 
-/* Returns true if the rule for k decides in a leaf. */
+/* Returns true if the rule for k certainly decides at all points of a leaf. */
 static bool is_far_leaf(marking *w, ebpo_cell cell, const ebpo_cap_box *box, const near_discs *near)
 {
     return is_far(w, box, near, INT_MAX) ||
@@ -214,7 +222,7 @@ static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_di
     return near;
 }
 
-/* Uses bytes of the table. Returns false if there are too few. */
+/* Takes bytes of the quota for the table. Returns false if the quota has too few. */
 static bool use_bytes(marking *w, uint64_t bytes)
 {
     bool fits = bytes <= w->bytes;
@@ -222,7 +230,7 @@ static bool use_bytes(marking *w, uint64_t bytes)
     return fits;
 }
 
-/* Adds an ebpo_near_cell. Returns its index, or -1 without space. */
+/* Adds an ebpo_near_cell to the table. Returns its index, or -1 if there is no space. */
 static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, int32_t winding)
 {
     ebpo_node_table *t = w->m->table;
@@ -247,7 +255,8 @@ static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, in
 static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                          const near_discs *parent);
 
-/* Splits a cell. Returns the index of its parts, or -1 if there is no space. */
+/* Splits a cell into eight parts and marks them. Returns the index of the parts in the table's
+ * `split`, or -1 if the cell cannot be split. */
 static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                           const near_discs *near)
 {
@@ -269,8 +278,9 @@ static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf
     return (int32_t)index;
 }
 
-/* Returns the marked entry of a part of a leaf, or of a cell without faces. `winding`: number for
- * ebpo_near_cell. */
+/* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf (`leaf`).
+ * `winding`: for a cell without faces, k at its lowest corner; for a leaf, the value that its
+ * ebpo_near_cell gets (see mark_leaf). */
 static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                          const near_discs *parent)
 {
@@ -296,6 +306,8 @@ static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
     return marked;
 }
 
+/* Marks a leaf, if the rule for k does not decide in it. If caps may touch the leaf, `caps` is the
+ * index of an ebpo_near_cell with these caps, whose crossings queries must count. */
 static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const near_discs *parent)
 {
     const ebpo_accel *s = w->m->accel;
@@ -323,7 +335,7 @@ static uint32_t mark_uniform(marking *w, ebpo_cell cell, int32_t winding, const 
 /* Marks a node and the nodes below it. Recursive, one call for each level. */
 static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_discs *parent)
 {
-    enum { STEPS = 2 };
+    enum { STEPS = 2 }; /* refinements for a gray node, whose children can be tested, too */
     ebpo_node_table *t = w->m->table;
     uint32_t value = ebpo_entry_value(*entry);
     switch (ebpo_entry_kind_of(*entry)) {
@@ -361,13 +373,13 @@ ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *ma
     w->bytes = marked->bytes;
     w->has_memory = ebpo_grow(&w->lists.entry, &w->lists.capacity, 1, sizeof *w->lists.entry);
     if (w->has_memory && holes->caps.node_count > 0)
-        w->lists.entry[all.end++] = 0; /* the root */
+        w->lists.entry[all.end++] = 0; /* the root of the tree of caps: all discs */
     w->lists.count = all.end;
     mark_node(w, &table->root, marked->root, &all);
     bool fits = w->fits;
     free(w->lists.entry);
     free(w);
-    if (table->grid) { /* it has copies of entries */
+    if (table->grid) { /* the grid has copies of entries, so it is made again */
         free(table->grid);
         free(table->grid_depth);
         table->grid = NULL;
@@ -392,6 +404,7 @@ int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const
     return holes->caps.node_count ? ebpo_cap_path_crossings(&holes->caps, 0, low, p) : 0;
 }
 
+/* Converts a decision to a result, and counts ties. */
 static ebpo_where where_of(ebpo_holes *holes, ebpo_cap_decision d)
 {
     if (d.tie)

@@ -1,5 +1,5 @@
-/* Decides points inside a surface with holes, by its generalized winding number. Caps are faces
- * that close the loops of the border. */
+/* Decides if points are inside a surface with holes, by the surface's generalized winding number.
+ * The border is the edges of the holes, which form loops. Caps are faces that close these loops. */
 #ifndef EBPO_QUERY_HOLES_H
 #define EBPO_QUERY_HOLES_H
 
@@ -11,11 +11,11 @@
 #include "geometry/cells.h"
 #include "query/accel.h"
 
-/* The caps of a surface, and the rule. Any thread. */
+/* The caps of a surface, and the rule. Any thread may use it. */
 typedef struct ebpo_holes {
     ebpo_cap_tree caps;
     ebpo_cap_rule rule;
-    _Atomic uint64_t ties; /* number of decisions that were ties */
+    _Atomic uint64_t ties; /* number of decisions that were ties (ebpo_cap_decision) */
 } ebpo_holes;
 
 /* Reads the border of a file with EBPO_PART_BORDER. */
@@ -23,28 +23,29 @@ EBPO_MUST_USE ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *fil
                                           ebpo_error *error);
 void ebpo_holes_free(ebpo_holes *holes); /* accepts NULL */
 uint64_t ebpo_holes_bytes(const ebpo_holes *holes);
-/* Returns an upper bound of the bytes of a border in memory. Twice of this also holds it while it
- * is read. */
+/* Returns an upper bound of the bytes of a border in memory. While the border is read, it takes at
+ * most twice as many bytes. */
 static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 {
     return info->parts & EBPO_PART_BORDER ? 4096 + EBPO_CAPS_BYTES * info->border_points : 0;
 }
 
-/* Returns the maximum bytes of marks of a whole model. */
+/* Returns the maximum bytes that ebpo_holes_mark adds to the table of a whole model. */
 static inline uint64_t ebpo_holes_marks_max(const ebpo_info *info)
 {
     return info->parts & EBPO_PART_BORDER ? (UINT64_C(1) << 17) + 320 * info->border_points : 0;
 }
 
-/* Decides what is constant in the cells of a table's nodes, and marks these nodes. Uniform entries
- * get a number of ebpo_marked_entry in place of the winding number at their lowest corner. A leaf
- * with cell_face EBPO_NEAR_BORDER is decided point by point; in other leaves the rule for the
- * integer winding number decides, as in a solid. Uniform nodes that are not decided are split into
- * groups of eight cells, down to level `deepest`. The data that are added to the table take at most
- * `bytes`. Returns EBPO_E_LIMIT for winding numbers beyond 2^25. */
+/* Finds the nodes of a table in which all points have the same result, and marks all nodes of the
+ * table. Uniform entries (white nodes) get a number of ebpo_marked_entry in place of the winding
+ * number at their lowest corner. A leaf in which points must be decided one by one gets the
+ * cell_face EBPO_NEAR_BORDER; in other leaves the rule for the integer winding number decides, as
+ * in a solid. A uniform node whose points may have different results is split into eight cells
+ * again and again, down to level `deepest`, and these cells are marked. The data that are added to
+ * the table take at most `bytes`. Returns EBPO_E_LIMIT for winding numbers beyond 2^25. */
 typedef struct ebpo_marked_table {
-    const ebpo_box *box;
-    ebpo_cell root;
+    const ebpo_box *box; /* root cell of the model */
+    ebpo_cell root;      /* cell of the table's root */
     ebpo_node_table *table;
     const ebpo_accel *accel; /* of the table; NULL: the table has no leaves */
     ebpo_cell_faces_fn *cell_faces;
@@ -53,18 +54,19 @@ typedef struct ebpo_marked_table {
 } ebpo_marked_table;
 EBPO_MUST_USE ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
                                           ebpo_error *error);
-/* Returns the bytes that were added to a table. */
+/* Returns the bytes that ebpo_holes_mark has added to a table. */
 uint64_t ebpo_holes_marked_bytes(const ebpo_node_table *table);
 
-/* Results for all points of a cell without faces. */
+/* The result for the points of a cell without faces. A marked entry has a mark and a value. */
 typedef enum ebpo_uniform_mark {
-    EBPO_MARK_OUT = 0,
-    EBPO_MARK_IN = 1,
-    EBPO_MARK_NEAR = 2,   /* decided point by point */
-    EBPO_MARK_LISTED = 3, /* the same; the value is the index of its ebpo_near_cell */
-    EBPO_MARK_SPLIT = 4   /* has parts; the value is their index in ebpo_node_table.split */
+    EBPO_MARK_OUT = 0,    /* all points are outside; value: winding number (ebpo_holes_mark) */
+    EBPO_MARK_IN = 1,     /* all points are inside; value: winding number */
+    EBPO_MARK_NEAR = 2,   /* points are decided one by one; value: winding number */
+    EBPO_MARK_LISTED = 3, /* points are decided one by one; value: index of the ebpo_near_cell */
+    EBPO_MARK_SPLIT = 4   /* the cell has eight parts; value: index in ebpo_node_table.split */
 } ebpo_uniform_mark;
 
+/* The first function makes a marked entry; the other two return its mark and its value. */
 static inline int32_t ebpo_marked_entry(int32_t value, ebpo_uniform_mark mark)
 {
     return value * 8 + (int32_t)mark;
@@ -75,8 +77,9 @@ static inline ebpo_uniform_mark ebpo_entry_mark(int32_t marked)
 }
 static inline int32_t ebpo_marked_value(int32_t marked) { return (marked - (marked & 7)) / 8; }
 
-/* Returns the mark of a part of a cell: that at position `at` of level `fine`. *level: in, the
- * level of the cell; out, that of the part. */
+/* Returns the marked entry of the part of a cell that contains the position `at` of level `fine`.
+ * On entry, `marked` and *level are the cell's marked entry and level; on return, *level is the
+ * part's level. */
 static inline int32_t ebpo_marked_part(const ebpo_node_table *table, int32_t marked,
                                        const uint32_t at[3], int fine, int *level)
 {
@@ -85,17 +88,17 @@ static inline int32_t ebpo_marked_part(const ebpo_node_table *table, int32_t mar
     return marked;
 }
 
-/* Returns the crossings of caps on the way from the lowest corner of a cell to a point in it, both
- * shifted: along x, then y, then z. */
+/* Returns the sum of the crossings with caps on the way from the lowest corner of a cell (`low`) to
+ * a point in it, along x, then y, then z. Both points are shifted as in format-spec, section 10. */
 int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const double p[3]);
 
-/* The same, of the caps that may touch a cell. */
+/* Returns the same sum, but counts only the caps that may touch `cell`. */
 int32_t ebpo_holes_list_crossings(const ebpo_holes *holes, const ebpo_node_table *table,
                                   const ebpo_near_cell *cell, const double low[3],
                                   const double p[3]);
 
-/* Classifies a point that is on no face; `winding` is the winding number of surface and caps. The
- * second function is faster, for a point of a cell. */
+/* Classify a point that is on no face; `winding` is the winding number, at the point, of the closed
+ * mesh of surface and caps. The second function is faster; the point must be in `cell`. */
 ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding);
 ebpo_where ebpo_holes_where_in(ebpo_holes *holes, const ebpo_node_table *table,
                                const ebpo_near_cell *cell, const double p[3], int32_t winding);

@@ -1,18 +1,22 @@
 /* Decides exactly whether points are inside a model.
  *
- * In a leaf, the signs of the planes of the leaf's faces decide where possible (leaf_kinds.c).
- * Where they do not, crossings of faces with axis-parallel segments are counted: with one segment
- * from a free cell face (one that no face intersects) to the point, or with three segments that
- * lead from the cell's lowest corner to the point. A filter in single precision counts first
- * (inside_kernels.c); exact predicates decide the faces that are *open*: the filter could not
- * decide them. In a model that is completely in memory, a batch goes down the tree several points
- * at a time.
+ * In leaves of some kinds, the signs of the planes of the leaf's faces at the point decide
+ * (leaf_kinds.c). In other leaves, the winding number at the point is the winding number at a known
+ * position of the cell, plus the crossings of faces with axis-parallel segments from this position
+ * to the point: one segment from a free cell face (a cell face that no face intersects), or three
+ * segments from the cell's lowest corner. A filter in single precision counts the crossings first
+ * (inside_kernels.c). A face that the filter cannot decide is *open*; exact predicates decide it.
+ * In a model that is completely in memory, a batch goes down the tree with several points at a
+ * time.
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
  * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. If the point
  * is in a pruned node (whose children are not in the file), an envelope decides, or the query fails
- * with EBPO_E_ABSENT. Envelopes of a surface do not contain its inside, so they decide nothing
- * there.
+ * with EBPO_E_ABSENT. For surfaces, envelopes do not decide, because the inside of a surface may be
+ * outside its envelopes.
+ *
+ * In a surface with its border (the edges of its holes), leaves and white nodes near the border are
+ * marked, and points in them are decided by holes.c.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"
@@ -33,8 +37,8 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* Decides a point in a pruned node by the envelopes of the nodes above it. It is declared here
- * because it calls functions below that call it. */
+/* Decides a point in a pruned node by the envelopes of the nodes above it. (Declared here, because
+ * it and the functions that it calls are recursive.) */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error);
 
@@ -55,8 +59,8 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
     return false;
 }
 
-/* Sets *sum to the crossings along a segment. Returns false if `point`, an end of the segment, is
- * on a face. NULL: no test. */
+/* Sets *sum to the signed crossings of a leaf's faces with a segment. Returns false if `point`, an
+ * end of the segment, is on a face. If `point` is NULL, always returns true. */
 static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                        const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
                        uint32_t *open, int32_t *sum)
@@ -68,13 +72,14 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 
 /* A point in a leaf's cell. */
 typedef struct leaf_point {
-    ebpo_cell leaf;
+    ebpo_cell leaf;     /* the leaf's cell */
     double xi[3];       /* coordinates in the cell, 0 .. 1; the error is at most 2^-30 */
-    const uint32_t *at; /* position at the finest level */
+    const uint32_t *at; /* [3] the cell of the deepest level that contains the point */
     uint32_t sixteenth; /* coordinates in sixteenths of the cell, eight bits for each axis, as the
                          * lower sides in ebpo_listed_block */
 } leaf_point;
 
+/* Sets the position of a point in the cell of a leaf at this level. */
 static inline void find_leaf_point(int deepest, int level, const ebpo_position *position,
                                    leaf_point *out)
 {
@@ -91,8 +96,7 @@ static inline void find_leaf_point(int deepest, int level, const ebpo_position *
     }
 }
 
-/* Returns ebpo_axis_segment.reach for the point alone. A segment from the point to a cell face has
- * more bits. */
+/* Returns ebpo_axis_segment.reach for a segment of length 0 at the point. */
 static inline uint32_t reach_of(const leaf_point *at)
 {
     return at->sixteenth | (UINT32_C(0x0f0f0f) - at->sixteenth) << 4;
@@ -118,8 +122,8 @@ static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_fac
     return g;
 }
 
-/* Finds the winding number by one segment from the free cell face. Returns false if the point is on
- * a face. */
+/* Computes the winding number by one segment between the free cell face and the point. Returns
+ * false if the point is on a face. */
 static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                            const ebpo_accel_leaf *leaf, const leaf_point *at, const double p[3],
                            uint32_t *open, int32_t *winding)
@@ -132,9 +136,9 @@ static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel 
     return true;
 }
 
-/* Finds the winding number by three segments from the lowest corner (format-spec, section 10).
- * Returns false if the point is on a face, which the last segment finds. `boxed`: the boxes of the
- * leaf's list are known. */
+/* Computes the winding number by three segments from the lowest corner to the point (format-spec,
+ * section 10). Returns false if the point is on a face; only the last segment, which ends at the
+ * point, tests this. `boxed`: the boxes of the leaf's list are known. */
 static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                         const ebpo_accel_leaf *leaf, bool boxed, const leaf_point *at,
                         const double p[3], uint32_t *open, int32_t *winding)
@@ -195,7 +199,7 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
     return !any_sign(not_below);
 }
 
-/* Counts the query, which may find the leaf's kind, and returns the kind. */
+/* Counts a query of a leaf whose kind is not known; this may find the kind. Returns the kind. */
 static __attribute__((noinline)) ebpo_leaf_kind query_kind(const ebpo_context *context,
                                                            const ebpo_accel *s,
                                                            ebpo_accel_leaf *leaf,
@@ -213,7 +217,7 @@ static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_acc
     return kind <= EBPO_LEAF_CONCAVE ? kind : query_kind(context, s, leaf, at);
 }
 
-/* Sets the result for a winding number. For a surface, the winding number is given as 0 or 1,
+/* Sets the result for a winding number. For a surface, the result's winding number is 0 or 1,
  * unless the context wants undecided results (ebpo_context.undecided). */
 static inline void give_winding(const ebpo_context *context, int32_t winding,
                                 ebpo_inside_result *out)
@@ -223,8 +227,8 @@ static inline void give_winding(const ebpo_context *context, int32_t winding,
     *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, rounded ? in : winding, 0 };
 }
 
-/* Decides a point of a surface by the winding number of the closed mesh of surface and caps (faces
- * that close its holes). */
+/* Decides a point of a surface. `winding`: the winding number at the point of the closed mesh of
+ * the surface and its caps (faces that close its holes). */
 static void decide_capped(const ebpo_context *context, const double p[3], int32_t winding,
                           ebpo_inside_result *out)
 {
@@ -249,8 +253,8 @@ static inline void inside_beyond_root(const ebpo_context *context, const double 
         give_out(out);
 }
 
-/* Decides a point of a cell near the border. `cell`: the cell's record, or NULL. `winding`: winding
- * number of surface and caps. */
+/* Decides a point of a cell near the border. `cell`: the record of the cell, which makes this
+ * faster, or NULL. `winding`: winding number of surface and caps at the point. */
 static void decide_near(const ebpo_context *context, const ebpo_node_table *table,
                         const ebpo_near_cell *cell, int32_t winding, const double p[3],
                         ebpo_inside_result *out)
@@ -264,7 +268,8 @@ static void decide_near(const ebpo_context *context, const ebpo_node_table *tabl
 }
 
 /* Decides a point of a leaf near the border. `winding`: winding number of surface and caps at the
- * leaf's lowest corner plus the crossings of faces on the way to the point. */
+ * leaf's lowest corner, plus the crossings of faces on the way to the point. This function adds the
+ * crossings of caps on this way. */
 static void decide_in_leaf(const ebpo_context *context, const ebpo_accel *s,
                            const ebpo_accel_leaf *leaf, const leaf_point *at, const double p[3],
                            int32_t winding, ebpo_inside_result *out)
@@ -298,13 +303,13 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
                                    const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_inside_kernels *kernels = context->model->kernels.inside;
-    uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
+    uint64_t open_max = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
     /* another thread may be writing the cell face of a leaf that is not bounded yet */
     bool near = bounded && leaf->cell_face == EBPO_NEAR_BORDER;
-    if (most > context->open_capacity &&
-        !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
-        return ebpo_fail_memory(error, most * sizeof *context->open);
+    if (open_max > context->open_capacity &&
+        !ebpo_grow(&context->open, &context->open_capacity, open_max, sizeof *context->open))
+        return ebpo_fail_memory(error, open_max * sizeof *context->open);
     bool on_no_face = bounded && leaf->cell_face < EBPO_NO_CELL_FACE
                           ? from_cell_face(kernels, s, leaf, at, p, context->open, &winding)
                           : from_corner(kernels, s, leaf, bounded, at, p, context->open, &winding);
@@ -317,6 +322,7 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
     return EBPO_OK;
 }
 
+/* Decides a point in a leaf, by planes if the leaf's kind allows it. */
 static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
                                   const leaf_point *at, const double p[3], ebpo_inside_result *out,
                                   ebpo_error *error)
@@ -329,18 +335,18 @@ static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, eb
     return EBPO_OK;
 }
 
-/* Classifies p in a leaf of a subtree at this level; p is in the leaf's cell, and `position` is its
- * shifted position. */
-static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
+/* Classifies p in leaf `index` of a subtree. The leaf is at this level, p is in the leaf's cell,
+ * and `position` is p's shifted position. */
+static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t index,
                                int level, const ebpo_position *position, const double p[3],
                                ebpo_inside_result *out, ebpo_error *error)
 {
     leaf_point at;
     find_leaf_point(context->model->locator.level, level, position, &at);
-    return result_in_leaf(context, s, &s->leaf[number], &at, p, out, error);
+    return result_in_leaf(context, s, &s->leaf[index], &at, p, out, error);
 }
 
-/* Classifies a point in a white node of a surface, all of whose points have the same result. */
+/* Classifies a point in a white node of a surface whose mark is EBPO_MARK_IN or EBPO_MARK_OUT. */
 static inline void give_marked(const ebpo_context *context, int32_t marked, ebpo_inside_result *out)
 {
     bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
@@ -348,7 +354,7 @@ static inline void give_marked(const ebpo_context *context, int32_t marked, ebpo
                                  context->undecided ? ebpo_marked_value(marked) : in, 0 };
 }
 
-/* Classifies a point in another white node of a surface. */
+/* Classifies a point in a white node of a surface with any mark (ebpo_uniform_mark). */
 static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
                                                     const ebpo_node_table *table, uint32_t entry,
                                                     const ebpo_position *position, int level,
@@ -410,15 +416,15 @@ static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
     return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, position, p, out, error);
 }
 
-/* Number of points that are processed together, stage by stage: memory for the next stage of one
- * point is fetched while other points are processed. */
+/* Number of points that are processed together, stage by stage: while the other points are
+ * processed, the processor fetches the memory for the next stage of one point. */
 enum { POINTS_TOGETHER = 16 };
 
 /* One of these points on its way down the tree. */
 typedef struct lane {
     ebpo_position position;
-    bool within; /* the point is in the root cell */
-    ebpo_descent d;
+    bool within;    /* the point is in the root cell */
+    ebpo_descent d; /* the node that the point has reached */
 } lane;
 
 /* A point whose way down the tree ended in a leaf. */
@@ -428,6 +434,7 @@ typedef struct waiting {
     leaf_point in;
 } waiting;
 
+/* Begins the way down of each point. */
 static void start_lanes(const ebpo_accel *s, const ebpo_locator *locator, const double *points,
                         unsigned count, lane *l)
 {
@@ -446,6 +453,7 @@ static void start_lanes(const ebpo_accel *s, const ebpo_locator *locator, const 
         }
 }
 
+/* Moves all points down, one level at a time, until each of them has reached its last node. */
 static void descend_together(const ebpo_accel *s, int deepest, unsigned count, lane *l)
 {
     for (bool more = true; more;) {
@@ -478,6 +486,7 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
     }
 }
 
+/* Decides the points whose way down ended in a leaf. */
 static ebpo_status result_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,
                                   unsigned count, const double *points, ebpo_inside_result *out,
                                   ebpo_error *error)
@@ -496,6 +505,7 @@ static ebpo_status result_waiting(ebpo_context *context, const ebpo_accel *s, co
     return status;
 }
 
+/* Classifies at most POINTS_TOGETHER points. */
 static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, const double *points,
                                    unsigned count, ebpo_inside_result *out, ebpo_error *error)
 {
@@ -551,11 +561,12 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
 
 /* --- node by node: EBP 2017, 4.2 --- */
 
+/* Returns true if the query tests the envelopes of nodes on the way down. */
 static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
 {
-    /* An envelope proves that a point is outside, but not its winding number. Under rules other
-     * than nonzero the result would be incomplete, so only queries with a level or deadline use
-     * envelopes. */
+    /* A point outside an envelope is outside the solid, but its winding number is known (0) only
+     * under the rule nonzero. Under other rules the result would be incomplete, so only queries
+     * with a level or deadline use envelopes. */
     bool proves_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
     if (o->envelopes == EBPO_ENVELOPES_SKIP || !proves_result || c->model->holes)
@@ -564,38 +575,44 @@ static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
            o->deadline_ns;
 }
 
+/* A query of one point. */
 typedef struct inside_query {
     ebpo_context *context;
     const ebpo_inside_options *options;
     ebpo_box box;
-    bool envelopes;
-    uint64_t deadline; /* a time of ebpo_clock; 0: none */
-    const double *p;
-    ebpo_position position;
+    bool envelopes;         /* test envelopes */
+    uint64_t deadline;      /* a time of ebpo_clock; 0: none */
+    const double *p;        /* [3] the point */
+    ebpo_position position; /* shifted position of p */
 } inside_query;
 
-static void give_maybe(const inside_query *a, ebpo_cell cell, ebpo_inside_result *out)
+/* Sets the result "undecided", with the diagonal of the cell as bound of p's distance. */
+static void give_maybe(const inside_query *query, ebpo_cell cell, ebpo_inside_result *out)
 {
-    *out = (ebpo_inside_result){ EBPO_MAYBE, 0, ebpo_cell_diagonal(&a->box, cell) };
+    *out = (ebpo_inside_result){ EBPO_MAYBE, 0, ebpo_cell_diagonal(&query->box, cell) };
 }
 
-static bool outside_envelope(const inside_query *a, const ebpo_node *node)
+/* Returns true if the query tests envelopes and p is outside the envelope of the node. */
+static bool outside_envelope(const inside_query *query, const ebpo_node *node)
 {
     uint32_t count;
     const uint32_t *codes =
-        a->envelopes ? ebpo_model_planes(a->context->model, node, &count) : NULL;
-    return codes && ebpo_outside_planes(&a->box, node->cell, codes, count, a->p);
+        query->envelopes ? ebpo_model_planes(query->context->model, node, &count) : NULL;
+    return codes && ebpo_outside_planes(&query->box, node->cell, codes, count, query->p);
 }
 
-static bool is_late(const inside_query *a) { return a->deadline && ebpo_clock() > a->deadline; }
+static bool is_late(const inside_query *query)
+{
+    return query->deadline && ebpo_clock() > query->deadline;
+}
 
 /* Returns true if the query's level or deadline ends the way down at this node. */
-static bool stops_here(const inside_query *a, const ebpo_node *node)
+static bool stops_here(const inside_query *query, const ebpo_node *node)
 {
-    if (a->options->level >= 0 &&
-        (node->cell.level >= a->options->level || node->type != EBPO_GRAY || node->pruned))
+    if (query->options->level >= 0 &&
+        (node->cell.level >= query->options->level || node->type != EBPO_GRAY || node->pruned))
         return true;
-    return is_late(a);
+    return is_late(query);
 }
 
 /* Returns the table of the nodes that are not in a subtree loaded on demand. */
@@ -604,53 +621,57 @@ static const ebpo_node_table *top_nodes(const ebpo_model *m)
     return m->whole ? &m->whole->nodes : &m->top->nodes;
 }
 
-/* Decides the point at a node of the top or of a subtree, without visiting the node's children.
- * Returns false if that is not possible. */
-static inline bool decide_at(const inside_query *a, const ebpo_node *node, ebpo_inside_result *out)
+/* Decides the point at a node of the top or of a subtree, if this is possible without visiting the
+ * node's children or faces. Returns false if it is not possible. */
+static inline bool decide_at(const inside_query *query, const ebpo_node *node,
+                             ebpo_inside_result *out)
 {
     if (ebpo_node_is_uniform(node))
-        inside_uniform(a->context,
-                       node->subtree ? &node->subtree->nodes : top_nodes(a->context->model),
-                       node->entry, &a->position, node->cell.level, a->p, out);
-    else if (outside_envelope(a, node))
+        inside_uniform(query->context,
+                       node->subtree ? &node->subtree->nodes : top_nodes(query->context->model),
+                       node->entry, &query->position, node->cell.level, query->p, out);
+    else if (outside_envelope(query, node))
         give_out(out);
-    else if (stops_here(a, node))
-        give_maybe(a, node->cell, out);
+    else if (stops_here(query, node))
+        give_maybe(query, node->cell, out);
     else
         return false;
     return true;
 }
 
-static ebpo_status walk_down(inside_query *a, ebpo_inside_result *out, ebpo_error *error)
+/* Decides the point on the way down from the root. Loads the subtree on the way. */
+static ebpo_status walk_down(inside_query *query, ebpo_inside_result *out, ebpo_error *error)
 {
-    const ebpo_model *m = a->context->model;
+    const ebpo_model *m = query->context->model;
     int deepest = m->info->level_count - 1;
     ebpo_node node = ebpo_model_root(m);
     for (;;) {
-        if (decide_at(a, &node, out))
+        if (decide_at(query, &node, out))
             return EBPO_OK;
         if (ebpo_node_is_subtree_root(&node)) {
-            ebpo_status status = ebpo_model_enter(a->context, &node, error);
+            ebpo_status status = ebpo_model_enter(query->context, &node, error);
             if (status != EBPO_OK)
                 return status;
-            if (!a->envelopes && a->options->level < 0 && !a->deadline)
-                return inside_subtree(a->context, node.subtree, &a->position, a->p, out, error);
+            if (!query->envelopes && query->options->level < 0 && !query->deadline)
+                return inside_subtree(query->context, node.subtree, &query->position, query->p, out,
+                                      error);
         }
         if (ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
-            return inside_leaf(a->context, node.subtree, ebpo_entry_value(node.entry),
-                               node.cell.level, &a->position, a->p, out, error);
+            return inside_leaf(query->context, node.subtree, ebpo_entry_value(node.entry),
+                               node.cell.level, &query->position, query->p, out, error);
         node = ebpo_model_child(m, &node,
-                                ebpo_octant_at(a->position.at, deepest - node.cell.level - 1));
+                                ebpo_octant_at(query->position.at, deepest - node.cell.level - 1));
     }
 }
 
 /* --- node by node from the file (EBPO_LOAD_NODES): only nodes on the way are read, and only
  * decoded chunks are kept --- */
 
-static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_inside_result *out,
-                                  ebpo_error *error)
+/* Decides the point in a leaf, which is read as a subtree and then freed. */
+static ebpo_status leaf_from_file(inside_query *query, const ebpo_node *leaf,
+                                  ebpo_inside_result *out, ebpo_error *error)
 {
-    ebpo_model *m = a->context->model;
+    ebpo_model *m = query->context->model;
     ebpo_slice slice;
     ebpo_accel *subtree;
     ebpo_status status = ebpo_model_has_capacity(m, leaf, error);
@@ -666,58 +687,62 @@ static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_i
                             error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
-        status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
-                             leaf->cell.level, &a->position, a->p, out, error);
+        status = inside_leaf(query->context, subtree, ebpo_entry_value(subtree->nodes.root),
+                             leaf->cell.level, &query->position, query->p, out, error);
         ebpo_model_count_leaves(m, subtree, -1);
         ebpo_accel_free(subtree);
     }
     return status;
 }
 
-/* Decides a point of a white node. `winding`: that of its lowest corner. */
-static void decide_white(const inside_query *a, ebpo_cell cell, int32_t winding,
+/* Decides a point in a white node of a surface. `winding`: winding number at the cell's lowest
+ * corner. */
+static void decide_white(const inside_query *query, ebpo_cell cell, int32_t winding,
                          ebpo_inside_result *out)
 {
     double low[3], high[3];
-    ebpo_cell_bounds(&a->box, cell, low, high);
-    winding += ebpo_holes_crossings(a->context->model->holes, low, a->p);
-    decide_capped(a->context, a->p, winding, out);
+    ebpo_cell_bounds(&query->box, cell, low, high);
+    winding += ebpo_holes_crossings(query->context->model->holes, low, query->p);
+    decide_capped(query->context, query->p, winding, out);
 }
 
-static ebpo_status uniform_from_file(inside_query *a, const ebpo_node *node,
+/* Decides the point in a white or black node, whose winding number is read from the file. */
+static ebpo_status uniform_from_file(inside_query *query, const ebpo_node *node,
                                      ebpo_inside_result *out, ebpo_error *error)
 {
     int32_t winding;
-    ebpo_status status = ebpo_chunks_winding(a->context->model->chunks, node, &winding, error);
-    if (status == EBPO_OK && a->context->model->holes)
-        decide_white(a, node->cell, winding, out);
+    ebpo_status status = ebpo_chunks_winding(query->context->model->chunks, node, &winding, error);
+    if (status == EBPO_OK && query->context->model->holes)
+        decide_white(query, node->cell, winding, out);
     else if (status == EBPO_OK)
-        give_winding(a->context, winding, out);
+        give_winding(query->context, winding, out);
     return status;
 }
 
-/* Handles a gray node on the way: sets the result and *done, or moves the cursor to a child. A node
- * is known to be pruned only after its children have been requested. */
-static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
-                             ebpo_error *error)
+/* Handles a gray node on the way: sets the result and *done, or moves the cursor to the child that
+ * contains the point. Only after its children have been requested, it is known if a node is pruned.
+ */
+static ebpo_status pass_gray(inside_query *query, ebpo_cursor *c, bool *done,
+                             ebpo_inside_result *out, ebpo_error *error)
 {
-    const ebpo_model *m = a->context->model;
+    const ebpo_model *m = query->context->model;
     const ebpo_node *node = ebpo_cursor_node(c), *child;
     uint32_t codes[EBPO_NODE_PLANES];
     unsigned count = 0;
     ebpo_status status = EBPO_OK;
     *done = true;
-    if (a->envelopes)
+    if (query->envelopes)
         status = ebpo_cursor_planes(c, codes, &count, error);
     if (status != EBPO_OK)
         return status;
-    if (ebpo_outside_planes(&a->box, node->cell, codes, count, a->p)) {
+    if (ebpo_outside_planes(&query->box, node->cell, codes, count, query->p)) {
         give_out(out);
         return EBPO_OK;
     }
-    bool limited = a->options->level >= 0;
-    if ((limited && (node->cell.level >= a->options->level || node->pruned)) || is_late(a)) {
-        give_maybe(a, node->cell, out);
+    bool limited = query->options->level >= 0;
+    if ((limited && (node->cell.level >= query->options->level || node->pruned)) ||
+        is_late(query)) {
+        give_maybe(query, node->cell, out);
         return EBPO_OK;
     }
     status = ebpo_cursor_children(c, &child, error);
@@ -725,105 +750,108 @@ static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_i
         return status;
     *done = !child;
     if (child)
-        ebpo_cursor_down(c, ebpo_octant_at(a->position.at,
+        ebpo_cursor_down(c, ebpo_octant_at(query->position.at,
                                            m->info->level_count - 2 - node->cell.level));
-    else if (limited || is_late(a))
-        give_maybe(a, node->cell, out);
+    else if (limited || is_late(query))
+        give_maybe(query, node->cell, out);
     else
         status = ebpo_fail_pruned(m, node->cell, error);
     return status;
 }
 
-/* Walks down from the root of a subtree by reading nodes from the file. */
-static ebpo_status walk_file(inside_query *a, const ebpo_node *below, ebpo_inside_result *out,
+/* Walks down from the root of a subtree (`below`), by reading nodes from the file. */
+static ebpo_status walk_file(inside_query *query, const ebpo_node *below, ebpo_inside_result *out,
                              ebpo_error *error)
 {
-    const ebpo_model *m = a->context->model;
+    const ebpo_model *m = query->context->model;
     ebpo_cursor c;
     ebpo_cursor_begin(&c, &ebpo_chunks_source, m->chunks,
                       m->top->below[ebpo_entry_value(below->entry)]);
     while (ebpo_cursor_node(&c)->type == EBPO_GRAY) {
         bool done;
-        ebpo_status status = pass_gray(a, &c, &done, out, error);
+        ebpo_status status = pass_gray(query, &c, &done, out, error);
         if (status != EBPO_OK || done)
             return status;
     }
     const ebpo_node *node = ebpo_cursor_node(&c);
-    if (node->type == EBPO_LEAF && (a->options->level >= 0 || is_late(a))) {
-        give_maybe(a, node->cell, out);
+    if (node->type == EBPO_LEAF && (query->options->level >= 0 || is_late(query))) {
+        give_maybe(query, node->cell, out);
         return EBPO_OK;
     }
-    return node->type == EBPO_LEAF ? leaf_from_file(a, node, out, error)
-                                   : uniform_from_file(a, node, out, error);
+    return node->type == EBPO_LEAF ? leaf_from_file(query, node, out, error)
+                                   : uniform_from_file(query, node, out, error);
 }
 
-static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_error *error)
+/* Decides the point on the way down from the root, for EBPO_LOAD_NODES. */
+static ebpo_status walk_nodes(inside_query *query, ebpo_inside_result *out, ebpo_error *error)
 {
-    const ebpo_model *m = a->context->model;
+    const ebpo_model *m = query->context->model;
     int deepest = m->info->level_count - 1;
     ebpo_node node = ebpo_model_root(m);
     while (!ebpo_node_is_subtree_root(&node)) {
-        if (decide_at(a, &node, out))
+        if (decide_at(query, &node, out))
             return EBPO_OK;
         node = ebpo_model_child(m, &node,
-                                ebpo_octant_at(a->position.at, deepest - node.cell.level - 1));
+                                ebpo_octant_at(query->position.at, deepest - node.cell.level - 1));
     }
-    return walk_file(a, &node, out, error);
+    return walk_file(query, &node, out, error);
 }
 
-/* Returns the subtree that the context holds in memory, if its cell contains p, else NULL. *entry,
- * *level: the node at which the way down the top of the tree ends. */
-static const ebpo_accel *find_held(const inside_query *a, uint32_t *entry, int *level)
+/* Returns the whole model if it is in memory, or the subtree that the context holds in memory, if
+ * its cell contains p. Otherwise returns NULL. *entry, *level: entry and level of the node at which
+ * the way down the top of the tree ends (not set for a whole model, except *entry). */
+static const ebpo_accel *find_held(const inside_query *query, uint32_t *entry, int *level)
 {
-    const ebpo_context *c = a->context;
+    const ebpo_context *c = query->context;
     int deepest = c->model->info->level_count - 1;
     *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, 0);
     if (c->model->whole)
         return c->model->whole;
-    ebpo_descent d = ebpo_descend(&c->model->top->nodes, deepest, a->position.at);
+    ebpo_descent d = ebpo_descend(&c->model->top->nodes, deepest, query->position.at);
     *entry = d.entry;
     *level = d.level;
     bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_SUBTREE_ROOT;
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* Decides p if the context has all data that p needs in memory. Then envelopes would save nothing,
- * because only the faces of a leaf take time. Returns false if some data is missing. */
-static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_status *status,
+/* Decides p without envelopes, if the context has all data for it in memory. (Then envelopes would
+ * save no time, because loading takes the time.) Returns false if some data is missing. */
+static bool result_in_memory(inside_query *query, ebpo_inside_result *out, ebpo_status *status,
                              ebpo_error *error)
 {
-    const ebpo_model *m = a->context->model;
+    const ebpo_model *m = query->context->model;
     uint32_t entry;
     int level;
-    const ebpo_accel *held = find_held(a, &entry, &level);
+    const ebpo_accel *held = find_held(query, &entry, &level);
     *status = EBPO_OK;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(a->context, top_nodes(m), entry, &a->position, level, a->p, out);
+        inside_uniform(query->context, top_nodes(m), entry, &query->position, level, query->p, out);
         return true;
     }
     if (!held)
         return false;
-    if (!a->deadline) {
-        *status = inside_subtree(a->context, held, &a->position, a->p, out, error);
+    if (!query->deadline) {
+        *status = inside_subtree(query->context, held, &query->position, query->p, out, error);
         return true;
     }
     int deepest = m->info->level_count - 1;
-    ebpo_descent d = ebpo_descend(&held->nodes, deepest, a->position.at);
+    ebpo_descent d = ebpo_descend(&held->nodes, deepest, query->position.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return false; /* pruned: an envelope may decide */
-    ebpo_cell cell = ebpo_descent_cell(&d, deepest, a->position.at);
+    ebpo_cell cell = ebpo_descent_cell(&d, deepest, query->position.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
-        inside_uniform(a->context, &held->nodes, d.entry, &a->position, d.level, a->p, out);
-    else if (is_late(a))
-        give_maybe(a, cell, out);
+        inside_uniform(query->context, &held->nodes, d.entry, &query->position, d.level, query->p,
+                       out);
+    else if (is_late(query))
+        give_maybe(query, cell, out);
     else
-        *status = inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->position,
-                              a->p, out, error);
+        *status = inside_leaf(query->context, held, ebpo_entry_value(d.entry), d.level,
+                              &query->position, query->p, out, error);
     return true;
 }
 
-/* Decides below a pruned node of the whole tree or of a subtree by an envelope, or returns
- * EBPO_E_ABSENT. */
+/* Decides a point in a pruned node of the whole tree or of a subtree by an envelope. Returns
+ * EBPO_E_ABSENT if no envelope decides. */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error)
 {
@@ -831,15 +859,14 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
     if (m->holes) /* envelopes do not contain the inside of a surface */
         return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
-    inside_query a = {
+    inside_query query = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
     };
-    if (!ebpo_locator_find(&m->locator, p, &a.position))
+    if (!ebpo_locator_find(&m->locator, p, &query.position))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
-    ebpo_status status = walk_down(&a, out, error);
-    if (status == EBPO_OK && out->where == EBPO_OUT &&
-        m->info->rule != EBPO_RULE_NONZERO) /* the point is outside, but its winding number is not
-                                             * known */
+    ebpo_status status = walk_down(&query, out, error);
+    /* If the point is outside under another rule than nonzero, its winding number is not known. */
+    if (status == EBPO_OK && out->where == EBPO_OUT && m->info->rule != EBPO_RULE_NONZERO)
         return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
     return status;
 }
@@ -851,24 +878,24 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                                ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    inside_query a = { .context = context,
-                       .options = options,
-                       .box = ebpo_model_box(m),
-                       .envelopes = uses_envelopes(context, options),
-                       .p = p };
+    inside_query query = { .context = context,
+                           .options = options,
+                           .box = ebpo_model_box(m),
+                           .envelopes = uses_envelopes(context, options),
+                           .p = p };
     if (options->deadline_ns)
-        a.deadline = ebpo_clock() + options->deadline_ns;
-    if (!ebpo_locator_find(&m->locator, p, &a.position)) {
+        query.deadline = ebpo_clock() + options->deadline_ns;
+    if (!ebpo_locator_find(&m->locator, p, &query.position)) {
         inside_beyond_root(context, p, out);
         return EBPO_OK;
     }
     ebpo_status status;
     bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0;
     if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) &&
-        result_in_memory(&a, out, &status, error))
+        result_in_memory(&query, out, &status, error))
         return status;
-    return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error)
-                                                              : walk_down(&a, out, error);
+    return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&query, out, error)
+                                                              : walk_down(&query, out, error);
 }
 
 ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,
@@ -918,8 +945,8 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     return ebpo_batch_end(&batch, status, error);
 }
 
-/* Returns true if the query has no special options and the model is completely in memory: then no
- * checks except that of the point are necessary. */
+/* Returns true if the query has no special options and the model is completely in memory. Then only
+ * the point must be checked. */
 static inline bool is_plain(const ebpo_context *context, const ebpo_inside_options *o)
 {
     return context->model->results_inside &&
@@ -927,6 +954,7 @@ static inline bool is_plain(const ebpo_context *context, const ebpo_inside_optio
                    o->envelopes == EBPO_ENVELOPES_AUTO && !o->deadline_ns));
 }
 
+/* Classifies a point for which is_plain is true. A finite point in the root cell needs no check. */
 static ebpo_status inside_plain(ebpo_context *context, const double point[3],
                                 ebpo_inside_result *out, ebpo_error *error)
 {

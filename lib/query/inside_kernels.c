@@ -1,9 +1,8 @@
-/* Counts, for point in solid, the crossings of a segment with the faces that a leaf lists, eight at
- * a time.
+/* Kernels of the query "inside" (inside.c), for the faces that a leaf lists, eight faces at a time.
  *
- * sum_crossings sums, for a segment parallel to an axis, its crossings with the faces. It uses
+ * sum_crossings sums the crossings of the faces with a segment that is parallel to an axis. It uses
  * single precision, or double precision in accels (acceleration structures of subtrees) of doubles.
- * Faces that are not certain in this precision are decided exactly by inside.c.
+ * Faces that are not certain in this precision ("open" faces) are decided exactly by inside.c.
  *
  * find_reached_cell_faces finds the cell faces that the leaf's faces reach: a face reaches a cell
  * face if its extent on the axis goes up to the cell face or beyond. It also computes the box of
@@ -25,15 +24,17 @@
 
 /* --- crossings --- */
 
-/* Positions of eight faces relative to the segment's line, as masks with a bit for each face. A
- * face whose bit is 0 in all three masks certainly has no point on the line. */
+/* The turns of eight faces around the segment's line: the directions in which their corners follow
+ * each other around the line. Masks have a bit for each face. A face whose bit is 0 in all three
+ * masks certainly has no point on the line. */
 typedef struct turns {
-    unsigned left;  /* the corners certainly turn left around the line */
-    unsigned right; /* the corners certainly turn right around the line */
+    unsigned left;  /* all edges certainly turn left around the line */
+    unsigned right; /* all edges certainly turn right around the line */
     unsigned open;  /* not certain */
 } turns;
 
-/* Combines the turns of the three edges of each face. */
+/* Combines the turns of the three edges of each face. some_left: an edge certainly turns left;
+ * all_left: all edges certainly turn left. lanes: the lanes that the leaf lists. */
 EBPO_EIGHT turns combine_turns(unsigned some_left, unsigned some_right, unsigned all_left,
                                unsigned all_right, unsigned lanes)
 {
@@ -41,10 +42,11 @@ EBPO_EIGHT turns combine_turns(unsigned some_left, unsigned some_right, unsigned
                     lanes & ~(all_left | all_right | (some_left & some_right)) };
 }
 
-/* Rounding: let R be the greatest |coordinate| of the model's box and M the greatest side of the
- * box. Two floats represent `from` to 2^-48 R. So the error of a difference d of coordinates is
- * 2^-23 |d| plus 2^-47 R. No |d| is above M. So the error of a cross product is 2^-45 R M plus
- * 2^-21 of the sum of the absolute values of its two products.
+/* Rounding in single precision: let R be the greatest |coordinate| of the model's box and M the
+ * greatest side of the box. Two floats represent `from` with an error of at most 2^-48 R. So the
+ * error of a difference d of coordinates is at most 2^-23 |d| plus 2^-47 R. No |d| is above M. So
+ * the error of a cross product is at most 2^-45 R M plus 2^-21 of the sum of the absolute values of
+ * its two products.
  *
  * The code uses larger bounds: 2^-43 R M (`turn_error_constant` of ebpo_accel) plus
  * TURN_ERROR_FACTOR times this sum. They also cover the rounding of the bounds themselves, and
@@ -60,8 +62,8 @@ EBPO_EIGHT void load_relative(const ebpo_face_block *b, int axis, double from, f
         out[i] = f8_sub(f8_sub(out[i], f8_all(high)), f8_all(low));
 }
 
-/* Computes the turns of a block's faces in single precision. error_constant: the part of the error
- * bound that does not depend on the face. */
+/* Computes the turns of a block's faces in single precision. u, v: the two axes that are not the
+ * segment's. error_constant: the part of the error bound that does not depend on the face. */
 EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u, int v,
                                  const ebpo_axis_segment *g, float error_constant)
 {
@@ -82,18 +84,18 @@ EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u
                          f8_bits(f8_and(right[0], f8_and(right[1], right[2]))), lanes);
 }
 
-/* Rounding: the error of a difference of two doubles is 2^-53 of the difference. The error of a
- * cross product of two differences is at most CROSS_ERROR times the sum of the absolute values of
- * its two products. The error of a plane's height, a sum of three such cross products with a factor
- * each (compare_plane), is at most HEIGHT_ERROR times the sum of the absolute values of all its
- * products. UNDERFLOW_ERROR is added for underflow. Overflow makes bounds infinite or NaN, and then
- * nothing is certain. */
+/* Rounding in double precision: the error of a difference of two doubles is at most 2^-53 of the
+ * difference. The error of a cross product of two differences is at most CROSS_ERROR times the sum
+ * of the absolute values of its two products. The error of a plane's height, a sum of three such
+ * cross products with a factor each (compare_plane), is at most HEIGHT_ERROR times the sum of the
+ * absolute values of all its products. UNDERFLOW_ERROR is added for underflow. Overflow makes
+ * bounds infinite or NaN, and then nothing is certain. */
 #define CROSS_ERROR     0x1p-50
 #define HEIGHT_ERROR    0x1p-47
 #define UNDERFLOW_ERROR 0x1p-960
 
-/* Returns the cross product of two corners relative to the line. *size: the sum of the absolute
- * values of its two products. */
+/* Returns the cross product of the vectors (au, av) and (bu, bv) from the line to two corners.
+ * *size: the sum of the absolute values of its two products. */
 EBPO_EIGHT double cross_product(double au, double av, double bu, double bv, double *size)
 {
     double p = au * bv, q = av * bu;
@@ -128,11 +130,11 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
     return combine_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
-/* The segment's line intersects the plane of a face in a point. Compares this point's coordinate on
- * the segment's axis with `at`: returns 1 if it is greater, -1 if it is less, 0 if this is not
- * certain. weight[i]: the cross product of the corners of edge i; size[i]: its *size (see
- * cross_product). k: the corners' coordinates on the axis. `turn`: 1 if the face's
- * corners turn left around the line, -1 if they turn right. */
+/* Compares the point where the segment's line intersects the plane of a face with `at`, a
+ * coordinate on the segment's axis: returns 1 if the point's coordinate is greater, -1 if it is
+ * less, 0 if this is not certain. weight[i], size[i]: the cross product of the corners of edge i,
+ * and its *size. k: the corners' coordinates on the axis. `turn`: 1 if the face turns left around
+ * the line, -1 if it turns right. */
 static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {
@@ -143,8 +145,8 @@ static int compare_plane(const double weight[3], const double size[3], const dou
     return height > error ? 1 : height < -error ? -1 : 0;
 }
 
-/* Tests if a face that certainly intersects the segment's line intersects the segment. Returns 1 if
- * it does, 0 if not, -1 if this is not certain. t: the face's corners. `turn`: as for
+/* Tests if a face, which certainly intersects the segment's line, intersects the segment. Returns 1
+ * if it does, 0 if not, -1 if this is not certain. t: the face's corners. `turn`: as for
  * compare_plane. */
 static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axis_segment *g,
                               int turn)
@@ -171,8 +173,8 @@ static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axi
     return at_from < 0 || at_to > 0 ? 0 : at_from > 0 && at_to < 0 ? 1 : -1;
 }
 
-/* Returns the sum of the certain crossings of a block's faces. Appends the slots of faces that are
- * not certain to `open`. */
+/* Returns the sum of the certain crossings of a block's faces with the segment. Appends the slots
+ * of faces that are not certain to `open`. */
 EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int v,
                                const ebpo_axis_segment *segment, uint32_t *open,
                                uint32_t *open_count)
@@ -220,8 +222,9 @@ static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
 /* Coordinates of the cell faces: as doubles, and rounded down and up to the nearest floats. */
 typedef struct faces_of_cell {
     double low[3], high[3];
-    double inverse[3]; /* inverse of the cell's size */
-    float low_down[3], low_up[3], high_down[3], high_up[3];
+    double inverse[3];              /* 1 / size of the cell */
+    float low_down[3], low_up[3];   /* `low`, rounded down and up */
+    float high_down[3], high_up[3]; /* `high`, rounded down and up */
     bool has_boxes; /* false if the cell is too small for boxes: each box is then the whole cell */
 } faces_of_cell;
 
@@ -232,14 +235,14 @@ static inline float step_float(float f, int32_t steps)
 {
     uint32_t bits;
     memcpy(&bits, &f, sizeof bits);
-    uint32_t turn = bits >> 31 ? UINT32_C(0x7fffffff) : 0;
-    bits = ((bits ^ turn) + (uint32_t)steps) ^ turn;
+    uint32_t reversed = bits >> 31 ? UINT32_C(0x7fffffff) : 0; /* bits of negative floats descend */
+    bits = ((bits ^ reversed) + (uint32_t)steps) ^ reversed;
     memcpy(&f, &bits, sizeof bits);
     return f;
 }
 
-/* Returns the greatest float that is at most x. The code is branch-free, because the direction of
- * rounding is unpredictable. */
+/* Returns the greatest float that is at most x. Avoids a branch on the direction of rounding, which
+ * would be unpredictable. */
 static inline float float_below(double x)
 {
     float f = (float)x;
@@ -275,21 +278,23 @@ typedef struct spans {
     unsigned reaches[2]; /* faces that reach the cell's lower face, and its upper face */
 } spans;
 
-static inline spans span_floats(const ebpo_face_block *b, const faces_of_cell *w, int k)
+/* Compares the faces of a block of floats with the cell on axis k. */
+static inline spans span_floats(const ebpo_face_block *b, const faces_of_cell *sides, int k)
 {
     f8 x[3];
     spans out;
     ebpo_face_block_floats(b, k, x);
     out.least = f8_min3(x[0], x[1], x[2]);
     out.most = f8_max3(x[0], x[1], x[2]);
-    out.away = f8_bits(f8_or(f8_less(f8_all(w->high_down[k]), out.least),
-                             f8_less(out.most, f8_all(w->low_up[k]))));
-    out.reaches[0] = f8_bits(f8_at_most(out.least, f8_all(w->low_down[k])));
-    out.reaches[1] = f8_bits(f8_at_most(f8_all(w->high_up[k]), out.most));
+    out.away = f8_bits(f8_or(f8_less(f8_all(sides->high_down[k]), out.least),
+                             f8_less(out.most, f8_all(sides->low_up[k]))));
+    out.reaches[0] = f8_bits(f8_at_most(out.least, f8_all(sides->low_down[k])));
+    out.reaches[1] = f8_bits(f8_at_most(f8_all(sides->high_up[k]), out.most));
     return out;
 }
 
-static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int k)
+/* Compares the faces of a block of doubles with the cell on axis k. */
+static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *sides, int k)
 {
     double x[3][EBPO_BLOCK];
     float lows[EBPO_BLOCK], highs[EBPO_BLOCK];
@@ -300,64 +305,65 @@ static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int 
                most = ebpo_max3(x[0][lane], x[1][lane], x[2][lane]);
         lows[lane] = float_below(least);
         highs[lane] = float_above(most);
-        out.away |= (unsigned)((least > w->high[k]) | (most < w->low[k])) << lane;
-        out.reaches[0] |= (unsigned)(least <= w->low[k]) << lane;
-        out.reaches[1] |= (unsigned)(most >= w->high[k]) << lane;
+        out.away |= (unsigned)((least > sides->high[k]) | (most < sides->low[k])) << lane;
+        out.reaches[0] |= (unsigned)(least <= sides->low[k]) << lane;
+        out.reaches[1] |= (unsigned)(most >= sides->high[k]) << lane;
     }
     out.least = f8_load(lows);
     out.most = f8_load(highs);
     return out;
 }
 
-/* Converts a side of a box to sixteenths of the cell, 0 to 15. With direction -1, for the lower
- * side: returns the index of the sixteenth that contains the side. With direction 1, for the upper
- * side: returns 15 minus this index. The box is first enlarged by 2^-8 of a sixteenth, which is far
- * more than the rounding error here and in queries (2^-20 of a sixteenth). */
+/* Converts a side of a box to sixteenths of the cell, 0 to 15. For the lower side (direction -1),
+ * returns the index of the sixteenth that contains the side; for the upper side (direction 1), 15
+ * minus this index. The box is first enlarged by 2^-8 of a sixteenth, which is far more than the
+ * rounding error here and in queries (2^-20 of a sixteenth). */
 static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
 {
     double sixteenths = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
     sixteenths = direction < 0 ? sixteenths : 16 - sixteenths;
-    /* two separate comparisons, so that the code is branch-free */
+    /* two separate comparisons, so that the compiler needs no branch */
     sixteenths = sixteenths > 0 ? sixteenths : 0;
     return (uint64_t)(int32_t)(sixteenths < 15 ? sixteenths : 15);
 }
 
-/* Returns a box around the faces in `near` (a bit for each lane), encoded as in an
- * ebpo_listed_block. */
-static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *w)
+/* Returns a box around the faces in the lanes of `near`, encoded as in an ebpo_listed_block. */
+static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *sides)
 {
     f8 none = f8_all(INFINITY), mask = f8_mask(near), zero = f8_all(0);
     uint64_t box = 0;
     for (int k = 0; k < 3; k++) {
         float least = f8_least(f8_pick(mask, span[k].least, none)),
               most = -f8_least(f8_pick(mask, f8_sub(zero, span[k].most), none));
-        box |= find_sixteenth(least, w->low[k], w->inverse[k], -1) << 8 * k |
-               find_sixteenth(most, w->low[k], w->inverse[k], 1) << (8 * k + 4);
+        box |= find_sixteenth(least, sides->low[k], sides->inverse[k], -1) << 8 * k |
+               find_sixteenth(most, sides->low[k], sides->inverse[k], 1) << (8 * k + 4);
     }
     return box << EBPO_LISTED_BOX;
 }
 
-/* Considers those listed faces of the block that have a bounding box that intersects the cell. Sets
- * the block's box in the list to a box around these faces. Returns the cell faces that these faces
- * reach, as bits 2 axis + side. The comparisons are exact. */
-static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const faces_of_cell *w)
+/* Sets the box of a list entry to a box around the near faces: the listed faces of the block whose
+ * bounding boxes intersect the cell. Returns the cell faces that the near faces reach, as bits
+ * 2 axis + side. The comparisons are exact. */
+static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const faces_of_cell *sides)
 {
     uint64_t listed = ebpo_listed(at);
     ebpo_face_block b = ebpo_face_block_open(s, ebpo_listed_number(listed));
     spans span[3];
     unsigned near = ebpo_listed_lanes(listed), reached = 0;
     for (int k = 0; k < 3; k++) {
-        span[k] = s->wide ? span_doubles(&b, w, k) : span_floats(&b, w, k);
+        span[k] = s->wide ? span_doubles(&b, sides, k) : span_floats(&b, sides, k);
         near &= ~span[k].away;
     }
     for (int i = 0; i < 6; i++)
         reached |= (unsigned)((near & span[i / 2].reaches[i % 2]) != 0) << i;
-    uint64_t box = !near ? UINT64_MAX << EBPO_LISTED_BOX : w->has_boxes ? box_of(span, near, w) : 0;
+    uint64_t box = !near              ? UINT64_MAX << EBPO_LISTED_BOX
+                   : sides->has_boxes ? box_of(span, near, sides)
+                                      : 0;
     ebpo_list(at, listed | box);
     return reached;
 }
 
-/* Prefetches the first eight blocks of the list, or all if the list is shorter, into the
+/* Prefetches the first eight blocks of the list (or all, if the list is shorter) into the
  * processor's cache. They arrive while the cell's bounds are computed. */
 static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 {
@@ -376,12 +382,12 @@ static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 static unsigned find_reached_cell_faces(const ebpo_accel *s, ebpo_listed_block *list,
                                         ebpo_cell cell)
 {
-    faces_of_cell w;
+    faces_of_cell sides;
     unsigned out = 0;
     fetch_blocks(s, list);
-    find_cell_faces(s, cell, &w);
+    find_cell_faces(s, cell, &sides);
     for (;; list++) {
-        out |= bound_block(s, list, &w);
+        out |= bound_block(s, list, &sides);
         if (ebpo_listed(list) & EBPO_LISTED_LAST)
             return out;
     }

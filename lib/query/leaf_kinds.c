@@ -1,18 +1,19 @@
 /* Finds and stores the kind of a leaf during queries.
  *
- * The first queries find a cell face that no face intersects and the boxes of the leaf's list.
- * After many queries the leaf is classified: one plane, two planes, convex or concave (then the
- * signs of planes decide), or general (accel.h). While one thread classifies the leaf, the other
- * threads treat it as general. Kinds never change results.
+ * The first query finds a free cell face (that no face intersects) and the boxes of the leaf's
+ * list. After many queries the leaf is classified: one plane, two planes, convex or concave (then
+ * the signs of planes decide), or general (accel.h). While one thread classifies the leaf, the
+ * other threads treat it as general. Kinds never change results.
  *
  * Proof that the planes of some leaves decide: a point is below a plane if n . xi < d (leaf_plane).
  * Let P be the set of points of the cell below all planes of the leaf's faces. Suppose that every
- * face is in P (all its corners are below all planes). Then each face is on the boundary of P, so
- * the winding number is constant within P's interior; and it is constant in each component of the
- * rest of the cell. Every such component contains a corner of the cell: a point above plane i can
- * move to the corner that is farthest along that plane's normal and stays above. So when all
- * corners of the cell outside P's closure have the same winding number, and one point of P's
- * interior is known, the planes decide. The same holds with "above" for "below" (concave). */
+ * face is in the closure of P (no corner of a face is above a plane). Then each face is on the
+ * boundary of P, so the winding number is constant within P's interior; and it is constant in each
+ * component of the cell outside P's closure. Every such component contains a corner of the cell: a
+ * point above plane i can move to the corner that is farthest along that plane's normal, and is
+ * above plane i on the whole way. So if all corners of the cell outside P's closure have the same
+ * winding number, and the winding number at one point of P's interior is known, the planes decide.
+ * The same is true with "above" in place of "below" (concave). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -41,19 +42,18 @@ typedef struct deciding_planes {
     leaf_plane plane[EBPO_KIND_PLANES_MAX];
 } deciding_planes;
 
-/* Leaves with more faces stay general. */
+/* A leaf with more faces is general. */
 enum { FACES_MAX = 64 };
 
-/* The faces of a leaf in the coordinates of its cell (0 .. 1), rounded: only faces whose boxes
- * intersect the cell. */
+/* The faces that a leaf lists and whose boxes intersect the leaf's cell. */
 typedef struct leaf_faces {
     int count;
-    double p[FACES_MAX][3][3];
-    uint32_t slot[FACES_MAX];
+    double p[FACES_MAX][3][3]; /* corners in the coordinates of the cell (0 .. 1), rounded */
+    uint32_t slot[FACES_MAX];  /* where the accel has the face */
     double low[3], size[3], inverse[3]; /* lowest corner and size of the cell; 1 / size */
 } leaf_faces;
 
-/* Returns true if the triangle's box intersects the cell. */
+/* Returns true if the triangle's box intersects the cell from `low` to `high`. */
 static bool box_intersects_cell(const double t[3][3], const double low[3], const double high[3])
 {
     for (int k = 0; k < 3; k++)
@@ -103,9 +103,10 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
     }
 }
 
-/* Returns the signed crossings of the leaf's faces with a segment along an axis. Skips blocks whose
- * list entry has any bit of `excluded`: bits of lower sides of boxes. If such a bit is set, the box
- * begins above the lower side of the cell, and the segment is on that lower side. */
+/* Returns the sum of the signed crossings of the leaf's faces with a segment along an axis. Skips
+ * blocks whose list entry has any bit of `excluded`. These are bits of the lower sides of boxes, on
+ * the axes on which the segment is at the lower side of the cell: a box with such a bit begins
+ * above the segment. */
 static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                               const double from[3], double to, int axis, uint64_t excluded)
 {
@@ -125,7 +126,8 @@ static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
 }
 
 /* Returns the winding number at a point of the cell, after the infinitesimal shift of format-spec,
- * section 10: adds crossings on the way from the lowest corner, axis by axis. */
+ * section 10. Adds the crossings on the way from the lowest corner, along one axis after another.
+ */
 static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
                           const double p[3])
 {
@@ -140,14 +142,15 @@ static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
 }
 
 /* Computes the plane of a face in the cell's coordinates, with a normal of 1-norm 1. Returns false
- * if rounding may matter, as the face is very thin or has corners far outside the cell. */
+ * if rounding may matter, because the face is very thin or has corners far outside the cell. */
 static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_plane *out)
 {
     const double(*p)[3] = (const double(*)[3])f->p[face];
     double t[3][3], e[3], g[3], norm = 0, products = 0, greatest = 0;
     ebpo_accel_triangle(s, f->slot[face], t);
-    for (int k = 0; k < 3; k++) { /* uses the exact corners: the corners in the cell's coordinates
-                                   * are rounded, which is too inexact for short edges */
+    /* The edges e and g are computed from the exact corners t, because the rounded corners p are
+     * not exact enough for short edges. */
+    for (int k = 0; k < 3; k++) {
         e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
         g[k] = (t[2][k] - t[0][k]) * f->inverse[k];
     }
@@ -159,8 +162,8 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
         products += fabs(a) + fabs(b);
         greatest = ebpo_max3(greatest, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
-    /* The error of n is 2^-50 of the products, so 2^-40 of its norm. The error of n . xi is 2^-33
-     * for every corner: less than the margin of sides_of. */
+    /* The error of n is at most 2^-50 of the products, so 2^-40 of its norm. The error of n . xi is
+     * at most 2^-33 for every corner, which is less than the margin of sides_of (2^-26). */
     if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(greatest < 64))
         return false;
     out->d = 0;
@@ -171,8 +174,8 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
     return true;
 }
 
-/* Returns the exact side of a corner of face j relative to the plane of face i: -1 below, 1 above.
- */
+/* Returns the exact side of a corner of the face at point_slot, relative to the plane of the face
+ * at plane_slot: -1 below, 0 in the plane, 1 above. */
 static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_slot, int corner)
 {
     double a[3][3], b[3][3];
@@ -184,8 +187,8 @@ static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_s
     return ebpo_orient3d(a[0], a[1], a[2], b[corner]);
 }
 
-/* Returns the sides of plane i on which other faces have corners: bit 0: above, bit 1: below. Stops
- * when it has found all wanted sides. */
+/* Returns the sides of face i's plane q on which other faces have corners: bit 0: above, bit 1:
+ * below. Stops when it has found all sides of `wanted`. */
 static unsigned sides_of(const ebpo_accel *s, const leaf_faces *f, int i, const leaf_plane *q,
                          unsigned wanted)
 {
@@ -213,19 +216,19 @@ static bool is_in_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
     return true;
 }
 
-/* Returns false if the planes are certainly different, or have opposite orientations. */
-static bool turned_alike(const leaf_plane *a, const leaf_plane *b)
+/* Returns false if the planes are certainly different, or their normals are opposite. */
+static bool may_be_equal(const leaf_plane *a, const leaf_plane *b)
 {
     return fabs(a->d - b->d) < 0x1p-20 &&
            a->n[0] * b->n[0] + a->n[1] * b->n[1] + a->n[2] * b->n[2] > 0;
 }
 
-/* Collects all distinct planes of a convex or concave leaf. Returns false if the leaf is neither,
- * or has more than EBPO_KIND_PLANES_MAX planes. */
+/* Collects all different planes of a convex or concave leaf. Returns false if the leaf is neither
+ * convex nor concave, or has more than EBPO_KIND_PLANES_MAX planes. */
 static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_planes *out)
 {
-    int of_face[EBPO_KIND_PLANES_MAX];
-    unsigned allowed = 3; /* bit 0: convex is still possible, bit 1: concave */
+    int of_face[EBPO_KIND_PLANES_MAX]; /* for each plane, a face in it */
+    unsigned allowed = 3;              /* bit 0: convex is still possible, bit 1: concave */
     out->count = 0;
     for (int i = 0; i < f->count; i++) {
         leaf_plane q;
@@ -237,7 +240,7 @@ static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_pl
             return false;
         bool known = false;
         for (int k = 0; k < out->count && !known; k++)
-            known = turned_alike(&out->plane[k], &q) && is_in_plane(s, f, of_face[k], i);
+            known = may_be_equal(&out->plane[k], &q) && is_in_plane(s, f, of_face[k], i);
         if (known)
             continue;
         if (out->count == EBPO_KIND_PLANES_MAX)
@@ -249,8 +252,8 @@ static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_pl
     return true;
 }
 
-/* Returns true if xi is below all planes. Sets *certain to false if rounding may change the result.
- */
+/* Returns true if xi is below all planes (after the reversal by planes->flip). Sets *certain to
+ * false if rounding may change the result. */
 static bool below_all(const deciding_planes *planes, const double xi[3], bool *certain)
 {
     *certain = true;
@@ -266,9 +269,9 @@ static bool below_all(const deciding_planes *planes, const double xi[3], bool *c
 
 static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
-/* Finds the winding numbers below all planes (in P) and elsewhere in the cell. Uses the cell's
- * corners and, if none of them is in P, the mean of the faces' corners. Returns false if these
- * points do not decide. */
+/* Finds the winding numbers below all planes (in the set P of the proof above) and elsewhere in the
+ * cell. Uses the winding numbers at the cell's corners and, if no corner is in P, at the mean of
+ * the faces' corners. Returns false if these points are not sufficient. */
 static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_faces *f,
                           deciding_planes *out)
 {
@@ -318,8 +321,8 @@ static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, e
 /* --- rows of all leaves: pages, each twice as large as the page before, so that stored rows do not
  * move --- */
 
-/* FIRST_PAGE: rows of the first page, which has space for the maximum of one leaf (1 + 4 * 4).
- * PAGE_BYTES: the size of a page is a multiple of this number. */
+/* FIRST_PAGE: rows of the first page; a leaf has at most 1 + 4 * 4 rows. PAGE_BYTES: the size of a
+ * page is a multiple of this number, which is also its alignment. */
 enum { FIRST_PAGE = 32, PAGE_BYTES = 64 };
 
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max)
@@ -342,8 +345,8 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *k)
     free(k);
 }
 
-/* Adds a page for at least `least` rows. Returns false without memory, or if the pages or their
- * rows would be too many. */
+/* Adds a page with space for at least `least` rows. Returns false when out of memory, or if there
+ * would be too many pages or rows. */
 static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 {
     uint64_t size = (uint64_t)FIRST_PAGE << k->pages, unused = k->rows_max - k->rows;
@@ -362,7 +365,8 @@ static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
     return true;
 }
 
-/* Returns the number of the first of `rows` rows, which are in one page, or EBPO_NO_ROWS. */
+/* Reserves `rows` rows in one page. Returns the number of the first one, or EBPO_NO_ROWS if there
+ * is no space. */
 static uint32_t reserve_rows(ebpo_leaf_kinds *k, uint64_t rows)
 {
     uint32_t number = EBPO_NO_ROWS;
@@ -375,8 +379,8 @@ static uint32_t reserve_rows(ebpo_leaf_kinds *k, uint64_t rows)
     return number;
 }
 
-/* Stores the planes of a leaf and returns its kind. Without space for the planes, the leaf stays
- * general. */
+/* Stores the planes of a leaf and returns its kind. If there is no space for the planes, the leaf
+ * is general. */
 static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
                                   const deciding_planes *planes)
 {
@@ -401,8 +405,8 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
 /* --- a leaf --- */
 
 /* Returns a free cell face (2 * axis + side), or EBPO_NO_CELL_FACE. `cell_faces` has a bit for each
- * cell face that is not free. Prefers a lower cell face (bits 0, 2, 4), because the winding number
- * on it is that of the lowest corner. */
+ * cell face that is not free. Prefers a lower cell face (bits 0, 2, 4), because it has the lowest
+ * corner, so its winding number is known. */
 static uint8_t choose_cell_face(unsigned cell_faces)
 {
     unsigned is_free = ~cell_faces & 63;
@@ -436,22 +440,25 @@ static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cel
     leaf->cell_face_step = (int8_t)(small ? step : 0);
 }
 
-/* Changes the leaf's kind from `from` to `to`. Returns false if another thread has changed it. */
+/* Changes the leaf's kind from `from` to `to`. Returns false if the kind is not `from`, because
+ * another thread has changed it. */
 static bool begin_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind from, ebpo_leaf_kind to)
 {
     uint8_t expected = (uint8_t)from;
     return atomic_compare_exchange_strong(&leaf->kind, &expected, (uint8_t)to);
 }
 
+/* Sets the kind, and makes what this thread wrote before visible to threads that read the kind. */
 static void end_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
 {
     atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
 }
 
+/* Finds the free cell face and the boxes, unless a thread has done it or is doing it. */
 static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                            ebpo_cell_faces_fn *cell_faces)
 {
-    /* this test comes first, because in most queries it is false: it is one read */
+    /* The first test is one read, and false in most queries. */
     if (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_UNKNOWN &&
         begin_kind(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_CLAIMED)) {
         bound_leaf(s, leaf, cell, cell_faces);
@@ -459,7 +466,7 @@ static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell
     }
 }
 
-/* Returns true if this call has found the kind, false if another thread finds or has found it. */
+/* Finds the kind. Returns false if another thread has found it or is finding it. */
 static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
 {
     if (!begin_kind(leaf, EBPO_LEAF_BOUNDED, EBPO_LEAF_SORTED))
@@ -475,7 +482,7 @@ static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell
 bool ebpo_leaf_query(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                      ebpo_cell_faces_fn *cell_faces)
 {
-    /* threads may overwrite each other's counts; the kind is then found slightly later */
+    /* Threads may overwrite each other's counts. Then the kind is found slightly later. */
     int queries = atomic_load_explicit(&leaf->queries, memory_order_relaxed) + 1;
     bool found = false;
     if (queries >= EBPO_LEAF_CELL_FACE_QUERIES)

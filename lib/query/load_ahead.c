@@ -1,13 +1,12 @@
-/* Loads subtrees before queries need them, or sends prefetch hints for a remote
- * file.
+/* Loads subtrees before queries need them, and sends prefetch hints for remote files.
  *
- * A prefetch requests the subtrees that queries near the last query may need, in the order of their
- * distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that contains the
- * position instead.
+ * After a query, the context prefetches the subtrees that queries near it may need, in the order of
+ * their distance from the query's point. (EBP 2017, 4.2.3, loads the 26 neighbours of the subtree
+ * that contains the point instead.)
  *
- * A batch evaluates many points in the order of the Morton curve, so that subtrees are loaded few
- * times. For a remote file, the batch sends prefetch hints for some thousand points at a time, in
- * advance. A batch belongs to one thread. */
+ * A batch evaluates many points in the order of the Morton curve, so that each subtree is loaded
+ * few times. For a remote file, the batch sends prefetch hints for some thousand points at a time,
+ * before their bytes are needed. A batch belongs to one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,8 +30,8 @@ typedef struct wanted {
 
 /* A search for the nearest subtrees within a distance of a point. */
 typedef struct subtree_search {
-    ebpo_ranking ranking;
-    double limit; /* greatest bound that still matters */
+    ebpo_ranking ranking; /* computes lower bounds of the distance to nodes */
+    double limit;         /* subtrees with greater lower bounds are not listed */
     unsigned count;
     wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
 } subtree_search;
@@ -48,7 +47,7 @@ static void add_subtree(subtree_search *l, uint64_t below, double lower)
         l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
 
-/* Adds the subtrees at or below a node. `lower`: bound of the node. */
+/* Adds the subtrees at or below a node. `lower`: lower bound of the distance to the node. */
 static void search_below(subtree_search *l, ebpo_node node, double lower)
 {
     if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
@@ -98,9 +97,9 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     /* Until the next prefetch, p moves by about side / 4. By this motion, envelopes come nearer by
      * at most side / 4, and the search distance grows by at most side / 4. So queries need
      * subtrees whose envelopes are within search_distance + side / 2. Under rules other than
-     * nonzero, envelopes do not decide: a query needs the subtree whose cell contains the point.
-     * The envelope of this subtree may be a cell's diagonal, 1.73 sides, away. The sum of 0.5
-     * and 1.73 is rounded up to 2.25. */
+     * nonzero, envelopes do not decide if a point is inside: such a query needs the subtree whose
+     * cell contains the point, and the envelope of this subtree may be a cell's diagonal, 1.73
+     * sides, away. The sum of 0.5 and 1.73 is rounded up to 2.25. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(search_distance) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
@@ -108,9 +107,9 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* Returns the row of the file's table of subtrees whose subtree contains the node
- * top->below[below]. (This node can be deeper than the root of that subtree.) Returns UINT64_MAX if
- * no hint is needed, or no row is found. */
+/* Returns the row, in the file's table of subtrees, of the subtree that contains the node
+ * top->below[below]. (This node may be deeper than the root of the file's subtree.) Returns
+ * UINT64_MAX if no hint is needed, or no row is found. */
 static uint64_t table_row(const ebpo_context *c, uint32_t below)
 {
     const ebpo_model *m = c->model;
@@ -129,21 +128,21 @@ static uint64_t table_row(const ebpo_context *c, uint32_t below)
                : UINT64_MAX;
 }
 
-static int compare_numbers(const void *x, const void *y)
+static int compare_rows(const void *x, const void *y)
 {
     uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
     return (a > b) - (a < b);
 }
 
-/* Sorts numbers in ascending order and removes duplicates; returns the new count. */
-static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
+/* Sorts rows in ascending order and removes repetitions; returns the new count. */
+static uint64_t sort_rows(uint64_t *rows, uint64_t count)
 {
     uint64_t kept = 0;
     if (count)
-        qsort(numbers, count, sizeof *numbers, compare_numbers);
+        qsort(rows, count, sizeof *rows, compare_rows);
     for (uint64_t i = 0; i < count; i++)
-        if (i == 0 || numbers[i] != numbers[kept - 1])
-            numbers[kept++] = numbers[i];
+        if (i == 0 || rows[i] != rows[kept - 1])
+            rows[kept++] = rows[i];
     return kept;
 }
 
@@ -153,35 +152,36 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
     ebpo_hints hints = EBPO_HINTS_INIT(m->file);
     if (m->info->subtree_level == 0 || !ebpo_input_prefetches(&m->file->in) || count == 0)
         return;
-    uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
-    for (uint64_t i = 0; numbers && i < count; i++) {
-        uint64_t number = table_row(c, below[i]);
-        if (number != UINT64_MAX)
-            numbers[found++] = number;
+    uint64_t found = 0, *rows = ebpo_alloc(count, sizeof *rows);
+    for (uint64_t i = 0; rows && i < count; i++) {
+        uint64_t row = table_row(c, below[i]);
+        if (row != UINT64_MAX)
+            rows[found++] = row;
     }
-    found = sort_numbers(numbers, found);
-    ebpo_subtree_table_hint(m->chunks, numbers, found);
+    found = sort_rows(rows, found);
+    ebpo_subtree_table_hint(m->chunks, rows, found);
     for (uint64_t i = 0; i < found; i++)
-        ebpo_subtrees_hint(m->chunks, &hints, numbers[i], 1, ebpo_subtree_needs(c->planes),
+        ebpo_subtrees_hint(m->chunks, &hints, rows[i], 1, ebpo_subtree_needs(c->planes),
                            EBPO_LEVELS_MAX, true);
     ebpo_hint_all(&hints);
-    free(numbers);
+    free(rows);
 }
 
 /* --- batches --- */
 
 #define EBPO_NO_SUBTREE UINT64_MAX
 
-/* Limits of a prefetch hint for homes (home_of: subtrees where queries begin). The data of two
- * hints is being fetched at any time. */
+/* Limits of a prefetch hint for homes (home_of: the subtree where the query of a point begins). The
+ * data of two hints is being fetched at any time. */
 enum {
     HINT_SUBTREES = 128, /* maximum number of subtrees: some megabytes of data */
     HINT_POINTS = 4096,  /* maximum number of points whose homes are in the hint */
-    /* maximum number of points after a pending one, in a batch without hints */
+    /* in a batch without hints, the most points that are evaluated after the first point whose
+     * bytes are not available yet */
     POINTS_AFTER_PENDING = 256
 };
 
-/* A point and its position on the curve. */
+/* A point, by its index, and its position on the curve (key). */
 typedef struct placed {
     uint64_t key, point;
 } placed;
@@ -225,12 +225,12 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
 }
 
 /* Returns true if consecutive points are far apart. Such points are evaluated along the curve even
- * when the whole model is in memory. Then the data for the next point is in the processor's caches.
- * The search starts from the previous point's result, which is close to the next point's result.
+ * if the whole model is in memory. Along the curve, the data for the next point is often in the
+ * processor's caches, and the next search starts from the previous point's result, which is close.
  * The points of a path already have such an order. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
-    const double mean_least = 0x1p-5; /* mean distance, as a share of the box */
+    const double mean_least = 0x1p-5; /* least mean distance, as a share of the box's side */
     double sum = 0;
     for (uint64_t i = 1; i < count; i++) {
         double greatest = 0;
@@ -276,13 +276,13 @@ ebpo_status ebpo_batch_end(ebpo_batch *b, ebpo_status status, ebpo_error *error)
     free(b->below);
     if (!b->pending || (status != EBPO_OK && status != EBPO_E_PENDING))
         return status;
-    return ebpo_fail_with(error, &b->why_pending); /* later points may have changed *error */
+    return ebpo_fail_with(error, &b->pending_error); /* later points may have changed *error */
 }
 
 /* --- prefetch hints --- */
 
-/* Returns the *home* of a point: the subtree where the query of the point begins, as an index of
- * top->below. EBPO_NO_SUBTREE: the query needs no subtree, as the top decides. */
+/* Returns the *home* of a point: the subtree where the query of the point begins, as an index in
+ * top->below. EBPO_NO_SUBTREE: the query needs no subtree, because the top of the tree decides. */
 static uint64_t home_of(const ebpo_batch *b, const double p[3])
 {
     const ebpo_model *m = b->context->model;
@@ -315,6 +315,7 @@ static void hint_collected(ebpo_batch *b)
     b->below_count = 0;
 }
 
+/* Returns the point with turn i. */
 static const double *ordered_point(const ebpo_batch *b, uint64_t i)
 {
     return b->points + 3 * (b->order ? b->order[i] : i);
@@ -333,11 +334,11 @@ static void hint_next(ebpo_batch *b)
     hint_collected(b);
 }
 
-/* Sends one hint for the subtrees, other than homes, that the points up to turn `end` need, so that
- * queries do not request these subtrees one by one. Finds the nearest face in each point's home.
- * The distance of this face is an upper bound: subtrees beyond it are not needed. If a home cannot
- * be loaded, the loop ends, because the next home could again wait for a time-out; the query
- * returns the error. Homes whose bytes are pending do not end the loop. */
+/* Sends one hint for the subtrees, other than homes, that the points before turn `end` need, so
+ * that queries do not request these subtrees one by one. Finds the nearest face in each point's
+ * home. Subtrees that are farther away than this face are not needed. If a home cannot be loaded,
+ * the loop ends, because the next home could again wait for a time-out; the query will return the
+ * error. A home whose bytes are not available yet does not end the loop. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
@@ -378,8 +379,8 @@ uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
     return b->order ? b->order[i] : i;
 }
 
-/* Returns the turn at which a batch with pending points ends. With hints, this is the first turn
- * that would send another hint. */
+/* Returns the turn at which a batch with pending points (whose bytes are not available yet) ends.
+ * With hints, this is the first turn that would send another hint. */
 static uint64_t end_of_pass(const ebpo_batch *b)
 {
     if (!b->sends_hints)
@@ -395,7 +396,7 @@ ebpo_status ebpo_batch_note(ebpo_batch *b, uint64_t i, uint64_t point, ebpo_stat
     if (status == EBPO_E_PENDING && !b->pending) {
         b->pending = true;
         b->first_pending = i;
-        b->why_pending = error ? *error : (ebpo_error){ .status = status, .offset = -1 };
+        b->pending_error = error ? *error : (ebpo_error){ .status = status, .offset = -1 };
     }
     if (!b->pending || (status != EBPO_OK && status != EBPO_E_PENDING))
         return status;

@@ -4,12 +4,13 @@
  *   volume          det / 6
  *   first moments   det s / 24
  *   second moments  det (s s' + a a' + b b' + c c') / 120
- * All values are in double-double arithmetic, on coordinates scaled by a power of two to about 1.
- * They are summed in blocks of BLOCK_FACES faces, so that sums do not depend on the number of
- * threads. If the multiplicity of a face's component is known (construct/solid_shells.h), the face
- * counts that number of times, else once. The caps of a surface with its border are faces too
- * (measure_caps.h). Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D
- * tetrahedron inertia tensor in terms of its vertex coordinates". */
+ * where s' is the transpose of s. All values are in double-double arithmetic, on coordinates scaled
+ * by a power of two to about 1. They are summed in blocks of BLOCK_FACES faces, so that sums do not
+ * depend on the number of threads. A face counts as often as its component adds to the volume (its
+ * multiplicity, construct/solid_shells.h), or once if this is not known. For a surface with its
+ * border (the edges of its holes), the caps that close the holes are faces, too (measure_caps.h).
+ * Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia
+ * tensor in terms of its vertex coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -33,8 +34,8 @@
 
 enum { BLOCK_FACES = 16384 };
 
-/* A sum that is at most this share of the sum of the absolute values of its terms is a rounding
- * error, and becomes 0. */
+/* A sum that is at most this share of the sum of the absolute values of its terms counts as a
+ * rounding error, and becomes 0. */
 static const double zero_share = 0x1p-85;
 
 /* Scaled coordinates are p / 2^exponent. `middle`: middle of the model's box, scaled. */
@@ -44,11 +45,12 @@ typedef struct frame {
     double middle[3];
 } frame;
 
-/* Sums over faces. The number in a name is the factor by which the sum is too large. */
+/* Sums over faces. The number in a name is the factor by which the sum is larger than the value. An
+ * ebpo_pair is a double-double number. */
 typedef struct moments {
-    ebpo_pair area2, volume6, first24[3], second120[6]; /* order of second moments: xx, yy, zz, yz,
-                                                         * zx, xy */
-    ebpo_pair integral6;                                /* as volume6, but each face counts once */
+    ebpo_pair area2, volume6, first24[3];
+    ebpo_pair second120[6]; /* xx, yy, zz, yz, zx, xy */
+    ebpo_pair integral6;    /* as volume6, but each face counts once */
     /* absolute6: sum of the absolute values of the terms of volume6; terms6: sum of the absolute
      * values of the products from which these terms are computed */
     double absolute6, terms6;
@@ -56,10 +58,10 @@ typedef struct moments {
 
 typedef struct measuring {
     const ebpo_mesh *mesh;
-    const uint32_t *component; /* [faces]; NULL: all faces count once */
-    int8_t *times;             /* [component] multiplicity of its faces */
+    const uint32_t *component; /* [faces] component of each face; NULL: all faces count once */
+    int8_t *times;             /* [components] how often the component's faces count */
     frame frame;
-    moments *blocks;
+    moments *blocks; /* sums over each block */
 } measuring;
 
 /* --- the frame --- */
@@ -80,7 +82,7 @@ static void make_frame(frame *f, const ebpo_mesh *mesh)
     for (int k = 0; k < 3; k++)
         half = fmax(half, mesh->face_count ? .5 * high[k] - .5 * low[k] : 0);
     frexp(half, &f->exponent);
-    /* coordinates of a tiny model far from the origin must not overflow */
+    /* The scaled coordinates of a tiny model far from the origin must not overflow. */
     int largest_exponent;
     frexp(largest, &largest_exponent);
     f->exponent = f->exponent > largest_exponent - 900 ? f->exponent : largest_exponent - 900;
@@ -152,7 +154,7 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
 }
 
 /* Adds the tetrahedron of a triangle. `n`, `terms`: results of normal_of. The tetrahedron counts
- * `weight` times in the integral, and `weight` * `times` times in the volume. */
+ * `weight` times in integral6, and `weight` * `times` times in all other sums. */
 static void add_tetrahedron(moments *m, const double corner[3][3], const double middle[3],
                             const ebpo_pair n[3], const double terms[3], double weight, int times)
 {
@@ -215,11 +217,11 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
 
 /* --- caps --- */
 
-/* Sums over the caps of a border. */
+/* Sums over the loops of a border, for bounds of how much results depend on the choice of caps. */
 typedef struct cap_sums {
-    double volume; /* sum of weights times bounds of the volumes of the loops' hulls */
-    double moment; /* sum of these products, each times the distance of the farthest point of the
-                    * hull's box */
+    double volume; /* sum of the loop's weight times a bound of the volume of its convex hull */
+    double moment; /* sum of the same products, each times a bound of the distance of the hull's
+                    * farthest point from the centroid */
 } cap_sums;
 
 static void scale_point(const frame *f, const double p[3], double out[3])
@@ -228,7 +230,7 @@ static void scale_point(const frame *f, const double p[3], double out[3])
         out[k] = p[k] * f->factor[0] * f->factor[1];
 }
 
-/* Adds the caps, which turn against the discs (geometry/cap_triangles.h). */
+/* Adds the caps. Their triangles are those of the discs (geometry/cap_triangles.h), turned. */
 static void add_caps(moments *m, const frame *f, const ebpo_border_loops *loops)
 {
     const double *point = loops->point;
@@ -249,7 +251,7 @@ static void add_caps(moments *m, const frame *f, const ebpo_border_loops *loops)
     }
 }
 
-/* Computes the sums, relative to a scaled centroid. */
+/* Computes the sums of all loops. centroid: scaled. */
 static void sum_hulls(cap_sums *out, const frame *f, const ebpo_border_loops *loops,
                       const double centroid[3])
 {
@@ -269,7 +271,7 @@ static void sum_hulls(cap_sums *out, const frame *f, const ebpo_border_loops *lo
 
 /* --- from moments to mass --- */
 
-/* Computes the inertia from central second moments: the trace less the matrix. */
+/* Computes the inertia from central second moments: trace * identity - matrix. */
 static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
 {
     for (int k = 0; k < 3; k++) {
@@ -283,9 +285,9 @@ static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
 }
 
 /* Returns a bound of the rounding error of integral6. Each operation on pairs has an error of at
- * most 2^-103 times the absolute values of its operands, or of its product. A term of the sum is
- * the result of at most 8 operations, and passes at most 4 additions for each triangle and block.
- * All partial sums are at most `terms6`, but for a factor below 2. */
+ * most 2^-103 times the absolute values of its operands (for a product: of its result). A term of
+ * the sum is the result of at most 8 operations, and passes at most 4 additions for each triangle
+ * and block. All partial sums are at most 2 * terms6. */
 static double integral_error(const moments *m, uint64_t triangles)
 {
     return (4 * (double)triangles + 64) * 0x1p-102 * m->terms6 + 0x1p-900;
@@ -295,16 +297,18 @@ static double integral_error(const moments *m, uint64_t triangles)
  *
  * Rounding: the corners of a triangle are at most 2 from the middle on each axis, so the absolute
  * value of a coordinate of their sum is at most 6, and the error of first24 is at most 12 times the
- * error of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and f of
- * M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
+ * error of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and an
+ * error f of M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
  *
- * Other caps: let k' be the winding numbers with other caps C', for which the closed surface of the
- * cap C'_i of each loop and of our cap, reversed, has winding numbers -1, 0 and 1 only, times the
- * loop's weight w_i, and for which C'_i is in the convex hull H_i of the loop, as our cap is. Then
- * |k' - k| is at most the sum of w_i over the hulls that contain the point, so the integral changes
- * by at most h = sum of w_i |H_i|. With the centroid c as the origin, the first moment of k is 0,
- * and the first moment of k' is at most the sum of w_i |H_i| r_i, where r_i is the distance of the
- * farthest point of H_i. So the centroid moves by at most this sum over |V| - h. */
+ * Other caps: let k be the winding numbers with our caps C, and k' those with other caps C'. We
+ * assume two properties of the cap C'_i of each loop. First, C'_i together with our cap C_i,
+ * reversed, is a closed surface with no other winding numbers than -w_i, 0 and w_i, where w_i is
+ * the loop's weight. Second, C'_i is in the convex hull H_i of the loop (as C_i is). Then |k' - k|
+ * is at most the sum of w_i over the hulls that contain the point, so the integral changes by at
+ * most h = sum of w_i |H_i|, where |H_i| is the volume of the hull. With the centroid c as the
+ * origin, the first moment of k is 0, and the first moment of k' is at most the sum of w_i |H_i|
+ * r_i, where r_i is the distance of the farthest point of H_i. So the centroid moves by at most
+ * this sum divided by |V| - h. */
 static void set_border(ebpo_mass *out, const moments *m, const frame *f,
                        const ebpo_border_loops *loops, uint64_t triangles)
 {
@@ -317,8 +321,9 @@ static void set_border(ebpo_mass *out, const moments *m, const frame *f,
         largest = fmax(largest, fabs(c));
     }
     sum_hulls(&caps, f, loops, centre);
-    double left = volume6 * (1 - 0x1p-40) - error6, hulls6 = 6 * caps.volume;
-    double moved = left > 0 ? (3 + largest) * error6 / left + 0x1p-48 * (1 + largest) : INFINITY;
+    double least6 = volume6 * (1 - 0x1p-40) - error6, hulls6 = 6 * caps.volume;
+    double moved =
+        least6 > 0 ? (3 + largest) * error6 / least6 + 0x1p-48 * (1 + largest) : INFINITY;
     for (int k = 0; k < 3; k++)
         moved += 0x1p-50 * fabs(f->middle[k]);
     out->integral_error =
@@ -327,8 +332,8 @@ static void set_border(ebpo_mass *out, const moments *m, const frame *f,
     out->caps_integral = ldexp(caps.volume, 3 * f->exponent);
     out->caps_centroid =
         caps.volume == 0 ? 0
-        : left > hulls6
-            ? ldexp((6 * caps.moment + hulls6 * moved) / (left - hulls6) * (1 + 0x1p-40),
+        : least6 > hulls6
+            ? ldexp((6 * caps.moment + hulls6 * moved) / (least6 - hulls6) * (1 + 0x1p-40),
                     f->exponent)
             : INFINITY;
 }
@@ -378,8 +383,8 @@ static ebpo_status count_components(measuring *p, const ebpo_solid_shells *s, eb
     return EBPO_OK;
 }
 
-/* Returns true if the surface has one component, no edges of more than two faces, and no edges of
- * faces with opposite orientations. Its winding numbers with caps are then 0 and 1, or 0 and -1,
+/* Returns true if the surface has one component, no edge of more than two faces, and no edge whose
+ * faces have opposite orientations. Its winding numbers with caps are then 0 and 1, or 0 and -1,
  * unless faces or caps intersect. */
 static bool is_one_sheet(const ebpo_info *info)
 {
@@ -387,8 +392,8 @@ static bool is_one_sheet(const ebpo_info *info)
     return r->components == 1 && r->nonmanifold_edges.count == 0 && r->misoriented_edges.count == 0;
 }
 
-/* Computes the interval of the volume from the file header and, for several components, from their
- * nesting. If the volume is known, sets the multiplicity of faces. */
+/* Computes an interval of the volume from the file header and, if there are several components,
+ * from their nesting. If the volume is known, sets how often faces count. */
 static ebpo_status decide_volume(measuring *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {
@@ -406,8 +411,8 @@ static ebpo_status decide_volume(measuring *p, const ebpo_info *info, unsigned t
     return status;
 }
 
-/* Corrects the sums of a single component whose normals point inwards: its faces count -1 times if
- * the rule includes winding number -1, else 0 times. */
+/* Corrects the sums if the normals of a single component point inwards: its faces count -1 times if
+ * winding number -1 is inside under the rule, otherwise 0 times. */
 static void count_inwards(moments *m, ebpo_rule rule)
 {
     int times = ebpo_rule_inside(rule, -1) ? -1 : 0;
@@ -418,7 +423,8 @@ static void count_inwards(moments *m, ebpo_rule rule)
         *sum[i] = (ebpo_pair){ times * sum[i]->head, times * sum[i]->tail };
 }
 
-/* Sets the volume and its interval: the sum if the volume is known, else NAN and the interval. */
+/* Sets the volume and its interval. If the volume is not known, it becomes NAN. `bordered`: the
+ * file has the border of a surface. */
 static void set_volume(ebpo_mass *mass, const ebpo_solid_volume *known, bool bordered)
 {
     if (known->lo != known->hi) {
@@ -451,8 +457,8 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
         return status;
     if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "the file is a subset with an omitted part of the mesh: it cannot "
-                              "be measured; measure the original");
+                              "the file is a subset, which omits a part of the mesh, so it cannot "
+                              "be measured; measure the original file");
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
     status = ebpo_file_read_mesh(file, &read, &mesh, error);
@@ -497,12 +503,12 @@ done:
 
 /* --- the volume of a solid, from the file header --- */
 
-/* Bounds of the rounding errors of sums of envelopes' volumes: relative to the sum, and relative to
- * the root cell's volume. */
+/* Bounds of the rounding error of a sum of envelopes' volumes: OF_SUM is relative to the sum, and
+ * OF_ROOT to the root cell's volume. */
 static const double OF_SUM = 1e-9, OF_ROOT = 1e-12;
 
-/* Sets out->lo to the volume of the black cells, and out->hi to the volume of black cells and
- * leaves' envelopes. Does nothing for a subset. */
+/* Sets out->lo to the volume of the black cells, and out->hi to the volume of the black cells and
+ * of the leaves' envelopes. Does nothing for a subset, whose header does not have all volumes. */
 static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
 {
     double root = info->box_size[0] * info->box_size[1] * info->box_size[2], lo = 0, hi = 0;

@@ -1,10 +1,11 @@
-/* Bounds the volume of the convex hull of a loop by boxes: along the axes, and along the loop's
- * vector area, so that the bound of a nearly flat loop is nearly 0.
+/* Bounds the volume of the convex hull of a loop (of border edges) by the volumes of two boxes: one
+ * along the axes of coordinates, and one along the loop's vector area, which is thin if the loop is
+ * nearly flat.
  *
- * Rounding. Coordinates relative to the first point are at most `span` long. Their products with
- * axes that are unit vectors but for 2^-50 have an error below 2^-49 span, which is added on both
- * sides. Three axes that are orthogonal but for 2^-45 span the volume of an exact box but for a
- * relative 2^-40. */
+ * Rounding. Points relative to the first point are at most `span` long. Their products with axes,
+ * which are unit vectors up to an error of 2^-50, have an error below 2^-49 span, which is added on
+ * both sides. Three axes that are orthogonal up to an error of 2^-45 span the volume of an exact
+ * box up to a relative error of 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -13,6 +14,7 @@
 #include "geometry/vec3.h"
 #include "query/measure_caps.h"
 
+/* Returns point i minus the first point, with coordinates multiplied by both factors. */
 static void relative_point(const double *point, uint64_t i, const double factor[2], double out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -47,8 +49,9 @@ static bool scale_to_unit(double v[3])
     return length > 0x1p-400;
 }
 
-/* Sets the axes: the vector area, a perpendicular one to the farthest point, and the third. Returns
- * false if they are not known well enough. */
+/* Sets the axes: first the vector area; then the perpendicular direction to the point that is
+ * farthest from the first axis; then the cross product of both. Returns false if rounding makes
+ * them too inexact. */
 static bool find_axes(const double *point, uint64_t count, const double factor[2],
                       double axis[3][3])
 {

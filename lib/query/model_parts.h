@@ -1,5 +1,6 @@
-/* Declares the parts of a model other than subtrees: the top of its tree, skeletons, and its share
- * of budgets. */
+/* Declares the parts of a model that are not subtrees: the top of its tree, skeletons, and its
+ * share of budgets. A model that is not completely in memory keeps the top of its tree in memory
+ * and loads the subtrees below the top on demand. */
 #ifndef EBPO_QUERY_MODEL_PARTS_H
 #define EBPO_QUERY_MODEL_PARTS_H
 
@@ -10,7 +11,8 @@
 #include "query/accel.h"
 #include "query/point_bounds.h"
 
-/* --- the top: levels 0 .. cut level, without faces. Immutable; any thread may use it --- */
+/* --- the top: levels 0 to the cut level, without faces. It does not change after it is made; any
+ * thread may use it --- */
 
 /* A range of ebpo_top.planes. */
 typedef struct ebpo_top_planes {
@@ -20,24 +22,26 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    /* The kinds of entries are UNIFORM, GRAY (gray nodes above the cut level) and SUBTREE_ROOT:
-     * gray nodes of the cut level, leaves down to the cut level, and pruned nodes (whose children
-     * are not in the file). The value of an entry SUBTREE_ROOT is an index in `below`. */
+    /* The kinds of entries are UNIFORM (white and black nodes), GRAY (gray nodes above the cut
+     * level) and SUBTREE_ROOT (the roots of subtrees: gray nodes of the cut level, leaves down to
+     * the cut level, and pruned nodes, whose children are not in the file). The value of an entry
+     * SUBTREE_ROOT is an index in `below`. */
     ebpo_node_table nodes;
     uint32_t *planes;      /* codes of all planes */
     ebpo_top_planes *gray; /* [group] planes of the gray node whose children are this group */
 
     uint64_t below_count;
-    /* [below_count] nodes of the kind SUBTREE_ROOT; NULL after ebpo_top_read_envelopes */
+    /* [below_count] the roots of the subtrees; NULL after ebpo_top_read_envelopes. A subtree is
+     * identified by its index in this array, in variables called `below` */
     ebpo_node *below;
     ebpo_top_planes *below_planes; /* [below_count] planes of these nodes; leaves have none */
-    uint64_t bytes;
+    uint64_t bytes;                /* of memory that the top takes */
 } ebpo_top;
 
-/* Reads the top. */
+/* Reads the top of a file. */
 EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level,
                                         unsigned threads, ebpo_error *error);
-/* Reads only the table of nodes and the planes; `below` is NULL. */
+/* Reads only the table of nodes and the planes, without `below`. */
 EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file,
                                                   int cut_level, unsigned threads,
                                                   ebpo_error *error);
@@ -51,44 +55,47 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 /* --- skeletons ---
  *
  * A skeleton has the upper nodes of a subtree's hierarchy over faces (query/accel.h): eight nodes
- * at first, which take 2 KB, whereas the subtree takes hundreds. Skeletons bound the distance to a
- * subtree's faces much better than the subtree's cell and envelope do, so searches load the subtree
- * again only if it may matter. A skeleton is made when the subtree is loaded, without reading more
- * of the file, and is kept when the cache drops the subtree. When a search loads a subtree without
- * need, nodes near the query point are added to its skeleton: so memory is used where bounds are
- * too loose.
+ * at first, which take 2 KB, whereas the subtree takes hundreds of KB. The lower bound of the
+ * distance to a subtree's faces is much better from its skeleton than from its cell and envelope,
+ * so searches rarely load a subtree again that has no near face. A skeleton is made when the
+ * subtree is loaded, without reading more of the file, and is kept when the cache drops the
+ * subtree. If a search loads a subtree and finds no near face in it, nodes near the query point are
+ * added to the subtree's skeleton, so memory is used where bounds are not good enough.
  *
- * Skeletons give lower bounds only. Upper bounds would not help: subtrees are searched in the order
- * of lower bounds until the next bound is beyond the found distance (nearest_subtrees.c), and every
- * subtree whose lower bound is at most the result must be searched. */
+ * Skeletons give lower bounds only. Upper bounds would not help, because subtrees are searched in
+ * the order of lower bounds until the next bound is beyond the found distance (nearest_subtrees.c),
+ * and every subtree whose lower bound is at most the result must be searched. */
 
 /* Any thread may read a skeleton, also while one other thread changes it. */
 typedef struct ebpo_skeleton ebpo_skeleton;
 
 /* Guaranteed lower bounds of the distance, in the model's unit, to the faces that the subtree owns,
- * and to its shared faces, which other subtrees own. INFINITY: there are no such faces. */
+ * and to its shared faces, which it lists but other subtrees own. INFINITY: there are no such
+ * faces.
+ */
 typedef struct ebpo_skeleton_bounds {
     double owned, shared;
 } ebpo_skeleton_bounds;
 
 /* Makes a skeleton with at most `nodes` nodes, 1 to 8. Returns NULL if the subtree has no faces, if
- * squares of its size overflow or underflow, or without memory. */
+ * squares of its size overflow or underflow, or when out of memory. */
 ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *subtree, unsigned nodes);
 void ebpo_skeleton_free(ebpo_skeleton *skeleton);
 /* Returns the maximum bytes of a skeleton with this number of nodes. */
 uint64_t ebpo_skeleton_bytes(unsigned nodes);
 
-/* Returns lower bounds; those beyond `limit` may be INFINITY. */
+/* Returns lower bounds. A bound beyond `limit` may be replaced by INFINITY. */
 ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *skeleton, const double p[3],
                                                 double limit);
-/* Returns lower bounds of keys instead of distances, for a far point (point_bounds.h). */
+/* Returns lower bounds of keys, which replace distances for a far point (point_bounds.h). */
 ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *skeleton, const ebpo_far *far,
                                               double limit);
 
 /* Maximum number of nodes after growing. */
 enum { EBPO_SKELETON_NODES = 64 };
-/* Adds up to eight nodes of the same subtree: the nodes within `limit` of p that have the least
- * lower bounds. `take` reserves bytes of a quota, and returns false if that is not possible. */
+/* Adds at most eight nodes of the subtree's hierarchy to its skeleton: those within `limit` of p
+ * that have the least lower bounds. `take` reserves bytes of a quota, and returns false if the
+ * quota is too small. */
 void ebpo_skeleton_grow(ebpo_skeleton *skeleton, const ebpo_accel *subtree, const double p[3],
                         double limit, bool (*take)(void *user, uint64_t bytes), void *user);
 
@@ -98,8 +105,8 @@ typedef struct ebpo_shared_box {
 } ebpo_shared_box;
 /* Maximum number of boxes of a skeleton. */
 enum { EBPO_SHARED_BOXES = 64 };
-/* Writes boxes around the shared faces that may be within `limit` of p, and returns their number.
- */
+/* Writes boxes that contain all shared faces that may be within `limit` of p; returns the number of
+ * boxes. */
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double p[3], double limit,
                                     ebpo_shared_box out[EBPO_SHARED_BOXES]);
 
@@ -108,11 +115,11 @@ typedef struct ebpo_skeletons ebpo_skeletons;
 
 /* Makes an empty table for `count` subtrees. `space`: quota in bytes for all skeletons
  * (ebpo_skeletons_capacity). When bytes are needed, they are taken from the budget of `cache`,
- * unless it is NULL. Returns NULL without memory. */
+ * unless `cache` is NULL. Returns NULL when out of memory. */
 ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache);
 /* Frees the table after all other threads have finished; NULL is allowed. */
 void ebpo_skeletons_free(ebpo_skeletons *all);
-/* Returns the part of `space` that `count` skeletons can use. */
+/* Returns how many bytes of `space` the skeletons of `count` subtrees can use at most. */
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space);
 /* Reserve bytes of the quota for other data about subtrees (deep bounds, nearest.h), and give them
  * back. The first function returns false if the quota is too small. Any thread. */
@@ -121,20 +128,20 @@ void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
 /* Returns the bytes of memory that are used now. */
 uint64_t ebpo_skeletons_bytes(const ebpo_skeletons *all);
 
-/* Keeps the skeleton of a subtree, unless it exists or the quota is used up. */
+/* Makes and keeps the skeleton of a subtree, unless it is already kept or the quota is used up. */
 void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel *subtree);
 /* Adds nodes to the kept skeleton, as ebpo_skeleton_grow does. */
 void ebpo_skeletons_grow(ebpo_skeletons *all, uint64_t number, const ebpo_accel *subtree,
                          const double p[3], double limit);
-/* Returns NULL if no skeleton is kept. */
+/* Returns the skeleton of a subtree, or NULL if none is kept. */
 const ebpo_skeleton *ebpo_skeletons_find(const ebpo_skeletons *all, uint64_t number);
 
 /* --- shares of a budget --- */
 
-/* Bytes for loading at least one subtree. */
+/* The least bytes for subtrees, so that at least one can be loaded. */
 enum { EBPO_SUBTREES_LEAST = 1 << 20 };
 
-/* Bytes for decoded chunks. */
+/* The least bytes for decoded chunks. */
 enum { EBPO_CHUNKS_LEAST = 2 << 20 };
 
 /* Return the bytes of a budget for decoded chunks, for skeletons, and for both together. The
@@ -145,18 +152,18 @@ uint64_t ebpo_bytes_besides_subtrees(const ebpo_model_options *options, uint64_t
 
 /* --- the plan for a model's budget, from the counts in the file header --- */
 
-/* Sets options->memory: for a shared budget, the bytes that are not taken permanently; for a remote
- * file without any budget, a default unless a cut level is given. Returns true for a remote file
- * without any budget. */
+/* Sets options->memory in two cases. For a shared budget: to the bytes that no model has taken
+ * permanently. For a remote file without any budget: to a default, unless a cut level is given.
+ * Returns true for a remote file without any budget. */
 bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *options);
 
-/* Decides if the whole model is loaded, or chooses the cut level. Returns the errors of
+/* Decides if the whole model is loaded, and otherwise chooses the cut level. Errors: as for
  * ebpo_model_memory. */
 EBPO_MUST_USE ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *options,
                                           bool default_memory, ebpo_model_plan *out,
                                           ebpo_error *error);
-/* Chooses the cut level for a budget that the whole model exceeds. Sets only the cut level and
- * `least`. */
+/* Chooses the cut level for a budget that is too small for the whole model. Sets only
+ * out->cut_level and out->least. */
 EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_model_options *options,
                                           ebpo_model_plan *out, ebpo_error *error);
 
@@ -172,14 +179,14 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
 
-/* Reserve bytes for a whole model, and give back unused bytes or, at the end of the model, all
- * bytes. The first function returns false if the bytes exceed the quota of whole models or the free
- * part of the budget. */
+/* The first function reserves bytes for a model that is held completely in memory. It returns false
+ * if the bytes exceed the quota of whole models or the free part of the budget. The second function
+ * gives bytes back: unused bytes, or, when the model is closed, all bytes. */
 bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
 void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
 
-/* Reserve at most `wanted` bytes of the quota of skeletons (returns their number), and give them
- * back. */
+/* The first function reserves at most `wanted` bytes of the quota of skeletons, and returns their
+ * number. The second function gives bytes back. */
 uint64_t ebpo_budget_take_skeletons(ebpo_budget *budget, uint64_t wanted);
 void ebpo_budget_give_back_skeletons(ebpo_budget *budget, uint64_t bytes);
 

@@ -1,14 +1,15 @@
-/* Finds the nearest face: the search in one accel (acceleration structure of a subtree), and the
- * comparison of two faces.
+/* Finds the nearest face: the search in one accel (acceleration structure of a subtree, accel.h),
+ * and the comparison of two faces.
  *
- * The search is depth first, the nearest child first. It drops nodes that are certainly farther
- * than the best face. Bounds of nodes and faces are in single precision with bounded errors
- * (nearest_kernels.c). The remaining faces are compared by guaranteed bounds in double precision.
- * If the bounds of two faces overlap, exact arithmetic compares the faces. Of equally near faces,
- * the result is the face with the lowest index in the file. If a point is so far from the subtree
- * that single precision does not suffice, the search uses boxes in double precision. If it is so
- * far from the model that doubles do not suffice, the search uses keys: numbers in the order of the
- * distances (point_bounds.h). An ebpo_nearest may search several accels one after the other. */
+ * The search walks down the hierarchy over blocks of faces depth first, the nearest child first. It
+ * drops nodes that are certainly farther than the best face. Bounds of nodes and faces are in
+ * single precision with bounded errors (nearest_kernels.c). The remaining faces are compared by
+ * guaranteed bounds in double precision. If the bounds of two faces overlap, exact arithmetic
+ * compares the faces. Of equally near faces, the result is the face with the lowest index in the
+ * file. If the point is so far from the subtree that single precision does not suffice, the search
+ * uses boxes in double precision. If the point is so far from the model that doubles do not suffice
+ * (a far point), the search uses keys: numbers in the order of the distances (point_bounds.h). One
+ * search (ebpo_nearest) may visit several accels one after the other. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -32,8 +33,8 @@ static bool is_edge(ebpo_feature feature)
     return feature >= EBPO_NEAR_EDGE0 && feature <= EBPO_NEAR_EDGE2;
 }
 
-/* Returns true if the nearest features of both faces are the same vertex or edge. Such faces are
- * the most frequent case of equal distances. */
+/* Returns true if the nearest features (corner or edge) of both faces are the same vertex or edge,
+ * so that the distances are equal. This is the most frequent case of equal distances. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {
@@ -61,8 +62,8 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 
 /* --- the search --- */
 
-/* A coordinate in the subtree's frame, where the subtree is about -1 .. 1. From this coordinate on,
- * single precision cannot distinguish the distances of the subtree's faces. */
+/* If a coordinate of a point in the subtree's frame (in which the subtree is about -1 .. 1) is at
+ * least this, single precision does not distinguish the distances of the subtree's faces. */
 #define FAR_COORDINATE 32.0
 
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
@@ -79,6 +80,7 @@ void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p
     n->block = n->first_block = EBPO_NO_BLOCK;
 }
 
+/* Makes a face the nearest face so far, and lowers the limits of the search. */
 static void set_nearest_face(ebpo_nearest *n, const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, const ebpo_far_keys *keys,
                              uint64_t file_face, uint64_t source_face)
@@ -94,6 +96,7 @@ static void set_nearest_face(ebpo_nearest *n, const double triangle[3][3],
     n->limit = fmin(n->limit, bounds->hi);
 }
 
+/* Returns bounds of the face's key for a far point, otherwise -INFINITY .. INFINITY. */
 static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
 {
     return n->far.far ? ebpo_far_face(&n->far, triangle) : (ebpo_far_keys){ -INFINITY, INFINITY };
@@ -185,7 +188,7 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     return true;
 }
 
-/* Returns the limit in the subtree's frame, rounded up. */
+/* Returns the search's limit of distances in the subtree's frame, rounded up. */
 static float frame_limit(const ebpo_near_search *g)
 {
     const ebpo_nearest *n = g->user;
@@ -193,7 +196,7 @@ static float frame_limit(const ebpo_near_search *g)
     return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
 }
 
-/* Tests the candidates, the candidate with the least lower bound first. */
+/* Tests all waiting candidates, beginning with the one with the least lower bound. */
 static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -219,7 +222,8 @@ static void judge_waiting(ebpo_near_search *g)
     }
 }
 
-/* Ends the search at the deadline: the bounds of the nodes on the stack give n->passed_over. */
+/* Ends the search at the deadline. Lowers n->passed_over to the bounds of the nodes on the stack.
+ */
 static void give_up(const ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -238,6 +242,7 @@ static bool is_search_late(ebpo_near_search *g)
     return ebpo_clock() > n->deadline;
 }
 
+/* Searches an accel that is near enough for single precision. */
 static void search_near(ebpo_nearest *n, const ebpo_nearest_kernels *kernels, ebpo_near_search *g)
 {
     g->user = n;
@@ -280,8 +285,8 @@ typedef struct far_search {
     ebpo_far_frame frame;
 } far_search;
 
-/* Returns the children within the limit, a bit for each. Tests boxes first, then the bounding
- * cylinders of the remaining children, because a cylinder takes more time. */
+/* Returns a bit for each child of a node whose bound is within the limit. Tests boxes first, then
+ * the bounding cylinders of the remaining children, because a cylinder takes more time. */
 static unsigned far_children(const far_search *g, uint32_t node, double lower[8])
 {
     const ebpo_nearest *n = g->n;
@@ -297,6 +302,7 @@ static unsigned far_children(const far_search *g, uint32_t node, double lower[8]
     return lanes;
 }
 
+/* Searches the faces below a child (node or block). */
 static void search_by_keys(const far_search *g, uint32_t child)
 {
     ebpo_nearest *n = g->n;
@@ -333,11 +339,12 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
         return greatest;
     for (int k = 0; k < 3; k++)
         sum += d[k] / greatest * (d[k] / greatest);
-    /* On at least one axis, p is FAR_COORDINATE times half the subtree's size away. So the rounding
-     * error of the box sides is far below 2^-40 of the distance. */
+    /* On at least one axis, p is at least FAR_COORDINATE away from the subtree's centre, in its
+     * frame. So the rounding error of the box sides is far below 2^-40 of the distance. */
     return greatest * sqrt(sum) * (1 - 0x1p-40);
 }
 
+/* Searches the faces below a child (node or block), with boxes in double precision. */
 static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {

@@ -1,5 +1,5 @@
-/* Finds the nearest face: in one accel (acceleration structure of a subtree; nearest.c), and in a
- * model that is loaded subtree by subtree (nearest_subtrees.c). */
+/* Finds the nearest face: in one accel (acceleration structure of a subtree, accel.h; nearest.c),
+ * and in a model that is loaded subtree by subtree (nearest_subtrees.c). */
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
@@ -17,10 +17,10 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 /* A far point is a point so far from the model that keys replace distances (point_bounds.h). The
  * *winner* is the nearest face so far. */
 typedef struct ebpo_nearest {
-    double p[3];
+    double p[3]; /* the query's point */
     ebpo_far far;
-    double key_limit; /* for a far point: faces with a greater key certainly do not matter */
-    double limit;     /* faces that are farther away certainly do not matter */
+    double key_limit; /* for a far point: faces with a greater key are certainly not the result */
+    double limit;     /* faces that are farther away are certainly not the result */
     double upper;     /* upper bound of the distance to the model's nearest face, or INFINITY */
     bool found;       /* there is a winner; the next six fields are valid */
     ebpo_distance_bounds bounds;     /* bounds of the winner's distance */
@@ -30,35 +30,36 @@ typedef struct ebpo_nearest {
     uint32_t block, node; /* block of the winner, and the node above the block; EBPO_NO_BLOCK: the
                            * winner was known before the search */
     uint32_t first_block, first_node; /* block and node where a search starts, or EBPO_NO_BLOCK */
-    uint64_t deadline;                /* time of ebpo_clock, or 0 */
-    bool late;                        /* true once the deadline has passed */
-    double passed_over; /* lower bound of the distance of all that the deadline left unvisited */
+    uint64_t deadline;                /* a time of ebpo_clock; 0: none */
+    bool late;                        /* the deadline has passed */
+    double passed_over; /* lower bound of the distance of all parts that were not visited because
+                         * of the deadline; INFINITY: none */
 } ebpo_nearest;
 
 /* Begins a search with nothing found. */
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
                         double max_distance);
 
-/* Returns the limit for bounds of nodes. */
+/* Returns the limit for lower bounds of nodes: of keys for a far point, otherwise of distances. */
 static inline double ebpo_nearest_limit(const ebpo_nearest *n)
 {
     return n->far.far ? n->key_limit : n->limit;
 }
-/* Records the bound (a distance, or a key for a far point) of a part that is not visited because of
- * the deadline. */
+/* Records that a part is not visited because of the deadline. `lower`: its lower bound (a distance,
+ * or a key for a far point). */
 static inline void ebpo_nearest_pass_over(ebpo_nearest *n, double lower)
 {
     double distance = n->far.far ? ebpo_far_lower(&n->far, lower) : lower;
     n->passed_over = distance < n->passed_over ? distance : n->passed_over;
 }
 
-/* Returns true once the deadline has passed. */
+/* Returns true if the deadline has passed. */
 static inline bool ebpo_nearest_is_late(ebpo_nearest *n)
 {
     return n->late = n->late || (n->deadline && ebpo_clock() > n->deadline);
 }
 
-/* Takes a known face of the model as the winner, if it is within the limit. */
+/* Makes a known face of the model the winner, if it is within the limit. */
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
                              uint64_t source_face);
 
@@ -81,8 +82,8 @@ void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_
 
 /* --- a context's queue ---
  *
- * The queue holds nodes to visit, ordered by their bound; nodes with equal bounds are ordered by
- * their entry. */
+ * The queue has the nodes that are still to be visited, ordered by their lower bounds; nodes with
+ * equal bounds are ordered by ebpo_node.entry. */
 
 EBPO_MUST_USE ebpo_status ebpo_queue_push(ebpo_context *context, const ebpo_ranked *item,
                                           ebpo_error *error);
@@ -91,16 +92,18 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
 
 /* --- deep bounds ---
  *
- * Deep bounds are nodes of the first levels below the cut level, with their envelopes but without
- * faces: a few bytes for each node. For a subtree that has never been loaded, they give a better
- * bound than the subtree's envelope. (For a subtree that has been loaded, its skeleton gives one:
- * query/model_parts.h.) They are all read at once, when queries have loaded about as many subtrees
- * without need as this reading costs; so neither opening a model nor a path waits for them. They
- * are used for local files only: for remote files, one more request would cost as much as it saves.
- * They count towards the quota of skeletons. */
+ * Deep bounds are nodes of the first levels below the cut level (at which the roots of subtrees
+ * are), with their envelopes but without faces: a few bytes for each node. For a subtree that was
+ * never loaded, they give a better bound than the envelope of the subtree's root. (For a subtree
+ * that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep bounds
+ * are read together, after queries have spent about as much time on loading subtrees without need
+ * as reading deep bounds takes. So they delay neither opening a model nor queries along a path.
+ * They are used for local files only, because for remote files the additional request would cost as
+ * much as it saves. Their memory counts towards the quota of skeletons. */
 
-/* Reads the deep bounds, unless that was done before, the quota is too small, or there are no
- * levels below the cut. Returns no error: if the file cannot be read, later queries fail. */
+/* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
+ * levels below the cut level. Returns no error, because later queries fail if the file cannot be
+ * read. */
 void ebpo_deep_bounds_make(ebpo_model *model);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
@@ -112,8 +115,8 @@ void ebpo_deep_bounds_report(ebpo_model *model, unsigned loaded);
 /* Finds the nearest face of a model. If the model is not completely in memory, visits nodes of the
  * top and subtrees in the order of guaranteed lower bounds of their distance, until the next bound
  * is beyond the found distance. So a subtree is searched, and loaded if needed, only if its bound
- * is at most the result, whatever is in memory. After a deadline, the first bound that was not
- * visited limits the result. */
+ * is at most the result; this does not depend on what is in memory. After a deadline, the least
+ * bound that was not visited is in search->passed_over. */
 EBPO_MUST_USE ebpo_status ebpo_nearest_first(ebpo_context *context, ebpo_nearest *search,
                                              ebpo_error *error);
 

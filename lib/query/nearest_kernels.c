@@ -1,9 +1,9 @@
-/* The kernel that finds the nearest face: it walks from node to node of the hierarchy over faces of
- * one accel (acceleration structure of a subtree), eight children or eight faces at a time, in
- * single precision.
+/* The kernel that finds the nearest face of one accel (acceleration structure of a subtree). It
+ * walks from node to node of the hierarchy over blocks of faces, eight children or eight faces at a
+ * time, in single precision.
  *
- * The walk drops only nodes and faces that are certainly farther than the best upper bound. It
- * collects the other faces as candidates, which nearest.c compares.
+ * The walk only drops nodes and faces that are certainly farther than the best upper bound. All
+ * other faces become candidates, which nearest.c compares.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */
@@ -16,8 +16,8 @@
 
 /* --- boxes and bounding cylinders --- */
 
-/* The children's boxes relative to the point: their nearer sides, and their farther sides negated.
- */
+/* The boxes of a node's children relative to the point: the lower sides, and the upper sides
+ * negated. */
 typedef struct near_boxes {
     f8 low[3], minus_high[3];
 } near_boxes;
@@ -27,7 +27,7 @@ EBPO_EIGHT f8 near_square_sum(const f8 x[3])
     return f8_add(f8_add(f8_mul(x[0], x[0]), f8_mul(x[1], x[1])), f8_mul(x[2], x[2]));
 }
 
-/* Returns squared lower bounds of the distances, from boxes. */
+/* Returns squared lower bounds of the distances of the children, from boxes. */
 EBPO_EIGHT f8 near_by_boxes(const ebpo_bound *b, const ebpo_probe *probe, near_boxes *out)
 {
     f8 d[3];
@@ -41,7 +41,7 @@ EBPO_EIGHT f8 near_by_boxes(const ebpo_bound *b, const ebpo_probe *probe, near_b
     return near_square_sum(d);
 }
 
-/* Returns squared lower bounds of the distances, from bounding cylinders. */
+/* Returns squared lower bounds of the distances of the children, from bounding cylinders. */
 EBPO_EIGHT f8 near_by_cylinders(const ebpo_bound_cylinder *cylinder, const near_boxes *boxes)
 {
     f8 zero = f8_all(0), twice[3], part[3];
@@ -55,8 +55,8 @@ EBPO_EIGHT f8 near_by_cylinders(const ebpo_bound_cylinder *cylinder, const near_
        to = f8_mul(f8_from_shorts(cylinder->to), step),
        radius = f8_mul(f8_from_shorts(cylinder->radius), f8_all(cylinder->aside_step));
     f8 over = f8_max3(f8_add(along, from), f8_sub(f8_sub(zero, along), to), zero);
-    /* square of the distance of the middle, less a margin: the root of a small difference of large
-     * squares must be a lower bound */
+    /* away2: square of the distance of the middle, minus a margin, so that the root of the
+     * difference of away2 and along^2 is a lower bound even if both squares are large */
     f8 away2 = f8_mul(near_square_sum(twice), f8_all(0.25f * (1 - 0x1p-19f))),
        aside2 = f8_max(f8_sub(away2, f8_mul(along, along)), zero),
        aside = f8_max(f8_sub(f8_sqrt(aside2), radius), zero);
@@ -77,7 +77,7 @@ EBPO_EIGHT unsigned near_children(const ebpo_near_search *g, uint32_t node, floa
 
 /* --- faces --- */
 
-/* Eight vectors. */
+/* Eight vectors of three coordinates. */
 typedef struct three {
     f8 x, y, z;
 } three;
@@ -95,7 +95,7 @@ EBPO_EIGHT three three_cross(three a, three b)
 /* Returns the sum of the absolute coordinates, an upper bound of the length. */
 EBPO_EIGHT f8 three_size(three a) { return f8_add(f8_add(f8_abs(a.x), f8_abs(a.y)), f8_abs(a.z)); }
 
-/* Returns the squared distance of the origin to the segment from a along e. */
+/* Returns the squared distance of the origin to the segment from a to a + e. ee: e . e. */
 EBPO_EIGHT f8 edge_distance2(three a, three e, f8 ee)
 {
     f8 t = f8_sub(f8_all(0), f8_mul(three_dot(a, e), f8_inverse(ee)));
@@ -165,12 +165,13 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
     return out;
 }
 
-/* Computes bounds of the distances of eight faces: the computed distance less and plus 2^-16 r,
- * where r is the sum of the absolute coordinates of a corner and two edges; and EBPO_NEAR_UNDERFLOW
- * for the underflow of squares. A face whose height is at least an eighth of its longest edge
- * ("sturdy") uses its plane where the point projects into the face. Other faces use the distance of
- * their edges; no point of a face is farther from its edges than its height, which is subtracted
- * from the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces". */
+/* Computes bounds of the distances of eight faces: the computed distance minus and plus a margin.
+ * The margin is 2^-16 r, where r is the sum of the absolute coordinates of a corner and two edges,
+ * plus EBPO_NEAR_UNDERFLOW for the underflow of squares. For a "sturdy" face, whose height is at
+ * least an eighth of its longest edge, the computed distance is that to its plane if the point
+ * projects into the face, otherwise that to its edges. For other faces it is always that to the
+ * edges; no point of a face is farther from the edges than the face's height, so the height is
+ * subtracted from the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces". */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;
@@ -184,7 +185,8 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
         outside =
             f8_or(outside, f8_less(three_dot(three_cross(f->edge[i], n), f->corner[i]), zero));
     }
-    /* an^2 / nn without an^2, which would underflow for a small triangle close to the point */
+    /* `plane` is an^2 / nn, computed without an^2, which would underflow for a small triangle close
+     * to the point. */
     f8 an = three_dot(f->corner[0], n);
     f8 sturdy = f8_and(f8_at_most(f8_mul(f8_mul(longest2, longest2), f8_all(0x1p-6f)), nn),
                        f8_less(f8_all(0x1p-54f), longest2));
@@ -206,7 +208,7 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 /* --- the walk --- */
 
 /* Visits a block, whose parent is `node`. First lowers the limit to the least upper bound of the
- * eight faces: then most of them are known to be farther. Adds the remaining faces to the
+ * eight faces, so that most of them are known to be farther. Adds the remaining faces to the
  * candidates. */
 EBPO_EIGHT void near_block_in(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
@@ -243,8 +245,8 @@ static __attribute__((noinline)) void near_doubles(ebpo_near_search *g, uint32_t
     near_block_in(g, block, node, true);
 }
 
-/* Calls functions that are not inlined: the code of a block is long, and engines of WebAssembly
- * compile it at the first query. */
+/* Visits a block. The two functions that do the work are not inlined, because their code is long,
+ * and engines of WebAssembly compile it at the first query. */
 EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node)
 {
     if (g->s->wide)
@@ -260,19 +262,19 @@ EBPO_EIGHT void near_fetch(const ebpo_accel *s, uint32_t child)
         ebpo_visit_fetch_cylinder(s, child);
 }
 
-/* Prefetches the data of the next visit during the current one: far from the surface, a visit takes
- * two cache misses. */
+/* Prefetches the data of the next visit during the current visit, because far from the surface a
+ * visit takes two cache misses. */
 EBPO_EIGHT void near_fetch_next(const ebpo_near_search *g, uint32_t top)
 {
     if (top)
         near_fetch(g->s, (uint32_t)g->stack[top - 1]);
 }
 
-/* A search is small compared with a node if its squared limit is at most this multiple of the
- * node's cylinder_limit2. */
+/* A search is called small compared with a node if its squared limit is at most this multiple of
+ * the node's cylinder_limit2. */
 #define NEAR_SMALL 25.0f
 
-/* Pushes a node's children, farthest first; returns the new top. */
+/* Pushes the children `lanes` of a node, farthest first; returns the new top of the stack. */
 EBPO_EIGHT uint32_t near_push(ebpo_near_search *g, uint32_t top, uint32_t node, unsigned lanes,
                               const float lower2[8])
 {
@@ -282,8 +284,9 @@ EBPO_EIGHT uint32_t near_push(ebpo_near_search *g, uint32_t top, uint32_t node, 
     return above;
 }
 
-/* Descends from *child to a block, always to the nearest child, and sets *child to the block and
- * *node to the block's parent. Returns false if no child matters. */
+/* Descends from *child to a block, always to the nearest child, and pushes the other children. Sets
+ * *child to the block and *node to the block's parent. Returns false if all children of a node on
+ * the way are beyond the limit. */
 EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child, uint32_t *node)
 {
     while (!(*child & EBPO_IS_BLOCK)) {
@@ -305,9 +308,9 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
     return true;
 }
 
-/* Visits the first block, and returns the node where the walk continues: the deepest ancestor
- * compared with which the search is small. Above this node, the search hardly ever needs another
- * child. */
+/* Visits the first block (g->first_block), if there is one. Returns the node where the walk begins:
+ * the deepest ancestor of the first block compared with which the search is small (NEAR_SMALL);
+ * above this node, the search hardly ever needs another child. Without a first block, the root. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
 {
     const ebpo_bound *bound = g->s->bound;
@@ -315,21 +318,22 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
     if (g->first_block == EBPO_NO_BLOCK)
         return g->s->root_bound;
     near_block(g, g->first_block, node);
-    if (g->late) /* at the deadline, all unvisited nodes must be below nodes on the stack */
+    if (g->late) /* with a deadline, all unvisited nodes must be below nodes on the stack */
         return g->s->root_bound;
     while (node != g->s->root_bound && g->limit2 > bound[node].cylinder_limit2 * NEAR_SMALL)
         node = bound[node].parent;
     return node;
 }
 
-/* Pushes all children of a node that matter, except `child`. Returns the new top. */
+/* Pushes all children of a node within the limit, except `child`, onto the empty stack. Returns the
+ * new top. */
 EBPO_EIGHT uint32_t near_other_children(ebpo_near_search *g, uint32_t node, uint32_t child)
 {
     float lower2[8];
     unsigned lanes = near_children(g, node, lower2);
-    for (unsigned rest = lanes; rest; rest &= rest - 1)
-        if (g->s->bound[node].child[__builtin_ctz(rest)] == child)
-            lanes &= ~(rest & -rest);
+    for (unsigned more = lanes; more; more &= more - 1)
+        if (g->s->bound[node].child[__builtin_ctz(more)] == child)
+            lanes &= ~(more & -more);
     return lanes ? near_push(g, 0, node, lanes, lower2) : 0;
 }
 
@@ -353,8 +357,8 @@ EBPO_EIGHT bool near_walk_down(ebpo_near_search *g, uint32_t top)
     return true;
 }
 
-/* Walks down from the node that near_begin returns, then, node by node up to the root, down through
- * the other children. */
+/* Walks down from the node that near_begin returns. Then goes up to the root, one node at a time,
+ * and walks down through the other children of each node. */
 static void near_walk(ebpo_near_search *g)
 {
     uint32_t node = near_begin(g), top = 1;

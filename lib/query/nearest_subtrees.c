@@ -1,13 +1,13 @@
-/* Finds the nearest face of a model. Under a budget, loads and searches subtrees in the order of
- * their bounds.
+/* Finds the nearest face of a model. If the model is not completely in memory, loads and searches
+ * subtrees in the order of their bounds.
  *
  * Nodes of the top (levels 0 to the cut level) and subtrees wait in a queue, ordered by guaranteed
  * lower bounds of their distance. The search ends when the next bound is beyond the best face. So a
- * subtree is loaded only if its bound is at most the result, whatever is in memory. If a subtree
- * has ever been loaded, its bound comes from its skeleton (upper nodes of its hierarchy over faces,
- * skeleton.c). If not, its bound comes from the envelopes of the first levels below the cut level
- * (*deep bounds*, nearest.h). Deep bounds are read when queries have loaded enough subtrees without
- * need. */
+ * subtree is loaded only if its bound is at most the result; this does not depend on what is in
+ * memory. If a subtree was loaded before, its bound comes from its skeleton (upper nodes of its
+ * hierarchy over faces, skeleton.c). If it never was, its bound comes from the envelopes of the
+ * first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are read after queries
+ * have loaded many subtrees that they would not have needed with better bounds. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,7 +21,7 @@
 #include "query/load_ahead.h"
 #include "query/nearest.h"
 
-/* Returns true if `a` comes before `b` in the queue. */
+/* Returns true if `a` leaves the queue before `b`. */
 static bool comes_out_before(const ebpo_ranked *a, const ebpo_ranked *b)
 {
     return a->lower != b->lower ? a->lower < b->lower : a->node.entry < b->node.entry;
@@ -57,14 +57,16 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
 /* Number of levels of deep bounds. Each level takes four times the memory of the level above it; a
  * third level would save only a tenth of the remaining loads (docs/develop/design.md). */
 enum { DEEP_LEVELS = 2 };
-/* A new subtree has no skeleton. On a path, a query loads at most a few new subtrees: if it loads
- * more than NEW_NEEDED, the others count as loaded without need. Deep bounds are read after
- * LOADS_TO_READ such loads, which take about as long as reading two levels. */
+/* A *new* subtree has no skeleton, because it was never loaded. A query near the last one loads at
+ * most a few new subtrees. If a query loads more than NEW_NEEDED new subtrees, the excess counts as
+ * loaded without need. Deep bounds are read after LOADS_TO_READ loads without need, which take
+ * about as long as reading two levels. */
 enum { NEW_NEEDED = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
-/* Reads the levels down to `level`. Returns false if the quota of skeletons is too small. */
+/* Reads the deep bounds of the levels down to `level`. Returns false if the quota of skeletons is
+ * too small. */
 static bool read_levels(ebpo_model *m, int level)
 {
     uint64_t estimate = ebpo_top_envelopes_estimate(m->info, level);
@@ -98,7 +100,7 @@ void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
         ebpo_deep_bounds_make(m);
 }
 
-/* A search for the least bound among the deepest nodes of the deep bounds. */
+/* A search for the least lower bound among the deepest nodes of the deep bounds. */
 typedef struct deep_search {
     const ebpo_top *top;
     const ebpo_ranking *ranking;
@@ -106,11 +108,12 @@ typedef struct deep_search {
 } deep_search;
 
 typedef struct deep_child {
-    uint32_t entry;
+    uint32_t entry; /* in the table of the deep bounds */
     ebpo_cell cell;
-    double lower;
+    double lower; /* lower bound of the distance */
 } deep_child;
 
+/* Returns the planes of the node with an entry of the table. */
 static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
 {
     uint32_t value = ebpo_entry_value(entry);
@@ -118,7 +121,8 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
                                                                 : t->gray[value];
 }
 
-/* Lists the children with bounds below g->best, the nearest first. */
+/* Lists the children of a gray node that have bounds below g->best, the nearest first. `parent`:
+ * bound of the gray node. Returns their number. */
 static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
                               deep_child out[8])
 {
@@ -141,6 +145,7 @@ static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cel
     return count;
 }
 
+/* Lowers g->best to the least bound of a deepest node below a gray node. */
 static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double parent)
 {
     deep_child child[8];
@@ -152,8 +157,9 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
             g->best = child[i].lower;
 }
 
-/* Returns a guaranteed lower bound, at least `lower`, of the distance to the faces in the cell of a
- * node of the cut level, from deep bounds. The search for it stops beyond `limit`. Any thread. */
+/* Returns a guaranteed lower bound of the distance to the faces in the cell of a node of the cut
+ * level, from deep bounds. `lower`: a known lower bound; the result is at least this. A bound
+ * beyond `limit` need not be the best one. Any thread. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit)
 {
@@ -174,17 +180,17 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
 
 /* --- the search --- */
 
-/* Values of ebpo_ranked.what. NODE: a node of the top, or a subtree that was not inspected yet.
- * OWNED: the faces that the subtree owns; without a skeleton, all its faces. SHARED: faces that
- * other subtrees own. */
+/* Values of ebpo_ranked.what: what an entry of the queue stands for. NODE: a node of the top, or a
+ * subtree that has not left the queue yet. OWNED: the faces that the subtree owns; if it has no
+ * skeleton, all its faces. SHARED: the subtree's shared faces, which other subtrees own. */
 enum { NODE = 0, OWNED, SHARED };
 
 typedef struct searching {
     ebpo_context *c;
     ebpo_nearest *n;
     ebpo_ranking ranking;
-    unsigned new_loads; /* number of loaded subtrees that had no skeleton */
-    double hinted;      /* prefetch hints have been sent for all new subtrees up to this bound */
+    unsigned new_loads; /* number of new subtrees that this search loaded */
+    double hinted;      /* prefetch hints were sent for all new subtrees up to this bound */
 } searching;
 
 /* Adds a node to the queue if its bound is within the limit. */
@@ -195,7 +201,7 @@ static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *erro
         r->node.pruned) /* pruned nodes: see inspect_pruned (distance.c) */
         return EBPO_OK;
     if (ebpo_node_is_subtree_root(&r->node)) {
-        /* the node lists a face, so its farthest point is an upper bound */
+        /* The node lists a face, so the distance of its cell's farthest point is an upper bound. */
         double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
         n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
         n->limit = fmin(n->limit, n->upper);
@@ -204,6 +210,7 @@ static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *erro
     return r->lower <= ebpo_nearest_limit(n) ? ebpo_queue_push(g->c, r, error) : EBPO_OK;
 }
 
+/* Adds the children of a node of the top to the queue. */
 static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked child[8];
@@ -215,8 +222,8 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
     return status;
 }
 
-/* --- marks: a query of number q marks a subtree with 2 q if its owned faces are in the queue, and
- * with 2 q + 1 if the subtree has been searched --- */
+/* --- marks (ebpo_context.marks): the query with number q marks a subtree with 2 q when its owned
+ * faces are added to the queue, and with 2 q + 1 when the subtree is searched --- */
 
 static bool is_searched(const ebpo_context *c, uint32_t below)
 {
@@ -244,10 +251,11 @@ static bool is_in_memory(const ebpo_context *c, uint32_t below)
 
 /* Before a subtree of a remote file is entered, sends prefetch hints for it and for other new
  * subtrees that the search probably needs, so that one round trip fetches all of them. The result
- * is between the subtree's bound and the limit; subtrees with bounds in the first 3/16 of this
- * interval are requested. For 60 points anywhere in the box of a model of 4.3 million faces, a
- * query takes 11.5 round trips and 999 kB without these hints, 6.9 and 1,040 kB with 3/16, 6.0 and
- * 1,103 kB with 1/2. Far points, whose bounds are keys, get no hints. */
+ * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
+ * first 3/16 of this interval are requested. For 60 points anywhere in the box of a model of 4.3
+ * million faces, a query takes 11.5 round trips and 999 kB without these hints, 6.9 and 1,040 kB
+ * with 3/16, 6.0 and 1,103 kB with 1/2. For far points, whose bounds are keys (point_bounds.h), no
+ * hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
@@ -285,7 +293,8 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
     g->new_loads += g->c->loaded > loaded && is_new;
-    /* true if the load was without need, or this is one of many subtrees at about this distance */
+    /* A better bound of this subtree would help later queries, if the subtree had no face that is
+     * nearer than the limit, or if many subtrees are at about this distance. */
     bool needs_bounds =
         g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
     if (g->c->loaded > loaded && needs_bounds)
@@ -295,25 +304,26 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
 
 /* --- bounds from skeletons ---
  *
- * A face is listed by every subtree whose cell it intersects, and owned by one of them. A face that
- * extends through a cell face would be searched in both subtrees; so it is searched in its owner
- * only. In the queue, a subtree S first has a bound for its cell, which covers the parts of its
- * faces within the cell. When the queue returns S, the owned faces of S get a second entry in the
- * queue. For the shared faces of S that may matter, the subtrees that may own these faces get
- * entries, with bounds that hold for all faces of the owner, also outside its cell. If one of these
- * owners has no skeleton, S itself is searched.
+ * A face is listed by every subtree whose cell it intersects, and owned by one of them. To search a
+ * face that extends through a cell face only once, it is searched in its owner only. In the queue,
+ * a subtree S first has the bound of its cell, which is a bound for the parts of its faces within
+ * the cell. When the queue returns S, the owned faces of S get a second entry in the queue. For the
+ * shared faces of S that may be within the limit, the subtrees that may own these faces get
+ * entries, whose bounds are valid for all faces of the owner, also outside its cell. If one of
+ * these owners has no skeleton, S itself is searched.
  *
  * So the nearest face is found: its nearest point is in the cell of some S, and S or the face's
  * owner is searched. All bounds that lead to this search are at most the face's distance. The queue
  * may return S and the owner in any order. */
 
+/* Returns the bounds (distances, or keys for a far point) of a skeleton. */
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
 {
     return g->ranking.far ? ebpo_skeleton_far_bounds(k, g->ranking.far, g->n->key_limit)
                           : ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
 }
 
-/* Returns the root node of a subtree. */
+/* Returns the root node of the subtree top->below[below]. */
 static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 {
     ebpo_node node = m->top->below[below];
@@ -321,9 +331,9 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
     return node;
 }
 
-/* Adds the owned faces of a subtree to the queue, unless this query has done that. `lower`: bound
- * of the queue's current entry. As bounds of the queue's entries only increase, a second entry
- * would not have a lower bound. */
+/* Adds the owned faces of a subtree to the queue, unless this query has already done that. `lower`:
+ * bound of the queue's current entry. (The bounds of entries that leave the queue only increase, so
+ * a second entry of the same faces would not have a lower bound.) */
 static ebpo_status add_owned(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
@@ -336,8 +346,8 @@ static ebpo_status add_owned(searching *g, uint32_t below, double lower, ebpo_er
     return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
-/* A walk to the subtrees that may own shared faces of a subtree S: the cells of these owners
- * intersect the box of the faces, and precede S, depth first. */
+/* A walk to the subtrees that may own shared faces of a subtree S: subtrees whose cells intersect a
+ * box around these faces, and which precede S, depth first. */
 typedef struct owners {
     searching *g;
     uint64_t code;                 /* octcode of S */
@@ -349,8 +359,8 @@ typedef struct owners {
     ebpo_status status;
 } owners;
 
-/* Returns true if the box intersects the cell enlarged by 1/128 of its size, because its node may
- * also list faces that are near the cell (within 1/256: format-spec, section 7). */
+/* Returns true if the box o->shared intersects the cell, enlarged by 1/128 of its size. (A node may
+ * also list faces that are near its cell, within 1/256 of its size: format-spec, section 7.) */
 static bool cell_intersects(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];
@@ -371,13 +381,14 @@ static bool comes_before(const owners *o, ebpo_cell cell)
     return deeper > 0 ? code >> 3 * deeper < o->code : code <= o->code >> 3 * -deeper;
 }
 
-/* Returns true if the owner has a skeleton. */
+/* Returns true if the owner has a skeleton (owners.visit). */
 static bool is_known(owners *o, uint32_t below, ebpo_error *error)
 {
     (void)error;
     return ebpo_skeletons_find(o->g->c->model->skeletons, below) != NULL;
 }
 
+/* Adds the owned faces of an owner to the queue (owners.visit). */
 static bool add_owner(owners *o, uint32_t below, ebpo_error *error)
 {
     o->status = add_owned(o->g, below, o->lower, error);
@@ -411,8 +422,8 @@ static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, e
     return true;
 }
 
-/* Adds the owned faces of all owners to the queue. Returns false, and adds nothing, if some owner
- * has no skeleton. */
+/* Adds the owned faces of all owners of the subtree's shared faces to the queue. Returns false, and
+ * adds nothing, if some owner has no skeleton. */
 static bool add_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
                        ebpo_status *status, ebpo_error *error)
 {
@@ -437,8 +448,8 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
     return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
-/* Handles a subtree without skeleton. If deep bounds increase its bound, it goes back to the queue;
- * if not, it is searched. */
+/* Handles a subtree without skeleton that leaves the queue for the first time. If deep bounds
+ * increase its bound, it goes back to the queue; otherwise it is searched. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
@@ -460,7 +471,8 @@ static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     double least = fmax(r->lower, fmin(bounds.owned, bounds.shared));
     if (least > ebpo_nearest_limit(g->n))
         return EBPO_OK;
-    bool in_memory = is_in_memory(g->c, below); /* if so, all its faces are searched together */
+    /* If the subtree is in memory, all its faces are searched together. */
+    bool in_memory = is_in_memory(g->c, below);
     double lower = in_memory ? r->lower : deep_bound(g, r);
     ebpo_ranked owned = { r->node, in_memory ? least : fmax(lower, bounds.owned), OWNED },
                 shared = { r->node, in_memory ? INFINITY : fmax(lower, bounds.shared), SHARED };
@@ -483,6 +495,7 @@ static ebpo_status inspect_shared(searching *g, const ebpo_ranked *r, ebpo_error
     return search_below(g, r, error);
 }
 
+/* Searches a model that is loaded subtree by subtree. */
 static ebpo_status search_parts(searching *g, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;

@@ -1,8 +1,9 @@
-/* Computes guaranteed bounds of the distance of a point to a cell, to the half-spaces of an
- * envelope, and to the hierarchy over faces.
+/* Computes guaranteed bounds of the distance of a point to a cell, to an envelope, and to nodes of
+ * the hierarchy over faces.
  *
- * If the distance is at least 16 sizes of the model's box, doubles hardly distinguish distances.
- * Then the bounds are bounds of keys, which are in the same order as distances (point_bounds.h).
+ * If the point is at least 16 sizes of the model's box away (a far point), doubles hardly
+ * distinguish distances. Then the bounds are bounds of keys, which have the same order as distances
+ * (point_bounds.h). Variables are named as there: y, h (half), u (toward).
  * Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
@@ -12,8 +13,8 @@
 #include "geometry/polytope.h"
 #include "query/point_bounds.h"
 
-/* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
- * each axis (format-spec, section 7). This value adds a margin for rounding. */
+/* A node may list a face that is outside its cell, but within 1/256 of the cell's size on each axis
+ * (format-spec, section 7). This value includes a margin for rounding. */
 static const double list_margin = 0x1.1p-8;
 
 static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double size[3])
@@ -41,8 +42,8 @@ double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell)
     return safe_length(size) * (1 + list_margin);
 }
 
-/* Returns the value of a half-space at the point xi of the cell, 4096 n . xi - d (positive:
- * outside), and a bound of its error. An invalid code has an infinite error. */
+/* Returns the value 4096 n . xi - d of a half-space at the point xi, in cell coordinates (positive:
+ * outside), and a bound of its error. For an invalid code, the error is INFINITY. */
 static double plane_value(const double xi[3], uint32_t code, int32_t n[3], double *error)
 {
     int32_t d;
@@ -106,7 +107,7 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
     return safe_length(d) * (1 + 0x1p-40) + safe_length(size) * list_margin;
 }
 
-/* Distance from which points are far, in sizes of the model's box. */
+/* Points at this distance or more, in sizes of the model's box, are far. */
 static const double far_away = 16;
 /* Error of keys, relative to the largest coordinate (docs/develop/bounds.md). */
 static const double key_error = 0x1p-46;
@@ -142,18 +143,19 @@ void ebpo_far_make(ebpo_far *f, const ebpo_box *box, const double p[3])
         f->toward[k] = to[k] / length;
 }
 
-/* --- keys and distances: d^2 = D^2 + 2 D key --- */
+/* --- keys and distances: d^2 = D^2 + 2 D key, where d is the distance and D = |p - c| --- */
 
 double ebpo_far_limit(const ebpo_far *f, double distance)
 {
     if (!(distance < INFINITY) || !isfinite(f->distance_in_units) || !(f->distance < INFINITY) ||
         f->distance < 0x1p-1000)
         return INFINITY;
-    double ratio = distance / f->distance; /* (d / D)^2 = 1 + 2 key / reach */
+    /* (d / D)^2 = 1 + 2 key / distance_in_units; the second term of the sum covers rounding */
+    double ratio = distance / f->distance;
     return ((ratio - 1) * (ratio + 1) / 2 + (ratio * ratio + 1) * 0x1p-47) * f->distance_in_units;
 }
 
-/* Returns the distance for a key, with a relative error of `share` added. */
+/* Returns the distance for a key, enlarged by a relative `share` (negative: reduced). */
 static double distance_of(const ebpo_far *f, double key, double share)
 {
     if (key == INFINITY)
@@ -163,12 +165,13 @@ static double distance_of(const ebpo_far *f, double key, double share)
     return square > 0 ? f->distance * sqrt(square) * (1 + share) : 0;
 }
 
-/* Added to bounds, because the relative rounding error of denormal numbers is larger. */
+/* Bounds are enlarged by this, because the relative rounding error of denormal numbers is larger.
+ */
 static const double denormal_error = 0x1p-1070;
 
 double ebpo_far_lower(const ebpo_far *f, double key)
 {
-    /* the distance may be finite, although its computation in doubles overflows */
+    /* The true distance may be finite although its computation in doubles overflows. */
     double distance = distance_of(f, key, -0x1p-40) - denormal_error;
     return key == INFINITY ? INFINITY : fmin(fmax(distance, 0), 0x1p1023);
 }
@@ -179,13 +182,13 @@ double ebpo_far_upper(const ebpo_far *f, double key)
 
 /* --- positions --- */
 
-/* Returns a coordinate of y (point_bounds.h). */
+/* Converts a coordinate of the model to a coordinate of y. */
 static double y_on_axis(const ebpo_far *f, double x, int axis)
 {
     return (x - f->centre[axis]) * f->unit[0] * f->unit[1];
 }
 
-/* Returns the position of the minimum of h y^2 - u y. */
+/* Returns the y at which h y^2 - u y has its minimum. */
 static double apex_of_square(double half, double toward)
 {
     return half > 0 ? toward / (2 * half) : toward > 0 ? INFINITY : -INFINITY;
@@ -215,9 +218,10 @@ static double margin_of(const ebpo_far *f, double greatest)
 
 /* --- cells and envelopes --- */
 
-/* A cell in coordinates y; its greatest absolute coordinate. */
+/* A cell in coordinates y. */
 typedef struct placed_cell {
-    double low[3], size[3], greatest;
+    double low[3], size[3];
+    double greatest; /* its greatest absolute coordinate */
 } placed_cell;
 
 static placed_cell place_cell(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
@@ -243,9 +247,9 @@ double ebpo_far_cell_end(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
     return sum + margin_of(f, 2 * c.greatest);
 }
 
-/* Returns a lower bound of the key in the part of the cell where gradient . y <= beyond. There,
- * adding share * (gradient . y - beyond) to the key does not increase it if share >= 0. So the
- * minimum of this sum over the whole cell is a lower bound, for every such share. */
+/* Returns a lower bound of the key in the part of the cell where gradient . y <= beyond. In this
+ * part, share * (gradient . y - beyond) is at most 0 for every share >= 0. So the minimum over the
+ * whole cell of the key plus this term is a lower bound. */
 static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gradient[3],
                         double beyond, double share)
 {
@@ -277,7 +281,8 @@ double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
             gradient[k] = c.size[k] > 0 ? n[k] / c.size[k] : 0;
             beyond += gradient[k] * c.low[k];
         }
-        /* the bound is a concave function of the share, whose slope changes only at these values */
+        /* The bound is a concave function of the share, and its slope changes only at these values.
+         */
         for (int k = 0; k < 3; k++) {
             double share = f->toward[k] / gradient[k];
             if (c.size[k] > 0 && share > 0 && isfinite(share))
@@ -316,9 +321,10 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
     }
 }
 
-/* |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) for the middle m of the box.
- * By Cauchy and Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m),
- * with a the axis and N(v) = sqrt(v . v - (v . a)^2), as in docs/develop/bounds.md. */
+/* Let m be the middle of the child's box, a the axis of the cylinder, and
+ * N(v) = sqrt(v . v - (v . a)^2). Then |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) and, by Cauchy
+ * and Schwarz, (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m). See
+ * docs/develop/bounds.md. */
 double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
                          const ebpo_bound_cylinder *cylinder, int lane)
 {
@@ -338,8 +344,8 @@ double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_
 
 /* --- faces --- */
 
-/* |y|^2 >= 2 z . y - |z|^2 for every z. If z is the corner with the least key, the right side is
- * linear in y, so its minimum is at a corner. */
+/* |y|^2 >= 2 z . y - |z|^2 for every z. The right side is linear in y, so a key with it in place of
+ * |y|^2 has its minimum over the face at a corner. Here z is the corner with the least key. */
 ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
 {
     double y[3][3], key[3], greatest = 0;

@@ -1,13 +1,13 @@
-/* Computes guaranteed bounds of distances from a point to cells and envelopes and, for a point far
- * from the model, to the boxes and faces of subtrees. */
+/* Computes guaranteed bounds of the distances from a point to cells and envelopes. For a far point
+ * (see below), also to the boxes, bounding cylinders and faces of subtrees. */
 #ifndef EBPO_QUERY_POINT_BOUNDS_H
 #define EBPO_QUERY_POINT_BOUNDS_H
 
 #include "geometry/cells.h"
 #include "query/accel.h"
 
-/* Returns the length of the cell's diagonal, rounded up so that it bounds the distance of any point
- * of the cell to a face that the node lists. */
+/* Returns the length of the cell's diagonal, rounded up so far that it is an upper bound of the
+ * distance of any point of the cell to a face that the cell's node lists. */
 double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell);
 
 /* Returns true if p is certainly outside one of the half-spaces (`count` plane codes) of a cell's
@@ -15,23 +15,24 @@ double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell);
 bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
                          const double p[3]);
 
-/* Returns a guaranteed lower bound of the distance of p to the cell cut by the half-spaces. The
- * computation may stop at any bound beyond `enough`. */
+/* Returns a guaranteed lower bound of the distance of p to the part of the cell in all half-spaces
+ * (`count` plane codes). A bound beyond `enough` need not be the best one. */
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
                               uint32_t count, const double p[3], double enough);
-/* Returns an upper bound of the distance of p to the farthest point of the cell, and so to the
- * nearest point of any face that the cell's node lists. (Such a face has a point at most 1/256 of
- * the cell's size outside the cell: format-spec, section 7.) */
+/* Returns an upper bound of the distance of p to the farthest point of the cell, and to any face
+ * that the cell's node lists. (Such a face has a point that is at most 1/256 of the cell's size
+ * outside the cell: format-spec, section 7.) */
 double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3]);
 
 /* --- far points ---
  *
  * If a point p is very far from a model, its distances to different parts of the model are nearly
- * or exactly equal as doubles. Keys replace these distances: numbers in the same order. With c the
- * middle of the model's box, the key of a point x is key(x) = (|p - x|^2 - |p - c|^2) / (2 |p -
- * c|). Its absolute value is at most about the model's size. With y the position of x relative to
- * c, in a unit of about the model's size, u the direction from c to p, and h = 1 / (2 |p - c|) in
- * that unit, key(x) = h |y|^2 - u . y. Bounds of keys are certain; their error is about 2^-46 of
+ * or exactly equal as doubles. Keys replace these distances: numbers in the same order. Let c be
+ * the middle of the model's box. The key of a point x is
+ *     key(x) = (|p - x|^2 - |p - c|^2) / (2 |p - c|).
+ * Its absolute value is at most about the model's size. Let y be the position of x relative to c,
+ * in a unit of about the model's size, u the direction from c to p, and h = 1 / (2 |p - c|) in that
+ * unit. Then key(x) = h |y|^2 - u . y. Bounds of keys are guaranteed; their error is about 2^-46 of
  * the model's size (docs/develop/bounds.md, "Points far away"). */
 
 typedef struct ebpo_far {
@@ -39,13 +40,13 @@ typedef struct ebpo_far {
     double centre[3];         /* c */
     double unit[2];           /* powers of two: y = (x - centre) * unit[0] * unit[1] */
     double toward[3];         /* u */
-    double half;              /* h, at most 1/32; 0 where it would be too small for a double */
+    double half;              /* h, at most 1/32; 0 if it is too small for a double */
     double distance_in_units; /* |p - c| in the unit of y, at least 16, or INFINITY */
     double distance;          /* |p - c| with a relative error of 2^-50, or INFINITY */
 } ebpo_far;
 
-/* Sets all members. A point is far if its distance is at least about 16 times the longest side of
- * the model's box. */
+/* Sets all members. A point is far if its distance from c is at least about 16 times the longest
+ * side of the model's box. */
 void ebpo_far_make(ebpo_far *far, const ebpo_box *box, const double p[3]);
 
 /* Converts a limit of distances, 0 or more or INFINITY, to a limit of keys, rounded up. */
@@ -54,18 +55,19 @@ double ebpo_far_limit(const ebpo_far *far, double distance);
 double ebpo_far_lower(const ebpo_far *far, double key);
 double ebpo_far_upper(const ebpo_far *far, double key);
 
-/* Return the same bounds as ebpo_envelope_distance and ebpo_cell_far, as keys instead of distances.
- */
+/* Return the same bounds as ebpo_envelope_distance and ebpo_cell_far, but as keys. */
 double ebpo_far_envelope(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell,
                          const uint32_t *codes, uint32_t count, double enough);
 double ebpo_far_cell_end(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell);
 
-/* Converts the frame of an accel (acceleration structure of a subtree) to y = offset + ratio *
- * local. `margin`: bound of the error of keys. */
+/* Converts coordinates in the frame of an accel (acceleration structure of a subtree) to y:
+ * y = offset + ratio * (coordinate in the frame). */
 typedef struct ebpo_far_frame {
-    double offset[3], ratio, margin;
+    double offset[3], ratio;
+    double margin; /* bound of the error of keys in this accel */
 } ebpo_far_frame;
-/* `centre`, `scale`: the accel's frame; `largest`: bound of the absolute coordinates in it. */
+/* Makes this conversion. `centre`, `scale`: of the accel's frame; `largest`: bound of the absolute
+ * coordinates in the frame. */
 ebpo_far_frame ebpo_far_frame_of(const ebpo_far *far, const double centre[3], double scale,
                                  double largest);
 /* Compute lower bounds of the keys of a node's children: of all children from their boxes, and of

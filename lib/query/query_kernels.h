@@ -1,6 +1,7 @@
 /* Declares the kernels of queries and their data. A kernel is an inner loop over blocks of faces
- * and over the bounds of eight children, compiled for several instruction sets with the same
- * results (core/cpu.h). Kernels are filters: what they call certain holds in exact arithmetic. */
+ * and over the bounds of eight children (accel.h), compiled for several instruction sets with the
+ * same results (core/cpu.h). Kernels are filters in low precision: a result that they call certain
+ * is also the result of exact arithmetic. */
 #ifndef EBPO_QUERY_QUERY_KERNELS_H
 #define EBPO_QUERY_QUERY_KERNELS_H
 
@@ -13,12 +14,14 @@
 
 /* --- stack of children still to visit, the nearest on top --- */
 
-/* A visit: in the upper 32 bits a nonnegative float as the key (bound of the child; such floats
- * have the order of their bits), in the lower 32 bits the child, as in ebpo_bound. */
+/* A visit of a child. The upper 32 bits are the key, a nonnegative float (the child's bound); the
+ * bits of such floats, read as integers, have the order of the floats. The lower 32 bits are the
+ * child, as in ebpo_bound. */
 typedef uint64_t ebpo_visit;
 
-/* Maximum number of visits on a stack: eight for each level of the hierarchy. An octree level adds
- * at most one level to the hierarchy, and a long list of one leaf adds at most eleven. */
+/* Maximum number of visits on a stack: eight for each level of the hierarchy, which has at most 64
+ * levels. (An octree level adds at most one level to the hierarchy, and a long list of one leaf
+ * adds at most eleven.) */
 enum { EBPO_VISITS_MAX = 64 * 8 };
 
 static inline ebpo_visit ebpo_visit_make(float key, uint32_t child)
@@ -36,7 +39,7 @@ static inline float ebpo_visit_key(ebpo_visit v)
     return key;
 }
 
-/* Prefetches the first cache lines of the child. */
+/* Prefetches the first cache lines of a child's node or block into the processor's cache. */
 static inline void ebpo_visit_fetch(const ebpo_accel *s, uint32_t child)
 {
     const char *at = (const char *)&s->bound[child & ~EBPO_IS_BLOCK];
@@ -56,7 +59,8 @@ static inline void ebpo_visit_fetch_cylinder(const ebpo_accel *s, uint32_t node)
     __builtin_prefetch(at + 64);
 }
 
-/* Pushes the children of `lanes`, farthest first; returns the new top. */
+/* Pushes the children `lanes` (a bit for each), farthest first; returns the new top of the stack.
+ */
 static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const ebpo_bound *bound,
                                        unsigned lanes, const float key[8])
 {
@@ -80,15 +84,15 @@ typedef struct ebpo_probe {
     float high[3], low[3]; /* p = high + low with an error of 2^-48 of |p| (for blocks of floats) */
     float local[3];        /* position in the subtree's frame */
     float scale;           /* scale of the frame */
-    double scale64;
+    double scale64;        /* `scale` as a double */
     /* bound, in the frame, of the error of distances caused by the rounding of `local` */
     float error;
 } ebpo_probe;
 
-/* A face that may be nearest, and a lower bound of its distance in the frame. Candidates wait until
- * the end of the search, when nearly all of them are known to be farther. */
+/* A face that may be nearest. Candidates wait until the end of the search, when nearly all of them
+ * are known to be farther than another face. */
 typedef struct ebpo_near_candidate {
-    float low;
+    float low;           /* lower bound of the distance, in the frame */
     uint32_t slot, node; /* the face's slot; the parent of its block */
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
@@ -98,14 +102,14 @@ typedef struct ebpo_near_search ebpo_near_search;
 struct ebpo_near_search {
     const ebpo_accel *s;
     ebpo_probe probe;
-    void *user;
-    void (*judge)(ebpo_near_search *search); /* compares all waiting candidates */
+    void *user;                              /* of the functions below */
+    void (*judge)(ebpo_near_search *search); /* compares all waiting candidates exactly */
     bool (*late)(ebpo_near_search *search); /* returns true after the deadline; NULL: no deadline */
     /* block that is visited before all others, and the node above it; EBPO_NO_BLOCK: none */
     uint32_t first_block, first_node;
-    float best;   /* greatest distance that matters, in the frame */
-    float limit2; /* limit for squared lower bounds */
-    int count;
+    float best;   /* faces at a greater distance, in the frame, are not the result */
+    float limit2; /* nodes with a greater squared lower bound are skipped */
+    int count;    /* of waiting candidates */
     ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
     uint32_t top; /* number of visits that remained at the deadline */
     ebpo_visit stack[EBPO_VISITS_MAX];
@@ -116,6 +120,7 @@ struct ebpo_near_search {
  * sqrt(2^-149). */
 #define EBPO_NEAR_UNDERFLOW 0x1p-56f
 
+/* Lowers `best` and the limit for squared bounds, which includes rounding errors. */
 static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
 {
     float limit = best * (1 + 0x1p-18f) + g->probe.error + EBPO_NEAR_UNDERFLOW;
@@ -140,7 +145,7 @@ typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL }
 typedef struct ebpo_ray_search ebpo_ray_search;
 
 /* A face that the ray may hit, at a t of at least `low` (in the frame). `facing`: if the line
- * certainly goes through the face's interior, as in ebpo_ray_intersection; else 0. */
+ * certainly goes through the face's interior, as in ebpo_ray_intersection; otherwise 0. */
 typedef struct ebpo_ray_candidate {
     float low;
     uint32_t slot;
@@ -153,9 +158,9 @@ struct ebpo_ray_search {
     const ebpo_segment *ray;
     ebpo_ray_wants wants;
     int facing;   /* 1, -1: only front faces, back faces; 0: all */
-    double limit; /* hits with a greater t certainly do not matter; decreases */
-    /* Tests a face exactly (`facing`: as in a candidate), keeps it if it counts, and updates
-     * search->limit and search->done. */
+    double limit; /* hits with a greater t are not needed; decreases during the search */
+    /* Tests a face exactly (`facing`: as in a candidate), keeps it if it is a wanted hit, and
+     * updates search->limit and search->done. */
     void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
     void *user;
 
@@ -164,27 +169,28 @@ struct ebpo_ray_search {
     bool any_hit; /* EBPO_WANTS_ANY: some face is certainly hit, and `decide` was not called */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
     const ebpo_accel *s;
-    /* In the frame: the direction, whose longest coordinate is 2^-12 to 2^12; the origin, moved
-     * along the ray to t = `moved`; a bound of the origin's error. */
+    /* In the frame (coordinates in which the subtree's cell has a size of 1 to 2): the direction,
+     * whose longest coordinate is 2^-12 to 2^12; the origin, moved along the ray to t = `moved`; a
+     * bound of the origin's error. */
     double direction[3], origin[3], error;
-    /* Set by the kernels, with one float for each axis and an unused fourth one: the origin, moved
-     * by the error so that no box is missed, for the nearer and the farther sides of boxes; the
-     * inverse of the direction. */
+    /* Set by the kernels, with one float for each axis and an unused fourth float: the origin for
+     * the nearer and for the farther sides of boxes, moved by the error so that no box is missed;
+     * the inverse of the direction. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
     double inverse_double[4]; /* inverse of the direction, small coordinates replaced */
     /* byte offsets in ebpo_bound: of the nearer sides of boxes on each axis, and of the farther
      * ones */
     const uint8_t (*side_at)[3];
-    int axis[3];    /* z: the axis with the longest coordinate of the direction */
-    float shear[3]; /* motion in x and y for a step of 1 along z; change of t for such a step */
+    int axis[3]; /* the axes x, y, z of tests of faces; z has the direction's longest coordinate */
+    float shear[3]; /* how x, y and t change for a step of 1 along z */
     /* The origin in the model's unit, in two parts for blocks of floats. */
     double from[3];
     float from_high[4], from_low[4];
     float blur; /* distance at which other rounding errors equal the origin's error */
-    double moved, limit_scale;
-    float bound, surely; /* in the frame: limit, rounded up; t_max, rounded down */
-    int count;
+    double moved, limit_scale; /* limit_scale: converts t of the ray to t in the frame */
+    float bound, surely;       /* in the frame: `limit`, rounded up; t_max, rounded down */
+    int count;                 /* of waiting candidates */
     ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
 };
 
@@ -196,15 +202,15 @@ typedef struct ebpo_axis_segment {
     double from[3];
     double to;
     int axis;
-    /* Extent of the segment in the cell, in sixteenths. As in an ebpo_listed_block, but for each
-     * axis it has the upper side and 15 minus the lower side. EBPO_REACH_ALL: intersects all boxes.
-     */
+    /* Extent of the segment in the cell, in sixteenths of the cell, encoded as the box of an
+     * ebpo_listed_block, but with the upper side and 15 minus the lower side for each axis.
+     * EBPO_REACH_ALL: the segment may intersect all boxes. */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)
 
-/* Returns false if the listed faces of the block cannot intersect the segment. Then one of the six
- * values of the block's box, four bits each, is greater than that of the segment. */
+/* Returns false if the listed faces of the block cannot intersect the segment, because one of the
+ * six values of the block's box (four bits each) is greater than the same value of the segment. */
 static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint64_t listed)
 {
     const uint32_t digits = 0x0f0f0f, carry = 0x101010;
@@ -216,7 +222,7 @@ static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint
 
 /* --- tables --- */
 
-/* Functions without side effects except on their outputs. */
+/* These functions have no side effects except on their outputs. */
 typedef struct ebpo_inside_kernels {
     /* Returns the sum of the certain crossings (ebpo_axis_crossing) of the segment with a leaf's
      * listed faces. The segment must be in the leaf's cell. Appends the slots of faces that are not
@@ -227,8 +233,8 @@ typedef struct ebpo_inside_kernels {
     ebpo_cell_faces_fn *cell_faces;
 } ebpo_inside_kernels;
 
-/* Walk through search->s, and call search->judge when many candidates wait. Afterwards, the faces
- * that still wait may be the nearest, or hit. */
+/* These functions walk through search->s, and call search->judge when many candidates wait. After
+ * the walk, the faces that still wait may be the nearest face, or hit. */
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;

@@ -1,9 +1,10 @@
 /* Makes models and contexts: opens a file for queries, loads subtrees, and checks the arguments of
  * all queries.
  *
- * A model is completely in memory if its budget allows that. If not, it has the top of the tree and
- * a cache of subtrees (budget.c makes this plan). Any thread may use a model. A context, which has
- * the buffers of queries and a pinned subtree, is used by one thread at a time. */
+ * A model is completely in memory if its budget allows that. If not, it has the top of the tree
+ * (levels 0 to the cut level) and a cache of the subtrees below; budget.c makes this plan. Any
+ * thread may use a model. A context has the buffers of queries and a pinned subtree, which stays in
+ * memory; it is used by one thread at a time. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -53,10 +54,8 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
                           "the file was written without its mesh, which exact results need; query "
-                          "with a level (--max-level), or use "
-                          "a file that has it (`ebpo subset`, `ebpo fetch` or `ebpo convert` with "
-                          "--profile collision "
-                          "or full)");
+                          "with a level (--max-level), or use a file with its mesh (`ebpo subset`, "
+                          "`ebpo fetch` or `ebpo convert` with --profile collision or full)");
 }
 
 ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
@@ -74,14 +73,14 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 
 /* --- envelopes that a context keeps --- */
 
-/* Bytes of marks of the nodes above the subtrees of a surface. */
+/* Maximum bytes that ebpo_holes_mark adds to the top of a surface's tree. */
 enum { TOP_MARKS = 1 << 17 };
 
-/* Maximum number of kept envelopes; most take 1 to 3 KB. */
+/* Maximum number of kept envelopes; most of them take 1 to 3 KB. */
 enum { SLOTS = 256 };
 
-/* The head of a kept envelope. After it come the used parts of the arrays of ebpo_polytope, in its
- * order. */
+/* The head of a kept envelope. After the head follow the used parts of the arrays of ebpo_polytope,
+ * in the order vertex, tag, first, corner. */
 typedef struct kept {
     ebpo_cell cell;
     int vertices, faces, corners;
@@ -120,6 +119,7 @@ bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *k, ebpo_cell cell, ebpo_
     return true;
 }
 
+/* Returns a copy of an envelope; NULL when out of memory. */
 static kept *copy_of(ebpo_cell cell, const ebpo_polytope *p)
 {
     size_t vertices = (size_t)p->vertex_count, faces = (size_t)p->face_count,
@@ -163,8 +163,8 @@ static void kept_envelopes_free(ebpo_kept_envelopes *k)
 
 /* --- subtrees for the cache --- */
 
-/* Estimates the bytes of a subtree, for the cache: the maximum while it is loaded, and what is
- * kept. */
+/* Estimates the bytes of a subtree for the cache: the most bytes while it is loaded (*peak), and
+ * the bytes that it keeps (*keep). */
 static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                                     ebpo_error *error)
 {
@@ -195,8 +195,10 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
-/* Returns the deepest level of cells that are split near the border: with a few undecided cells at
- * each edge of the border, these are a few percent of the root box. */
+/* Returns the deepest level of the cells into which ebpo_holes_mark splits nodes near the border.
+ * At this level, the few undecided cells at each edge of the border are a few percent of the root
+ * cell.
+ */
 static int split_level(const ebpo_model *m)
 {
     enum { CELLS_FOR_EDGE = 64, LEAST = 7 };
@@ -207,7 +209,8 @@ static int split_level(const ebpo_model *m)
     return level;
 }
 
-/* Marks the nodes of a surface with its border, with at most `bytes` of additional data. */
+/* Marks the nodes of a surface near its border (ebpo_holes_mark), with at most `bytes` of
+ * additional data. */
 static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, uint64_t bytes, ebpo_error *error)
 {
     if (!m->holes)
@@ -220,19 +223,21 @@ static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, uint64_t bytes
     return status;
 }
 
-/* Returns the bytes that remain for marks of a subtree. */
-static uint64_t space_for_marks(const ebpo_model *m, const ebpo_accel *s, uint64_t most)
+/* Returns the bytes for the marks of a subtree that may take `quota` bytes in all. */
+static uint64_t space_for_marks(const ebpo_model *m, const ebpo_accel *s, uint64_t quota)
 {
-    uint64_t left = most > s->bytes ? most - s->bytes : 0, marks = ebpo_holes_marks_max(m->info);
-    return left < marks ? left : marks;
+    uint64_t unused = quota > s->bytes ? quota - s->bytes : 0,
+             marks = ebpo_holes_marks_max(m->info);
+    return unused < marks ? unused : marks;
 }
 
-/* Loads a subtree for the cache, within `most` bytes. */
-static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
+/* Loads a subtree for the cache, within `quota` bytes. *bytes: bytes that it keeps or, after
+ * EBPO_E_LIMIT, bytes that it needs. */
+static ebpo_status load_subtree(void *user, uint64_t key, uint64_t quota, void **item,
                                 uint64_t *bytes, ebpo_error *error)
 {
     ebpo_model *m = user;
-    ebpo_quota space = { .most = most };
+    ebpo_quota space = { .most = quota };
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
     ebpo_status status = ebpo_slice_read_within(&slice, m->chunks, &m->top->below[key >> 1],
@@ -240,7 +245,7 @@ static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
     if (status == EBPO_OK &&
-        mark_accel(m, subtree, space_for_marks(m, subtree, most), error) != EBPO_OK) {
+        mark_accel(m, subtree, space_for_marks(m, subtree, quota), error) != EBPO_OK) {
         ebpo_accel_free(subtree);
         subtree = NULL;
         status = EBPO_E_LIMIT;
@@ -277,11 +282,12 @@ ebpo_status ebpo_model_has_capacity(const ebpo_model *m, const ebpo_node *leaf, 
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64
-                     " bytes does not hold a leaf of level %d, which takes up to %" PRIu64
-                     " more than the %" PRIu64 " in use; give a larger budget",
+                     " bytes is too small for a leaf of level %d, which takes up to %" PRIu64
+                     " bytes in addition to the %" PRIu64 " in use; give a larger budget",
                      m->options.memory, leaf->cell.level, peak, taken);
 }
 
+/* Loads the whole model. */
 static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 {
     ebpo_slice slice;
@@ -296,7 +302,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
                              : status;
 }
 
-/* Makes caches under the model's own budget; 0: no limit. */
+/* Makes the caches of a model with a separate budget (options.memory; 0: no limit). */
 static ebpo_status make_own_caches(ebpo_model *m, const ebpo_cache_source *source,
                                    ebpo_error *error)
 {
@@ -305,7 +311,7 @@ static ebpo_status make_own_caches(ebpo_model *m, const ebpo_cache_source *sourc
     if (budget && taken + EBPO_SUBTREES_LEAST > budget)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "levels 0 to %d and a cache take more than the budget of %" PRIu64
-                         " bytes; give %" PRIu64 " or a lower cut level",
+                         " bytes; give at least %" PRIu64 ", or a lower cut level",
                          m->top->cut_level, budget, taken + EBPO_SUBTREES_LEAST);
     ebpo_status status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
     if (status != EBPO_OK)
@@ -314,7 +320,7 @@ static ebpo_status make_own_caches(ebpo_model *m, const ebpo_cache_source *sourc
                            budget ? budget - m->top->bytes - chunks : 0, error);
 }
 
-/* Makes caches under a budget that several models share. */
+/* Makes the caches of a model whose budget several models share. */
 static ebpo_status make_shared_caches(ebpo_model *m, const ebpo_cache_source *source,
                                       ebpo_error *error)
 {
@@ -343,6 +349,7 @@ static uint64_t skeleton_capacity(ebpo_model *m)
     return ebpo_skeletons_capacity(m->top->below_count, m->shared_skeletons);
 }
 
+/* Loads the top of the tree, and makes the caches and skeletons. */
 static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
 {
     ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
@@ -361,16 +368,16 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     uint64_t skeletons = status == EBPO_OK ? skeleton_capacity(m) : 0;
     if (status == EBPO_OK && m->options.loading == EBPO_LOAD_CACHE && skeletons) {
         m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons, m->cache);
+        /* If other models have used up a shared budget, there are no skeletons. */
         if (!m->skeletons && m->options.budget)
-            ebpo_cache_set_aside(m->cache, 0); /* other models have used up the budget: go on
-                                                * without skeletons */
+            ebpo_cache_set_aside(m->cache, 0);
         else if (!m->skeletons)
             return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
     }
     return status;
 }
 
-/* Reads the border of a surface, if the file has it and the budget is sufficient. */
+/* Reads the border of a surface, if the file has it. Fails if the budget is too small. */
 static ebpo_status open_border(ebpo_model *m, ebpo_error *error)
 {
     ebpo_model_plan plan;
@@ -405,7 +412,8 @@ static ebpo_status open_planned(ebpo_model *m, ebpo_error *error)
         uint64_t memory = m->options.memory;
         status = m->options.budget ? open_shared_whole(m, plan.whole, error) : open_whole(m, error);
         m->options.memory = memory;
-        /* EBPO_E_LIMIT: the model takes more memory than ordinary models with its counts */
+        /* After EBPO_E_LIMIT, the model is loaded in parts: it takes more memory than ordinary
+         * models with the same counts, for which the plan is made. */
         if (status != EBPO_E_LIMIT || !m->options.memory)
             return status;
         status = ebpo_plan_parts(m->file, &m->options, &plan, error);
@@ -564,7 +572,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* Returns EBPO_E_LIMIT, with a message that gives a sufficient budget. */
+/* Returns EBPO_E_LIMIT, with a message that gives a budget which is sufficient for this subtree. */
 static ebpo_status fail_budget(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;
@@ -576,8 +584,8 @@ static ebpo_status fail_budget(const ebpo_model *m, uint32_t below, ebpo_error *
         least += least / 8 + 1;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64
-                     " bytes does not hold one subtree below level %d and the memory in use; give "
-                     "at least %" PRIu64 ", or a deeper cut level",
+                     " bytes is too small for one subtree below level %d and the memory in use; "
+                     "give at least %" PRIu64 ", or a deeper cut level",
                      m->options.memory, m->top->cut_level, least);
 }
 

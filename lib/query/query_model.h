@@ -1,4 +1,6 @@
-/* Declares the members of models and contexts, and functions that all queries share. */
+/* Declares the members of models and contexts, and functions that all queries share. A model that
+ * is not completely in memory has the top of its tree (levels 0 to the cut level) in memory, and
+ * loads the subtrees below the cut level on demand. */
 #ifndef EBPO_QUERY_QUERY_MODEL_H
 #define EBPO_QUERY_QUERY_MODEL_H
 
@@ -23,9 +25,9 @@ struct ebpo_model {
     const ebpo_info *info;
     ebpo_locator locator; /* finds cells of the deepest level */
     ebpo_model_options options;
-    uint64_t shared_taken, shared_skeletons; /* bytes taken from a shared budget: by the model, and
-                                              * by its skeletons */
-    bool default_memory;                     /* no budget was given, and the file is remote */
+    /* bytes taken from a shared budget: by the whole model or its top, and by its skeletons */
+    uint64_t shared_taken, shared_skeletons;
+    bool default_memory; /* no budget was given, and the file is remote */
     ebpo_query_kernels kernels;
     ebpo_accel *whole;   /* the whole model in memory; NULL: the model is loaded in parts */
     bool results_inside; /* true: `whole` has its mesh, and an inside */
@@ -33,22 +35,22 @@ struct ebpo_model {
     /* If the model is loaded in parts: */
     ebpo_top *top;              /* levels 0 .. cut level */
     ebpo_chunks *chunks;        /* decoded chunks */
-    ebpo_cache *cache;          /* subtrees by ebpo_subtree_key */
+    ebpo_cache *cache;          /* loaded subtrees, by ebpo_subtree_key */
     ebpo_skeletons *skeletons;  /* skeletons (upper nodes of the hierarchies over faces) of subtrees
-                                   that have been loaded; or NULL */
+                                 * that were loaded at least once; or NULL */
     _Atomic(ebpo_top *) deep;   /* deep bounds (nearest.h), or NULL */
     atomic_bool deep_begun;     /* a thread has begun to read deep bounds */
-    _Atomic uint64_t new_loads; /* number of subtrees that may have been loaded without need, until
-                                 * `deep` is set */
-    double open_seconds;
+    _Atomic uint64_t new_loads; /* number of loaded subtrees that had no skeleton before; counted
+                                 * until `deep` is set */
+    double open_seconds;        /* time that opening the model took */
     /* number of leaves in memory; of them, number of leaves of each kind, if the kind is known; and
      * number of general leaves with a free cell face */
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_cell_face;
     _Atomic uint64_t distances, distance_subtrees, distance_loads; /* as in ebpo_model_stats */
 };
 
-/* Adds a subtree's leaves to the counts, or (sign -1) subtracts them. The other function counts a
- * leaf whose kind has been found. */
+/* Adds a subtree's leaves to the model's counts of leaves, or (sign -1) subtracts them.
+ * ebpo_model_count_kind counts a leaf whose kind has been found. */
 void ebpo_model_count_leaves(ebpo_model *model, const ebpo_accel *subtree, int sign);
 void ebpo_model_count_kind(ebpo_model *model, const ebpo_accel_leaf *leaf);
 
@@ -58,15 +60,15 @@ typedef struct ebpo_kept_envelopes ebpo_kept_envelopes;
 
 struct ebpo_context {
     ebpo_model *model;
-    ebpo_accel *pinned; /* the last used subtree, when it came from the cache */
-    uint64_t pinned_key;
-    bool planes; /* the query needs the planes of nodes in subtrees */
-    /* for a surface with its border: results get the winding number of surface and caps, instead of
-     * the decision by the threshold */
+    ebpo_accel *pinned;  /* the last used subtree, if it came from the cache; it stays in memory */
+    uint64_t pinned_key; /* ebpo_subtree_key of `pinned` */
+    bool planes;         /* the query needs the planes of nodes in subtrees */
+    /* for a surface with its border: results get the winding number of the closed mesh of surface
+     * and caps, and are not decided by the threshold */
     bool undecided;
-    uint32_t *open; /* slots that a filter left undecided */
+    uint32_t *open; /* slots of faces that a filter could not decide */
     uint64_t open_capacity;
-    ebpo_ray_hit *hits;
+    ebpo_ray_hit *hits; /* results of ray queries */
     uint64_t hit_capacity;
     uint64_t *hit_begin; /* [number of rays + 1] index in `hits` of each ray's first hit */
     uint64_t hit_begin_capacity;
@@ -76,21 +78,22 @@ struct ebpo_context {
     uint64_t face_capacity;
     ebpo_ranked *queue; /* nodes to be searched (nearest.h) */
     uint64_t queue_count, queue_capacity;
-    uint32_t *marks; /* marks of subtrees, and the number of the query: nearest_subtrees.c */
-    uint32_t query_number;
-    uint64_t searched, loaded;      /* numbers of subtrees visited by distance queries, and of
-                                     * subtrees loaded by all queries */
+    uint32_t *marks;       /* [subtrees] state in the current query (nearest_subtrees.c) */
+    uint32_t query_number; /* of the current query */
+    /* number of subtrees that distance queries searched; number that all queries loaded */
+    uint64_t searched, loaded;
     ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */
     ebpo_polytope *cutting;         /* [2] temporary envelopes, which are too large for a small
                                      * stack; NULL before the first use */
-    bool has_prefetched;            /* position and search distance of the last query that
-                                     * prefetched are valid */
+    /* The last query that prefetched: false if there is none; its point and search distance. */
+    bool has_prefetched;
     double prefetched_from[3], prefetched_distance;
-    /* The last nearest face: the next ebpo_distance starts there, if enabled. */
-    bool warm;
+    /* The face that the last distance query found, from which the next ebpo_distance starts if its
+     * options enable this. */
+    bool warm; /* there is such a face */
     double warm_triangle[3][3];
-    uint64_t warm_face, warm_source_face; /* its index in the file and in the source */
-    /* its block in the whole model, and the node above the block; or EBPO_NO_BLOCK */
+    uint64_t warm_face, warm_source_face; /* index of the face in the file, and in the source */
+    /* the face's block in the whole model, and the node above the block; or EBPO_NO_BLOCK */
     uint32_t warm_block, warm_node;
 };
 
@@ -104,16 +107,17 @@ EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count
 EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count,
                                               ebpo_error *error);
 
-/* Returns EBPO_E_LIMIT if the budget does not hold this leaf in addition to the top and the chunks.
- * For EBPO_LOAD_NODES, which loads one leaf at a time, without the cache. */
+/* Returns EBPO_E_LIMIT if the budget is too small for this leaf in addition to the top and the
+ * chunks. For EBPO_LOAD_NODES, which loads one leaf at a time, without the cache. */
 EBPO_MUST_USE ebpo_status ebpo_model_has_capacity(const ebpo_model *model, const ebpo_node *leaf,
                                                   ebpo_error *error);
 
-/* Returns the cache's key of the subtree top->below[below], with or without the planes of its
- * nodes. (Few queries need planes, which take separate reads.) */
+/* Returns the key in the cache of the subtree top->below[below], with or without the planes of its
+ * nodes. (The subtree is loaded without planes if possible: few queries need them, and they take
+ * separate reads.) */
 static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
 
-/* Returns the parts of the file that a subtree needs, with or without planes. */
+/* Returns the data of the file (EBPO_NEEDS_...) that a subtree needs, with or without planes. */
 static inline uint32_t ebpo_subtree_needs(bool planes)
 {
     return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID_OR_BORDER |
@@ -126,8 +130,8 @@ static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below
     return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
 }
 
-/* Returns the cache's key of the subtree for the current query. If the cache has the subtree with
- * planes, it also serves queries that need no planes. */
+/* Returns the key in the cache of the subtree for the current query. A query that needs no planes
+ * uses the subtree with planes if the cache has it. */
 static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
 {
     uint64_t full = ebpo_subtree_key(below, true);
@@ -142,19 +146,20 @@ EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t b
 /* Releases the pinned subtree, so that other contexts may use its memory; NULL is allowed. */
 void ebpo_context_let_go(ebpo_context *context);
 
-/* Envelopes that a context has cut, kept for its next queries: cutting an envelope takes ten times
- * as long as finding its nearest point. One thread. */
+/* Envelopes that a context has computed and keeps for its next queries, because computing an
+ * envelope takes ten times as long as finding its nearest point. For one thread. */
 
 /* Finds the envelope of the node with this cell. Returns false if it is not kept. */
 bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);
-/* Keeps an envelope, which may replace another one. *kept is NULL initially. Without memory,
- * nothing is kept. */
+/* Keeps an envelope, which may replace another kept envelope. *kept is NULL before the first call.
+ * When out of memory, nothing is kept. */
 void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
                              const ebpo_polytope *envelope);
 
 /* --- common checks of all queries --- */
 
-/* Returns EBPO_E_ARGUMENT if the level is not -1 or a possible level. */
+/* Returns EBPO_E_ARGUMENT if the level is neither -1 nor from 0 to the deepest level of the format.
+ */
 EBPO_MUST_USE ebpo_status ebpo_check_query_level(int level, ebpo_error *error);
 /* Returns EBPO_E_ARGUMENT with a message: an option has an invalid enum value. */
 ebpo_status ebpo_fail_value(ebpo_error *error);

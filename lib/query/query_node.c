@@ -1,9 +1,9 @@
-/* Goes from a node of a model to its children, in the top of the tree and in subtrees, and computes
- * bounds from envelopes.
+/* Goes from a node of a model to its children, in the top of the tree (levels 0 to the cut level)
+ * and in subtrees, and computes bounds of distances from envelopes.
  *
- * Cursors (geometry/cursor.h) get nodes from an accel (nodes of one subtree) or from a context
- * (nodes of the model; a context loads subtrees on demand). Nodes of a subtree are valid until the
- * context enters another subtree.
+ * Cursors (geometry/cursor.h) get nodes from an accel (the nodes of one subtree, accel.h) or from a
+ * context (the nodes of the model; a context loads subtrees on demand). Nodes of a subtree are
+ * valid until the context enters another subtree.
  *
  * In a subset, nodes may be pruned: the file omits their children. A query that needs an omitted
  * part fails with EBPO_E_ABSENT, and the message gives the position and how the file was cut. */
@@ -40,12 +40,12 @@ ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned 
 /* Returns the codes of a gray node's planes, if the subtree has kept them. */
 static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
 {
-    uint32_t number = ebpo_entry_value(node->entry);
+    uint32_t group = ebpo_entry_value(node->entry);
     *count = 0;
     if (node->type != EBPO_GRAY || !s->gray_first)
         return NULL;
-    *count = s->gray_first[number + 1] - s->gray_first[number];
-    return s->gray_planes + s->gray_first[number];
+    *count = s->gray_first[group + 1] - s->gray_first[group];
+    return s->gray_planes + s->gray_first[group];
 }
 
 /* --- nodes of a subtree, for cursors --- */
@@ -118,7 +118,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    /* the subtree's table may show that the node is pruned, although the file's counts do not */
+    /* Only the subtree's table may show that the node is pruned. */
     if (ebpo_node_is_subtree_root(node))
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
@@ -150,7 +150,7 @@ double ebpo_rank_cell_end(const ebpo_ranking *r, ebpo_cell cell)
     return r->far ? ebpo_far_cell_end(r->far, &r->box, cell) : ebpo_cell_far(&r->box, cell, r->p);
 }
 
-/* Does the same as ebpo_rank_node, but may stop at any bound beyond `enough`. */
+/* Does the same as ebpo_rank_node, but a bound beyond `enough` need not be the best one. */
 static double bound_until(const ebpo_ranking *r, const ebpo_node *node, double parent,
                           double enough)
 {
@@ -177,7 +177,7 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
     const ebpo_node_table *table = gray->subtree ? &gray->subtree->nodes : &m->top->nodes;
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
-        /* most children are uniform: no node is made for these */
+        /* Most children are white or black. No ebpo_node is made for these. */
         if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
         ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0, 0 };
@@ -267,6 +267,7 @@ typedef struct checking {
     ebpo_box box;
 } checking;
 
+/* Fails at the first pruned node at or below a node for which `matters` is true. */
 static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;

@@ -1,6 +1,6 @@
 /* Goes from a node of a model to its children, in the top of the tree (levels 0 to the cut level)
- * and in subtrees, and computes bounds from envelopes. Nodes of a subtree are valid until the
- * context enters another subtree. */
+ * and in subtrees, and computes bounds of distances from envelopes. Nodes of a subtree are valid
+ * until the context enters another subtree. */
 #ifndef EBPO_QUERY_QUERY_NODE_H
 #define EBPO_QUERY_QUERY_NODE_H
 
@@ -16,9 +16,9 @@ static inline bool ebpo_node_is_subtree_root(const ebpo_node *node)
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_SUBTREE_ROOT;
 }
 
-/* Enters a subtree. `node` is of the kind SUBTREE_ROOT, and becomes the root node in the subtree's
- * table. The subtree is loaded if needed, and stays until the context enters another one. Returns
- * EBPO_E_ABSENT for a pruned node. */
+/* Enters a subtree. On entry, `node` is of the kind SUBTREE_ROOT; on return, it is the root node in
+ * the subtree's table. The subtree is loaded if needed, and stays in memory until the context
+ * enters another one. Returns EBPO_E_ABSENT for a pruned node. */
 EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node,
                                            ebpo_error *error);
 
@@ -33,7 +33,7 @@ extern const ebpo_node_source ebpo_context_source;
 /* Returns the plane codes of the node itself, without those of its ancestors. */
 const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node, uint32_t *count);
 
-/* A point p. Nodes are ranked by lower bounds of the distance of p to their contents. */
+/* A point p. Nodes are ranked by lower bounds of the distance of p to the faces in them. */
 typedef struct ebpo_ranking {
     const ebpo_model *model;
     ebpo_box box; /* box of the model */
@@ -48,16 +48,16 @@ static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double
     return (ebpo_ranking){ model, ebpo_model_box(model), p, far && far->far ? far : NULL };
 }
 
-/* Returns a lower bound for the contents of the node: the greater one of `parent`, the bound of its
- * parent, and the bound from its own planes. */
+/* Returns the lower bound of a node: the greater one of `parent`, the bound of its parent, and the
+ * bound from its cell and planes. */
 double ebpo_rank_node(const ebpo_ranking *ranking, const ebpo_node *node, double parent);
 /* Returns the lower bound of the root. */
 double ebpo_rank_root(const ebpo_ranking *ranking);
-/* Returns a lower bound for a cell, from the given planes only; the computation may stop at any
- * bound beyond `enough`. */
+/* Returns the lower bound of a cell with these planes. A bound beyond `enough` need not be the best
+ * one. */
 double ebpo_rank_cell(const ebpo_ranking *ranking, ebpo_cell cell, const uint32_t *codes,
                       uint32_t count, double enough);
-/* Returns an upper bound for the farthest point of a cell, as ebpo_cell_far. */
+/* Returns an upper bound for the farthest point of a cell (ebpo_cell_far, or its key). */
 double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
 
 /* A node and its lower bound. */
@@ -67,7 +67,7 @@ struct ebpo_ranked {
     uint8_t what; /* which faces of a subtree (nearest_subtrees.c); otherwise 0 */
 };
 
-/* Lists the children of a gray node that are neither white nor black and have a bound of at most
+/* Lists the children of a gray node that are gray nodes or leaves and have a lower bound of at most
  * `limit`, the nearest first. `parent`: bound of the gray node. Returns their number. */
 int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, double parent,
                        double limit, ebpo_ranked out[8]);
@@ -78,7 +78,7 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
  * node of this cell. The message gives the file, the position and how the file was cut. */
 ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
 
-/* Returns true if something in the node's cell matters to the query. */
+/* Returns true if the query's result may depend on what is in the node's cell. */
 typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);
 
 /* Returns EBPO_E_ABSENT if `matters` is true for a pruned node. If `matters` is true for a node, it

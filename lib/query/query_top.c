@@ -2,8 +2,9 @@
  * below.
  *
  * A model that is loaded in parts always has the top in memory; queries go down through the top to
- * the subtrees. The same struct, with envelopes only, holds some levels below the cut level for
- * deep bounds (nearest.h). It is immutable after it has been read; any thread may use it. */
+ * the subtrees. The same struct, read with envelopes only, serves as deep bounds, which have some
+ * levels below the cut level (nearest.h). It does not change after it was read; any thread may use
+ * it. */
 #include "query/holes.h"
 #include "query/model_parts.h"
 
@@ -20,13 +21,13 @@
 typedef struct reading {
     ebpo_top *top;
     const ebpo_info *info;
-    uint64_t group, plane, below; /* next free index of each array */
+    uint64_t group, plane, below; /* next free index in groups, planes and `below` of the top */
     ebpo_cell *gray;              /* cells of the previous level's gray nodes */
-    /* types of the next level's nodes, which show what nodes are pruned (their children are not in
+    /* types of the next level's nodes, which show which nodes are pruned (their children are not in
      * the file); NULL: not needed */
     uint16_t *next_types;
     uint64_t group_capacity, gray_capacity, plane_capacity, below_capacity, below_planes_capacity;
-    bool envelopes; /* as in ebpo_top_read_envelopes */
+    bool envelopes; /* true: for ebpo_top_read_envelopes, without `below` */
     ebpo_error *error;
 } reading;
 
@@ -35,7 +36,8 @@ static ebpo_status no_memory(const reading *r)
     return ebpo_fail_memory(r->error, ebpo_top_estimate(r->info, r->top->cut_level));
 }
 
-/* Adds the planes of a node: the next `count` planes of the level, which begin at *plane_at. */
+/* Adds the planes of a node: the next `count` planes of the level. *plane_at: index of the first
+ * one; on return, of the next node's first plane. */
 static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
                               uint64_t *plane_at, ebpo_top_planes *out)
 {
@@ -44,7 +46,7 @@ static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t coun
         return no_memory(r);
     if (r->plane + count > UINT32_MAX)
         return ebpo_fail(r->error, EBPO_E_LIMIT,
-                         "too many planes down to cut level %d; give a lower one",
+                         "too many planes down to cut level %d; give a lower cut level",
                          r->top->cut_level);
     if (count)
         memcpy(r->top->planes + r->plane, level->planes + *plane_at,
@@ -55,11 +57,12 @@ static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t coun
     return EBPO_OK;
 }
 
-/* Numbers of a level's nodes of each type, and of planes, so far. */
+/* How many nodes of each type, and how many planes, of a level were added so far. */
 typedef struct level_counts {
     uint64_t of[4], planes;
 } level_counts;
 
+/* Sets the entry of a white or black node. `windings`: [rank], or NULL. */
 static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint64_t rank,
                                  int32_t default_winding, uint32_t *entry)
 {
@@ -81,8 +84,8 @@ static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_nod
                    sizeof *t->below_planes))
         return no_memory(r);
     if (r->below >= EBPO_ENTRY_ZERO)
-        return ebpo_fail(r->error, EBPO_E_LIMIT, "too many nodes at cut level %d; give a lower one",
-                         t->cut_level);
+        return ebpo_fail(r->error, EBPO_E_LIMIT,
+                         "too many nodes at cut level %d; give a lower cut level", t->cut_level);
     if (!r->envelopes)
         t->below[r->below] = *node;
     *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)r->below);
@@ -102,21 +105,21 @@ static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, 
         return no_memory(r);
     if (r->group >= EBPO_ENTRY_ZERO)
         return ebpo_fail(r->error, EBPO_E_LIMIT,
-                         "too many nodes above cut level %d; give a lower one", t->cut_level);
+                         "too many nodes above cut level %d; give a lower cut level", t->cut_level);
     *entry = ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
     return add_planes(r, level, level->plane_counts ? level->plane_counts[rank] : 0, plane_at,
                       &t->gray[group]);
 }
 
-/* Returns true if the gray node with this rank in the level `number` is pruned. */
+/* Returns true if the gray node with this rank in level `number` is pruned. */
 static bool is_pruned(const reading *r, int number, uint64_t rank)
 {
     return r->info->pruned &&
            (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
 }
 
-/* Adds a pruned node. If it is above the cut level, the next level has an empty group for it, which
- * must be counted. */
+/* Adds a pruned node as a root of a subtree. If it is above the cut level, the file has an empty
+ * group for it in the next level, so it also gets a group, like a gray node. */
 static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_node *node,
                               uint64_t *plane_at, uint32_t *entry)
 {
@@ -149,7 +152,7 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
     return add_below(r, level, &node, &next->planes, entry);
 }
 
-/* Adds the nodes of a level. `first_group`: number of the level's first group. */
+/* Adds the nodes of level `number`. `first_group`: index in the top of the level's first group. */
 static ebpo_status add_level(reading *r, int number, const ebpo_level *level, uint64_t first_group)
 {
     uint64_t grays = 0;
@@ -270,17 +273,18 @@ void ebpo_top_free(ebpo_top *top)
 /* Bytes for the first allocations of growing arrays, which have space for several items. */
 enum { GROWN_LEAST = 4096 };
 
-/* Returns an upper bound of the bytes. `node`: bytes of each root in `below`. */
-static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t node)
+/* Returns an upper bound of the bytes of a top. `root_bytes`: bytes of each root in `below`. */
+static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t root_bytes)
 {
     uint64_t bytes = sizeof(ebpo_top) + GROWN_LEAST, largest = 0;
     for (int i = 0; i <= cut_level && i < info->level_count; i++) {
         const ebpo_level_summary *s = &info->level[i];
         uint64_t below = s->leaf_count + (i == cut_level ? s->gray_count : 0);
-        /* The data that are kept, and the arrays of the level while it is read. */
+        /* The data that are kept; growing arrays have up to half of their size as reserve. */
         bytes += (s->gray_count * (sizeof(uint32_t[8]) + sizeof(ebpo_top_planes)) +
-                  s->plane_count * 4 + below * (node + sizeof(ebpo_top_planes))) *
+                  s->plane_count * 4 + below * (root_bytes + sizeof(ebpo_top_planes))) *
                  3 / 2;
+        /* The arrays of the level while it is read. */
         uint64_t arrays = s->gray_count * 27 + s->plane_count * 4 + s->leaf_count * 28 +
                           s->ref_count * 4 + (s->white_count + s->black_count) * 4;
         largest = arrays > largest ? arrays : largest;

@@ -1,12 +1,12 @@
-/* Returns the faces within a distance of a point, one after the other, the nearest first.
+/* Returns the faces within a distance of a point, one after the other, the nearest first. The order
+ * is exact: by distance, then by index in the file.
  *
- * Faces are found in bands: a band is a limited number of faces that follow, in the order of
- * results, the last face of the previous band. So a stream of any length needs little memory; the
- * first band is small, for callers that need few faces. The search for a band is depth first, the
- * nearest child first. It skips nodes and faces that are certainly beyond the band's limit, or
- * certainly in an earlier band. The order is exact: by distance, then by index in the file.
- * Subtrees that are not in memory are loaded in the order of guaranteed lower bounds, until the
- * next bound is beyond the band. */
+ * Faces are found in bands. A band is the next faces in this order, after the last face of the
+ * previous band; their number is limited. So a stream of any length needs little memory. The first
+ * band is small, for callers that need few faces. The search for a band is depth first, the nearest
+ * child first. It skips nodes and faces that are certainly beyond the band's limit, or certainly in
+ * an earlier band. Subtrees that are not in memory are loaded in the order of guaranteed lower
+ * bounds of their distance, until the next bound is beyond the band. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -34,28 +34,28 @@ typedef struct near_face {
 
 typedef struct near_band {
     double p[3];
-    double radius;  /* farther faces are in no band; compared exactly */
-    double limit;   /* faces that are certainly farther are not in this band */
-    uint64_t most;  /* maximum number of faces in the band, at least 1 */
-    bool has_after; /* faces up to `after` were in earlier bands */
+    double radius;      /* faces at a greater distance are in no band; compared exactly */
+    double limit;       /* faces that are certainly farther are not in this band */
+    uint64_t faces_max; /* maximum number of faces in the band, at least 1 */
+    bool has_after;     /* faces up to and including `after` were in earlier bands */
     near_face after;
     near_face *near; /* [count] candidates; after near_band_settle, the band's faces in order */
     uint64_t count, capacity;
-    bool cut; /* there may be further faces after the band's last one */
+    bool cut; /* there may be faces within the radius after the band's last one */
     bool no_memory;
 } near_band;
 
-/* Returns true if everything at a distance of at most `far` was in earlier bands. */
+/* Returns true if all faces at a distance of at most `far` were in earlier bands. */
 static inline bool near_band_is_past(const near_band *band, double far)
 {
     return band->has_after && far < band->after.bounds.lo;
 }
 
 /* Prepares the search for a band; keeps `after` and the allocated memory. */
-static void near_band_begin(near_band *band, uint64_t most)
+static void near_band_begin(near_band *band, uint64_t faces_max)
 {
     band->limit = band->radius;
-    band->most = most;
+    band->faces_max = faces_max;
     band->count = 0;
     band->cut = false;
 }
@@ -73,8 +73,8 @@ static int compare_faces(const void *x, const void *y)
     return sign ? sign : a->file_face < b->file_face ? -1 : 1;
 }
 
-/* Sorts the candidates, removes duplicates, and keeps at most band->most candidates, the nearest.
- * If band->most candidates are kept, lowers the limit to the distance of the last of them. */
+/* Sorts the candidates, removes duplicates, and keeps the nearest band->faces_max candidates. If
+ * there are that many, lowers the limit to the distance of the last one. */
 static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
@@ -83,8 +83,8 @@ static void near_band_settle(near_band *band)
     for (uint64_t i = 0; i < band->count; i++)
         if (kept == 0 || band->near[i].file_face != band->near[kept - 1].file_face)
             band->near[kept++] = band->near[i];
-    band->count = kept < band->most ? kept : band->most;
-    if (band->count < band->most)
+    band->count = kept < band->faces_max ? kept : band->faces_max;
+    if (band->count < band->faces_max)
         return;
     band->limit = fmin(band->limit, band->near[band->count - 1].bounds.hi);
     band->cut = true;
@@ -97,8 +97,8 @@ static void near_band_settle(near_band *band)
 static void add_face(near_band *band, const near_face *face)
 {
     enum { SPARE_LEAST = 64 };
-    uint64_t spare = band->most < SPARE_LEAST ? SPARE_LEAST : band->most;
-    if (band->count == band->most + spare)
+    uint64_t spare = band->faces_max < SPARE_LEAST ? SPARE_LEAST : band->faces_max;
+    if (band->count == band->faces_max + spare)
         near_band_settle(band);
     if (!ebpo_grow(&band->near, &band->capacity, band->count + 1, sizeof *band->near))
         band->no_memory = true;
@@ -106,6 +106,7 @@ static void add_face(near_band *band, const near_face *face)
         band->near[band->count++] = *face;
 }
 
+/* Adds a face to the candidates, unless it is empty, beyond the limit or in an earlier band. */
 static void try_face(near_band *band, const ebpo_accel *s, uint32_t slot)
 {
     near_face face;
@@ -146,7 +147,7 @@ static double length_of_positive(const double x[3])
     return greatest * sqrt(a * a + b * b + c * c);
 }
 
-/* Computes guaranteed bounds of the distances of all points of a child's box. */
+/* Computes guaranteed bounds of the distances of the points of a child's box. */
 static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double *lower,
                        double *upper)
 {
@@ -159,11 +160,12 @@ static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double
         near[k] = fmax(fmax(low - p[k], p[k] - high), 0);
         far[k] = fmax(fabs(low - p[k]), fabs(p[k] - high));
     }
-    /* a difference that overflows may be finite in exact arithmetic */
+    /* If a difference overflows, the exact value may still be finite. */
     *lower = fmin(fmax(length_of_positive(near) - g->error, 0), 0x1p1022);
     *upper = length_of_positive(far) + g->error;
 }
 
+/* Searches the faces below a child (a node of the hierarchy or a block). */
 static void search_child(const searching *g, uint32_t child)
 {
     near_band *band = g->band;
@@ -194,7 +196,8 @@ static void near_band_search(near_band *band, const ebpo_accel *s)
 {
     searching g = { band, s, 0 };
     double size = s->largest_coordinate / s->scale * 0x1p-46;
-    for (int k = 0; k < 3; k++) /* box_bounds has a few rounding errors of numbers of this size */
+    /* box_bounds has a few rounding errors, relative to numbers of this size */
+    for (int k = 0; k < 3; k++)
         size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
     g.error = size;
     if (s->bound_count)
@@ -204,27 +207,27 @@ static void near_band_search(near_band *band, const ebpo_accel *s)
 /* --- the stream --- */
 
 /* Sizes of bands, in faces. The first band is small, for callers that need few faces. Each next
- * band is BAND_GROWTH times larger up to BAND_MAX: every band is searched from the root, so few
- * bands are faster. */
+ * band is BAND_GROWTH times larger, up to BAND_MAX, because every band is searched from the root,
+ * so few large bands take less time. */
 enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MAX = 1 << 16 };
 
 typedef struct within {
     ebpo_context *context;
     const ebpo_within_options *options;
     near_band band;
-    uint64_t given;  /* number of faces passed to the caller */
-    bool ahead;      /* result of lists_ahead */
-    uint64_t hinted; /* number of subtrees with a prefetch hint that have not been entered */
-    ebpo_near_fn take;
+    uint64_t given;    /* number of faces passed to the caller */
+    bool ahead;        /* all subtrees are listed before the first is entered (lists_ahead) */
+    uint64_t hinted;   /* number of subtrees with a prefetch hint that have not been entered */
+    ebpo_near_fn take; /* of the caller, called with `user` and each face */
     void *user;
 } within;
 
 /* --- a model that is loaded in parts: searches the nearest remaining subtree, until its bound is
  * beyond the limit --- */
 
-/* Returns true for a remote file with a radius: all subtrees within the radius will be entered, so
- * they are listed at once and requested together. For a number of nearest faces the subtrees are
- * not known in advance. */
+/* Returns true if the file is remote and the query has a radius. Then all subtrees within the
+ * radius will be entered, so they are listed at once and requested together. (If the query is for a
+ * number of nearest faces, the needed subtrees are not known in advance.) */
 static bool lists_ahead(const within *w)
 {
     const ebpo_model *m = w->context->model;
@@ -246,8 +249,8 @@ static double known_bound(const within *w, uint32_t below)
     return fmin(b.owned, b.shared);
 }
 
-/* Adds a node to the queue, or its children if w->ahead. Pruned nodes are checked when the band is
- * known (node_matters). */
+/* Adds a node to the queue; if w->ahead, adds the subtrees at or below the node instead. Pruned
+ * nodes are checked when the band is known (search_band). */
 static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
@@ -279,9 +282,10 @@ static void hint_window(within *w, const ebpo_ranked *next)
     w->hinted = count - 1;
 }
 
+/* Enters and searches a subtree, unless it is beyond the limit. */
 static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
 {
-    if (w->band.count > w->band.most) /* the next subtree may not be needed */
+    if (w->band.count > w->band.faces_max) /* a lower limit may exclude the subtree */
         near_band_settle(&w->band);
     if (r->lower > w->band.limit)
         return EBPO_OK;
@@ -292,6 +296,7 @@ static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
     return status;
 }
 
+/* Adds the children of a node of the top, as put_node does. */
 static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
                                 ebpo_error *error)
 {
@@ -304,6 +309,7 @@ static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranke
     return status;
 }
 
+/* Searches a band in a model that is loaded in parts. */
 static ebpo_status search_parts(within *w, ebpo_error *error)
 {
     ebpo_context *c = w->context;
@@ -323,6 +329,7 @@ static ebpo_status search_parts(within *w, ebpo_error *error)
 
 /* --- band by band --- */
 
+/* Returns true if the node may have a face of the band (ebpo_matters_fn). */
 static bool node_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
     const within *w = user;
@@ -331,11 +338,12 @@ static bool node_matters(void *user, const ebpo_box *box, const ebpo_node *node)
     return ebpo_rank_node(&ranking, node, 0) <= w->band.limit;
 }
 
-static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
+/* Finds the next band, of at most faces_max faces. */
+static ebpo_status search_band(within *w, uint64_t faces_max, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
     ebpo_status status = EBPO_OK;
-    near_band_begin(&w->band, most);
+    near_band_begin(&w->band, faces_max);
     if (m->whole)
         near_band_search(&w->band, m->whole);
     else
@@ -380,14 +388,14 @@ static bool give_band(within *w)
 static ebpo_status stream_faces(within *w, ebpo_error *error)
 {
     uint64_t wanted = w->options->most ? w->options->most : UINT64_MAX,
-             most = w->options->most ? BAND_MAX : FIRST_BAND;
+             band_size = w->options->most ? BAND_MAX : FIRST_BAND;
     bool more = true;
     ebpo_status status = EBPO_OK;
     while (more && w->given < wanted && status == EBPO_OK) {
         uint64_t missing = wanted - w->given;
-        status = search_band(w, missing < most ? missing : most, error);
+        status = search_band(w, missing < band_size ? missing : band_size, error);
         more = status == EBPO_OK && give_band(w);
-        most = most < BAND_MAX / BAND_GROWTH ? most * BAND_GROWTH : BAND_MAX;
+        band_size = band_size < BAND_MAX / BAND_GROWTH ? band_size * BAND_GROWTH : BAND_MAX;
     }
     return status;
 }
@@ -409,7 +417,8 @@ ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
         status = ebpo_check_mesh(context->model, error);
     if (status != EBPO_OK)
         return status;
-    context->planes = context->model->info->pruned; /* as in ebpo_distance */
+    /* In a subset, planes improve the bounds of omitted parts (as in ebpo_distance_many). */
+    context->planes = context->model->info->pruned;
     memcpy(w.band.p, point, sizeof w.band.p);
     w.band.radius = wanted.radius;
     w.ahead = lists_ahead(&w);

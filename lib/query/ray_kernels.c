@@ -1,9 +1,11 @@
-/* The kernel that finds the hits of a ray: it walks through the hierarchy over faces of one accel
- * (acceleration structure of a subtree) and filters eight faces at a time, in single precision.
+/* The kernel that finds the hits of a ray. It walks down the hierarchy over blocks of faces of one
+ * accel (acceleration structure of a subtree, accel.h), and filters eight faces at a time, in
+ * single precision.
  *
- * The kernel drops only faces that the ray certainly misses, or hits beyond the limit. If the
- * kernel reports a certain hit, the face is also hit in exact arithmetic. rays.c tests the other
- * faces exactly.
+ * The kernel only drops faces that the ray certainly misses, or certainly hits beyond the limit of
+ * t (a hit is at origin + t * direction). If the kernel reports a certain hit, the face is also hit
+ * in exact arithmetic. All faces that are not dropped become candidates, which rays.c tests
+ * exactly.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */
@@ -18,9 +20,9 @@
 
 /* --- the ray --- */
 
-/* [bits][0]: offsets in ebpo_bound of the nearer sides of boxes on each axis; [1]: of the farther
- * sides. `bits` has a bit for each axis on which the direction is negative. The table avoids
- * branches, half of which would be mispredicted. */
+/* Offsets in ebpo_bound of the sides of boxes on each axis: ray_side_at[bits][0] of the nearer
+ * sides, ray_side_at[bits][1] of the farther sides. `bits` has a bit for each axis on which the
+ * direction is negative. The table replaces branches, half of which would be mispredicted. */
 #define LOW(k)  (offsetof(ebpo_bound, low) + 8 * (k))
 #define HIGH(k) (offsetof(ebpo_bound, high) + 8 * (k))
 static const uint8_t ray_side_at[8][2][3] = {
@@ -36,7 +38,7 @@ static const uint8_t ray_side_at[8][2][3] = {
 #undef LOW
 #undef HIGH
 
-/* Sets the fields for tests of boxes. */
+/* Sets the fields of the search that are used in tests of boxes. */
 EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
 {
     d3 d = d3_load(r->direction), origin = d3_load(r->origin),
@@ -51,7 +53,7 @@ EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
     r->side_at = ray_side_at[d3_signs(d)];
 }
 
-/* Sets the fields for tests of faces. */
+/* Sets the fields of the search that are used in tests of faces. */
 EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
 {
     const double *d = r->direction;
@@ -70,15 +72,16 @@ EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
 
 /* --- boxes --- */
 
-EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned at, f8 step, f8 from)
+/* Returns step * side + from for the eight sides at this offset in ebpo_bound. */
+EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned offset, f8 step, f8 from)
 {
-    return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + at), step), from);
+    return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + offset), step), from);
 }
 
-/* Returns a bit for each child whose box the ray may intersect between 0 and the limit; *enter: t
- * where it enters each box. The three axes are prepared together: the origin's coordinates are in
- * lanes 0 to 2, the step's in lanes 1 to 3. (Origin and step are adjacent in memory, so each load
- * of four floats also reads one number of the other array.) */
+/* Returns a bit for each child whose box the ray may intersect between t = 0 and the limit; *enter:
+ * the t at which it enters each box. The three axes are prepared together: the origin's coordinates
+ * are in lanes 0 to 2, the step's in lanes 1 to 3. (Origin and step are adjacent in memory, so each
+ * load of four floats also reads one number of the other array.) */
 EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, f8 *enter)
 {
     f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
@@ -98,12 +101,13 @@ EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, 
 
 /* --- faces --- */
 
-/* Eight faces in the ray's coordinates: x and y with the ray as the origin, z along it. */
+/* Eight faces in coordinates of the ray: z is along the axis with the longest coordinate of the
+ * direction; x and y are sheared so that the ray is at x = y = 0. */
 typedef struct projected {
     f8 x[3], y[3], z[3];
 } projected;
 
-/* Reads the corners on one axis, relative to the origin. */
+/* Reads the corners' coordinates on one axis, relative to the origin, in the subtree's frame. */
 EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis, bool wide,
                          f8 corner[3])
 {
@@ -138,8 +142,9 @@ EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b
     return out;
 }
 
-/* For each edge: twice the signed area of the triangle that the ray's line forms with the edge, and
- * a bound of its rounding error. */
+/* For the three edges of eight faces (u, v, w): twice the signed area of the triangle, in x and y,
+ * that the edge forms with the ray. Their least and greatest values, and a bound of their rounding
+ * error. */
 typedef struct edges {
     f8 u, v, w, least, greatest, error;
 } edges;
@@ -165,15 +170,18 @@ EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
     return e;
 }
 
-/* Results of a block's lanes. alive: possible hits from 0 to the limit; low, high: bounds of their
- * t; sure: certain hits; front, back: the line certainly goes through the face's interior, from the
- * front or from the back. */
+/* Results for the faces of a block; masks have a bit for each lane. */
 typedef struct ray_lanes {
-    float low[8], high[8];
-    unsigned alive, sure, front, back;
+    float low[8], high[8]; /* bounds of t of possible hits */
+    unsigned alive, sure;  /* faces that may be hit, that are certainly hit, between 0 and the limit
+                            */
+    /* faces through whose interior the ray's line certainly goes, from the front or from the back
+     */
+    unsigned front, back;
 } ray_lanes;
 
-/* Tests eight faces. Comparisons are written such that a lane with NaN stays and is not certain. */
+/* Tests eight faces. Comparisons are written so that a lane with a NaN stays alive and is not
+ * certain. */
 EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(r->s, block);
@@ -223,7 +231,8 @@ static void drop_beyond(ebpo_ray_search *r)
     r->count = kept;
 }
 
-/* Visits a block: adds its possible hits to the candidates, and lowers the limit. */
+/* Visits a block: adds its possible hits to the candidates, and lowers the limit to certain hits.
+ */
 EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
 {
     ray_lanes found;
@@ -250,7 +259,8 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
         r->judge(r);
 }
 
-/* Prefetches cache lines of a later visit, without a branch that would often be mispredicted. */
+/* Prefetches cache lines of a child for a later visit, without a branch that would often be
+ * mispredicted. */
 EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
 {
     uint32_t number = child & ~EBPO_IS_BLOCK;
@@ -261,8 +271,8 @@ EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
         __builtin_prefetch(at + 64 * i);
 }
 
-/* Pushes the children of two or more lanes, farthest first, except the nearest child, which it
- * returns. */
+/* Returns the nearest of two or more children (`lanes`), and pushes the other children onto the
+ * stack, farthest first. */
 EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                                 const ebpo_bound *b, unsigned lanes, f8 enter, bool wide)
 {
@@ -284,7 +294,8 @@ EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t
     return (uint32_t)stack[*top];
 }
 
-/* Pushes the children of two or more lanes, in any order, except one child, which it returns. */
+/* Returns one of two or more children (`lanes`), and pushes the other children onto the stack, in
+ * any order. */
 EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                              const ebpo_bound *b, unsigned lanes, bool wide)
 {
@@ -297,8 +308,8 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
     return b->child[__builtin_ctz(lanes)];
 }
 
-/* Walks through the accel. `sorted`: nearer children first, which is faster when the limit
- * decreases. */
+/* Walks through the accel. `sorted`: visits nearer children first, which is faster if the limit
+ * decreases during the walk. */
 EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, bool wide, bool sorted)
 {
     const ebpo_accel *s = r->s;

@@ -1,11 +1,13 @@
 /* Finds the first face that a ray hits, any hit, or all hits; and evaluates many rays on all cores.
+ * A hit is a point origin + t * direction of a face.
  *
  * On the way down the tree, tests are conservative: a node is skipped only if the ray certainly
  * misses its cell, or if the cell is beyond the limit of t. In an accel (acceleration structure of
- * a subtree), a filter in single precision (ray_kernels.c) excludes all but a few faces. Exact
- * predicates test these candidates, the one with the least lower bound of t first. Hits are ordered
- * by t, then by the face's index in the file. Results do not depend on the number of threads: each
- * thread takes some rays at a time, with its own context. Error bounds: docs/develop/bounds.md. */
+ * a subtree, accel.h), a filter in single precision (ray_kernels.c) excludes all but a few faces.
+ * Exact predicates test these candidates, beginning with the least lower bound of t. Hits are
+ * ordered by t, then by the face's index in the file. Many rays are divided among threads; each
+ * thread takes some rays at a time and uses a separate context. Results do not depend on the number
+ * of threads. Error bounds: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -34,12 +36,11 @@ struct ebpo_ray_found {
 
 /* A query with one ray. */
 typedef struct casting {
-    ebpo_context *context; /* if all hits are wanted, its unsorted_hits holds them */
+    ebpo_context *context; /* EBPO_WANTS_ALL: the hits are in context->unsorted_hits */
     ebpo_segment ray;
     ebpo_ray_wants wants;
-    ebpo_ray_sides sides; /* sides of faces that count as hits */
-    double limit;         /* hits with a greater t certainly do not matter; decreases during the
-                           * search */
+    ebpo_ray_sides sides; /* only hits of these sides of faces count */
+    double limit;         /* hits with a greater t are not needed; decreases during the search */
     bool done;            /* the search is complete */
     bool no_memory;
     uint64_t count;       /* number of hits that are kept */
@@ -67,15 +68,15 @@ static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 
 /* --- one ray through one accel --- */
 
-/* An origin with a coordinate in the frame beyond this multiple of the accel's largest coordinate
- * is moved along the ray towards the faces. */
+/* If a coordinate of the ray's origin, in the accel's frame, is greater than this multiple of the
+ * accel's largest coordinate, the origin is moved along the ray towards the faces. */
 static const double near_enough = 4;
-/* Used in place of infinity, because products of infinity and 0 would be NaN. */
+/* This value is used in place of infinity, because infinity times 0 is NaN. */
 #define BEYOND 0x1p100f
 
 /* --- limits --- */
 
-/* Returns t in the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
+/* Converts t to the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
  * to the moved origin. With `sign` 1, the result is at least the exact value; with -1, it is at
  * most the exact value. */
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
@@ -83,10 +84,11 @@ static float frame_t(const ebpo_ray_search *r, double t, int sign)
     double scaled = t * r->limit_scale;
     if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)BEYOND))
         return sign > 0 || t == INFINITY ? BEYOND : -1;
-    double rest = scaled - r->moved + sign * (0x1p-50 * (scaled + r->moved) + 0x1p-90);
-    return (float)(rest + sign * fabs(rest) * 0x1p-22);
+    double relative = scaled - r->moved + sign * (0x1p-50 * (scaled + r->moved) + 0x1p-90);
+    return (float)(relative + sign * fabs(relative) * 0x1p-22);
 }
 
+/* Lowers r->bound to r->limit. */
 static void lower_bound(ebpo_ray_search *r)
 {
     float bound = frame_t(r, r->limit, 1);
@@ -95,7 +97,7 @@ static void lower_bound(ebpo_ray_search *r)
 
 /* --- the ray in the frame --- */
 
-/* Returns the maximum without a call of fmax. */
+/* Returns the maximum, without a function call. */
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
 /* Scales a very long or very short direction by a power of two. This is done only if necessary,
@@ -128,10 +130,10 @@ static double to_frame(ebpo_ray_search *r)
     return greatest;
 }
 
-/* Sets *t to a value shortly before the ray enters the faces: where it enters the cube from -2
- * `largest` to 2 `largest`, if all coordinates of faces are at most `largest`. Returns false if the
- * ray misses the cube. The rounding error of *t is far smaller than the margin between faces and
- * cube. (An origin that is too far away for this is not moved: see ray_search_accel.) */
+/* Sets *t to a value shortly before the ray reaches the first faces: where it enters the cube from
+ * -2 * `largest` to 2 * `largest`. `largest`: upper bound of the faces' coordinates. Returns false
+ * if the ray misses the cube. The rounding error of *t is far smaller than the margin between faces
+ * and cube. (An origin that is too far away for this is not moved: see ray_search_accel.) */
 static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
 {
     double from = 0, to = INFINITY;
@@ -170,9 +172,10 @@ static bool move_origin(ebpo_ray_search *r, double *greatest)
     return true;
 }
 
-/* Sets a bound of the error of the origin in the frame. The origin is moved, transformed to the
- * frame and back to the model's unit, and split into floats; small coordinates of the direction are
- * replaced. Each step adds an error (docs/develop/bounds.md, "A ray against boxes"). */
+/* Sets a bound of the error of the origin in the frame. Several steps add an error: the origin is
+ * moved, transformed to the frame and back to the model's unit, and split into floats; and small
+ * coordinates of the direction are replaced (docs/develop/bounds.md, "A ray against boxes").
+ * `greatest`: the largest absolute coordinate of the origin. */
 static void set_error(ebpo_ray_search *r, double greatest)
 {
     const double *c = r->s->centre;
@@ -187,8 +190,8 @@ static void set_error(ebpo_ray_search *r, double greatest)
 
 /* --- candidates --- */
 
-/* Tests all candidates. If the first hit is wanted, the candidate with the least lower bound comes
- * first, because its hit may exclude others. */
+/* Tests all waiting candidates. If only the first hit is wanted, begins with the candidate with the
+ * least lower bound, because its hit may exclude other candidates. */
 static void judge_waiting(ebpo_ray_search *r)
 {
     while (r->count && !r->done) {
@@ -207,7 +210,7 @@ static void judge_waiting(ebpo_ray_search *r)
     r->count = 0;
 }
 
-/* Calls `decide` for every face that may matter, the most promising first. */
+/* Searches an accel: calls r->decide for every face that may be a wanted hit. */
 static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels,
                              const ebpo_accel *s)
 {
@@ -230,8 +233,9 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
         judge_waiting(r);
 }
 
-/* Returns true if the ray hits m->triangle from a side that counts; sets m->intersection. `facing`:
- * the face's side if it is already certain, because the line goes through the interior; else 0. */
+/* Returns true if the ray hits m->triangle from a side that counts (casting.sides); sets
+ * m->intersection. `facing`: the side, if it is already certain that the line goes through the
+ * face's interior; otherwise 0. */
 static bool casting_intersects(const casting *c, int facing, ebpo_ray_found *m)
 {
     const double(*triangle)[3] = (const double(*)[3])m->triangle;
@@ -253,6 +257,7 @@ static int compare_found(const void *a, const void *b, void *ray)
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
+/* Keeps a hit if it is the first one so far, and lowers the limit. */
 static void keep_first(casting *c, const ebpo_ray_found *m)
 {
     if (c->count && compare_found(m, &c->first, &c->ray) >= 0)
@@ -280,8 +285,8 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     }
 }
 
-/* Sorts hits. In most cases they are few and nearly in order, because the nearest boxes are visited
- * first. */
+/* Sorts hits. If there are few, sorts by insertion, which is fast because they are nearly in order:
+ * the nearest boxes are visited first. */
 static void sort_found(ebpo_ray_found *found, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
@@ -306,14 +311,13 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
     sort_found(k->unsorted_hits, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
-        if (i == 0 || k->unsorted_hits[i].file_face !=
-                          k->unsorted_hits[i - 1].file_face) /* subtrees share faces: a face may be
-                                                              * hit twice */
+        /* A face that several subtrees list may be hit several times. */
+        if (i == 0 || k->unsorted_hits[i].file_face != k->unsorted_hits[i - 1].file_face)
             k->hits[(*end)++] = hit_of(&k->unsorted_hits[i]);
     return EBPO_OK;
 }
 
-/* Finds the fault of a ray that ray_fault does not accept at once. */
+/* Returns the fault of a ray as ray_fault does; slower. */
 static const char *ray_fault_of(const ebpo_segment *ray)
 {
     double not_finite = 0, longest = 0; /* not_finite: 0, or NaN if a coordinate is not finite */
@@ -328,7 +332,7 @@ static const char *ray_fault_of(const ebpo_segment *ray)
     return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
 }
 
-/* Returns the end of an error message for an invalid ray; NULL: the ray is valid. */
+/* Returns NULL for a valid ray, otherwise the end of an error message ("the ray ..."). */
 static inline const char *ray_fault(const ebpo_segment *ray)
 {
     const double *o = ray->origin, *d = ray->direction;
@@ -376,6 +380,7 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     r->limit = c->limit;
 }
 
+/* Searches the faces of a subtree or of the whole model. */
 static void cast_subtree(casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
@@ -402,11 +407,13 @@ static bool intersects_cell(const casting *c, const ebpo_box *box, const ebpo_no
     return intersects_box(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
 }
 
+/* Returns true if a hit may be in the node's cell (ebpo_matters_fn). */
 static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
     return intersects_cell(user, box, node);
 }
 
+/* Searches all subtrees at or below a node. */
 static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
@@ -420,16 +427,17 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
         return status;
     }
     /* Visits the children in the order in which the ray enters their cells. */
-    unsigned turn = 0;
+    unsigned octant_mask = 0;
     for (int k = 0; k < 3; k++)
-        turn |= (unsigned)(c->ray.direction[k] < 0) << k;
+        octant_mask |= (unsigned)(c->ray.direction[k] < 0) << k;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < 8 && status == EBPO_OK; i++)
-        status = cast_node(c, box, ebpo_model_child(m, &node, i ^ turn), error);
+        status = cast_node(c, box, ebpo_model_child(m, &node, i ^ octant_mask), error);
     return status;
 }
 
-/* Visits every face that may matter to the ray. The ray is valid. */
+/* Finds the hits of a valid ray. In a subset, fails if a pruned node may have another wanted hit.
+ */
 static ebpo_status ray_walk(casting *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -503,13 +511,15 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
 
 /* --- many rays --- */
 
-/* Number of rays that a thread takes at a time. For a model that is loaded in parts, it is larger,
- * because neighbours on the curve need the same subtrees. */
+/* Number of rays that a thread takes at a time. If the model is loaded in parts, the rays are
+ * sorted along the Morton curve, and a thread takes more rays, because neighbours on the curve need
+ * the same subtrees. */
 enum { RAYS_AT_A_TIME = 128, RAYS_ALONG_CURVE = 1024 };
 
-/* The hits of a ray, before they are gathered: a range of `hits` in the context of a worker. */
+/* The hits of a ray, before they are gathered: hits[begin .. end - 1] in the context of a thread.
+ */
 typedef struct found {
-    unsigned worker;
+    unsigned worker; /* index of the thread */
     uint64_t begin, end;
 } found;
 
@@ -520,12 +530,12 @@ typedef struct batch {
     ebpo_ray_wants wants;
     unsigned threads;
     ebpo_context **context; /* [threads] the first one is the caller's context */
-    uint64_t *held;         /* [threads] number of hits in each context, if all hits are wanted */
-    double *entry;          /* [count][3] points where rays enter the model's box, in the order of
+    uint64_t *hit_count;    /* [threads] EBPO_WANTS_ALL: number of hits in each context */
+    double *entry;          /* [work][3] points where rays enter the model's box, in the order of
                              * work */
-    uint64_t work;          /* number of rays to compute */
+    uint64_t work;          /* number of rays to evaluate */
     uint64_t *order;        /* [work] indices of rays in the order of work; NULL: the given order */
-    /* results, [count] each; `wants` decides which of the three is used */
+    /* [count] results; `wants` decides which of the three arrays is used */
     ebpo_ray_hit *first;
     bool *any;
     found *all;
@@ -533,6 +543,7 @@ typedef struct batch {
 
 /* --- a ray of many --- */
 
+/* Evaluates ray i, and stores its result. */
 static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
     casting c;
@@ -547,14 +558,15 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ebpo_error *e
     else if (b->wants == EBPO_WANTS_ANY)
         b->any[i] = c.count;
     else {
-        found f = { .worker = worker, .begin = b->held[worker] };
+        found f = { .worker = worker, .begin = b->hit_count[worker] };
         status = casting_sort(&c, f.begin, &f.end, error);
-        b->held[worker] = f.end;
+        b->hit_count[worker] = f.end;
         b->all[i] = f;
     }
     return status;
 }
 
+/* Evaluates the rays begin .. end - 1 in the order of work. */
 static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -579,8 +591,8 @@ static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned
 
 /* --- the order of work --- */
 
-/* Sets the approximate point where the ray enters the box. If the origin is inside, or the ray
- * misses the box, sets the origin. */
+/* Sets `out` to the approximate point where the ray enters the box. If the origin is in the box, or
+ * the ray misses the box, the point is near the origin, within the box. */
 static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
 {
     double from = 0;
@@ -595,8 +607,8 @@ static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
     }
 }
 
-/* Chooses the order of work, without completed rays. Without memory for it, the rays are processed
- * in the given order. */
+/* Sorts the rays that are not completed along the Morton curve. If there is no memory for this, the
+ * rays are evaluated in the given order. */
 static void put_in_order(batch *b, const ebpo_model *m)
 {
     ebpo_box box = ebpo_model_box(m);
@@ -639,16 +651,17 @@ ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error
     return EBPO_OK;
 }
 
-static ebpo_status make_contexts(batch *b, ebpo_context *own, ebpo_error *error)
+/* Makes a context for each thread; the first thread uses the caller's context. */
+static ebpo_status make_contexts(batch *b, ebpo_context *callers, ebpo_error *error)
 {
     b->context = ebpo_alloc_zero(b->threads, sizeof *b->context);
-    b->held = ebpo_alloc_zero(b->threads, sizeof *b->held);
-    if (!b->context || !b->held)
+    b->hit_count = ebpo_alloc_zero(b->threads, sizeof *b->hit_count);
+    if (!b->context || !b->hit_count)
         return ebpo_fail_memory(error, b->threads * sizeof *b->context);
-    b->context[0] = own;
+    b->context[0] = callers;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 1; i < b->threads && status == EBPO_OK; i++)
-        status = ebpo_context_new(own->model, &b->context[i], error);
+        status = ebpo_context_new(callers->model, &b->context[i], error);
     return status;
 }
 
@@ -657,12 +670,13 @@ static void clear_batch(batch *b)
     for (unsigned i = 1; b->context && i < b->threads; i++)
         ebpo_context_free(b->context[i]);
     free(b->context);
-    free(b->held);
+    free(b->hit_count);
     free(b->entry);
     free(b->order);
     free(b->all);
 }
 
+/* Checks the arguments, and evaluates all rays. */
 static ebpo_status cast_all(batch *b, ebpo_context *context, const ebpo_ray_options *options,
                             ebpo_error *error)
 {

@@ -1,7 +1,7 @@
-/* Samples attributes at points on faces. Attributes of vertices are interpolated at the point's
- * position on its face; attributes of faces are returned as stored.
+/* Samples attributes (such as temperatures) at points on faces. Attributes of vertices are
+ * interpolated at the point's position on its face; attributes of faces are returned as stored.
  *
- * A sampler reads the requested columns once, and then serves any number of points. ebpo/query.h
+ * A sampler reads the requested columns once, and then evaluates any number of points. ebpo/query.h
  * documents the exactness of results. */
 #include "core/strict_fp.h"
 
@@ -24,15 +24,16 @@ typedef struct sampled {
     const ebpo_attribute *head; /* attribute of the file */
     unsigned array, column;     /* index of the attribute in the file; index of its column */
     bool of_vertices;           /* the attribute belongs to vertices; false: to faces */
-    bool owner;                 /* this item frees `values`, which later items may use, too */
+    bool owner;                 /* this item must free `values`; later items may refer to them */
     ebpo_attribute_values values;
 } sampled;
 
 struct ebpo_sampler {
     const ebpo_file *file;
     ebpo_mesh mesh;      /* read if any attribute belongs to vertices; else empty */
-    uint32_t *file_face; /* [source_indices] file index of each source face; UINT32_MAX: the file
-                          * does not have the face; NULL: both indices are the same */
+    uint32_t *file_face; /* [source_indices] file index of each face of the source (the mesh that
+                          * was converted); UINT32_MAX: the file does not have the face; NULL: both
+                          * indices are the same */
     uint64_t source_indices; /* greatest source index of a face, plus 1 */
     unsigned count;
     sampled item[EBPO_SAMPLER_MAX];
@@ -40,13 +41,13 @@ struct ebpo_sampler {
 
 /* --- choice of attributes --- */
 
-/* A requested column: `text` is NAME or ELEMENT:NAME, in a longer string. */
+/* A requested column: NAME or ELEMENT:NAME. The three texts are within a longer string. */
 typedef struct wanted {
     const char *text, *element, *name;
     size_t bytes, element_bytes, name_bytes; /* element_bytes 0: any element */
 } wanted;
 
-/* Splits the text up to the next comma, or to the end. */
+/* Parses the requested column at the beginning of the text, up to the next comma or to the end. */
 static wanted next_wanted(const char *text)
 {
     wanted w = { .text = text, .bytes = strcspn(text, ",") };
@@ -58,7 +59,7 @@ static wanted next_wanted(const char *text)
     return w;
 }
 
-/* Returns the number of the column with this name, or -1. */
+/* Returns the index of the column with this name, or -1. names: separated by blanks. */
 static int column_named(const char *names, const wanted *w)
 {
     for (int column = 0; *names; column++) {
@@ -101,7 +102,7 @@ static ebpo_status choose_columns(ebpo_sampler *s, const char *names, ebpo_error
         sampled item;
         if (!find_column(s->file, &w, "vertex", &item) && !find_column(s->file, &w, "face", &item))
             return ebpo_fail_file(error, EBPO_E_ABSENT, shown,
-                                  "vertices and faces have no attribute '%.*s', or it is a list; "
+                                  "vertices and faces have no attribute '%.*s' that is not a list; "
                                   "'ebpo info' lists the attributes of the file",
                                   (int)(w.bytes < 100 ? w.bytes : 100), w.text);
         if (s->count == EBPO_SAMPLER_MAX)
@@ -211,9 +212,9 @@ unsigned ebpo_sampler_columns(const ebpo_sampler *s) { return s->count; }
 
 /* --- weights --- */
 
-static double clamp_to(double v, double least, double most)
+static double clamp_to(double v, double least, double greatest)
 {
-    return v < least ? least : v > most ? most : v;
+    return v < least ? least : v > greatest ? greatest : v;
 }
 
 /* Returns the exponent of the largest absolute value of `count` numbers; 0 if all are 0. */
@@ -245,7 +246,8 @@ static void edges_of(const double corner[3][3], const double p[3], double e[3][3
     scale_by_power(e[0], 9, -greatest_exponent(e[0], 6));
 }
 
-/* Computes weights by the position along the longest edge, for a face without area. */
+/* Computes weights for a face without area, by the position along the longest edge. e: as from
+ * edges_of. */
 static void weigh_edge(const double e[3][3], double weight[3])
 {
     static const int from[3] = { 0, 0, 1 }, to[3] = { 1, 2, 2 };
@@ -310,6 +312,7 @@ static void corners_of(const ebpo_mesh *mesh, const uint32_t *face, double corne
         }
 }
 
+/* Returns the value of a column in the row of a vertex or face. */
 static double value_of(const sampled *item, uint64_t row)
 {
     const uint8_t *values = item->values.values;
@@ -318,6 +321,7 @@ static double value_of(const sampled *item, uint64_t row)
                                  item->head->type);
 }
 
+/* Computes all requested values at a point of face f (file index). */
 static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3], double *out)
 {
     const uint32_t *face = s->mesh.faces ? s->mesh.faces + 3 * f : NULL;
@@ -337,13 +341,13 @@ static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3]
 
 /* Converts a source index of a face to its index in the file. Returns UINT64_MAX if the file does
  * not have the face. */
-static uint64_t face_in_file(const ebpo_sampler *s, uint64_t number)
+static uint64_t face_in_file(const ebpo_sampler *s, uint64_t source_face)
 {
-    if (number >= s->source_indices)
+    if (source_face >= s->source_indices)
         return UINT64_MAX;
-    return !s->file_face                        ? number
-           : s->file_face[number] == UINT32_MAX ? UINT64_MAX
-                                                : s->file_face[number];
+    return !s->file_face                             ? source_face
+           : s->file_face[source_face] == UINT32_MAX ? UINT64_MAX
+                                                     : s->file_face[source_face];
 }
 
 ebpo_status ebpo_sample(const ebpo_sampler *s, const double *points, const uint64_t *faces,

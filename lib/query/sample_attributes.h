@@ -1,8 +1,9 @@
-/* Weights of a face's corners at a point of the face. */
+/* Interpolates values of a face's corners at a point of the face. */
 #ifndef EBPO_QUERY_SAMPLE_ATTRIBUTES_H
 #define EBPO_QUERY_SAMPLE_ATTRIBUTES_H
 
-/* Computes the weights of the three corners at the point p: >= 0, with the sum 1. */
+/* Computes the weights of the three corners at the point p. Weights are at least 0; their sum is 1.
+ */
 void ebpo_weigh_corners(const double corner[3][3], const double p[3], double weight[3]);
 
 /* Returns the weighted mean of three values. The result is between the values, also after rounding.

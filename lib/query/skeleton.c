@@ -1,10 +1,14 @@
-/* Makes skeletons, which bound the distance to the faces of subtrees that are not in memory.
+/* Makes skeletons, which give lower bounds of the distance to the faces of subtrees that are not in
+ * memory.
  *
- * The skeleton of a subtree has the upper nodes of the subtree's hierarchy over faces, eight at
- * first. It is made when the subtree is loaded; later searches load the subtree again only if it
- * may matter. When a search has loaded a subtree without need, nodes near the query point are
- * added. All skeletons together stay within their share of the budget. They give lower bounds only
- * (model_parts.h has the reason). Any thread may use a skeleton, also while it grows. */
+ * The skeleton of a subtree has the upper nodes of the subtree's hierarchy over blocks of faces
+ * (accel.h), eight at first. It is made when the subtree is loaded. Later searches load the subtree
+ * again only if the lower bound from its skeleton is within the search's limit. If a search has
+ * loaded a subtree and found no near face in it, nodes near the query point are added to the
+ * skeleton. All skeletons together stay within their share of the budget. Skeletons give lower
+ * bounds only (model_parts.h has the reason). Any thread may use a skeleton, also while it grows.
+ *
+ * A subtree owns some of its faces; its shared faces are owned by other subtrees (accel.h). */
 #include "core/strict_fp.h"
 
 #include "query/model_parts.h"
@@ -18,24 +22,27 @@
 
 #include "core/alloc.h"
 
+/* A node of a skeleton. */
 typedef struct kept_node {
-    /* A child is a block (EBPO_IS_BLOCK), a node of the skeleton (IS_KEPT and its number), or a
-     * node of the subtree's hierarchy (its number there) that the skeleton does not have. */
+    /* A child in bound.child is a block (EBPO_IS_BLOCK), a node of the skeleton (IS_KEPT + its
+     * index in the skeleton), or a node that the skeleton does not have (its index in the subtree's
+     * hierarchy). */
     ebpo_bound bound;
     ebpo_bound_cylinder cylinder;
 } kept_node;
 
-/* Nodes are allocated in parts of PART_NODES nodes. GROWN_AT_ONCE: maximum number of nodes that are
- * added at a time. */
+/* Nodes are allocated in parts of PART_NODES nodes; the first part may be smaller. GROWN_AT_ONCE:
+ * maximum number of nodes that ebpo_skeleton_grow adds. */
 enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES, GROWN_AT_ONCE = 8 };
 #define IS_KEPT UINT32_C(0x40000000)
 
 struct ebpo_skeleton {
     double centre[3], scale; /* frame of the subtree */
-    unsigned count, first;   /* number of nodes; capacity of the first part */
-    uint8_t owned, shared;   /* a bit for each child of node 0 that has owned faces, shared faces;
-                              * no child has both */
-    kept_node *_Atomic part[PARTS];
+    unsigned count, first;   /* number of nodes; capacity of the first part, in nodes */
+    /* Masks of the children of node 0 (the root of the hierarchy): children with owned faces, and
+     * children with shared faces. No child has both. */
+    uint8_t owned, shared;
+    kept_node *_Atomic part[PARTS]; /* NULL: not allocated yet */
 };
 
 static kept_node *node_at(const ebpo_skeleton *k, uint32_t number)
@@ -44,28 +51,29 @@ static kept_node *node_at(const ebpo_skeleton *k, uint32_t number)
            number % PART_NODES;
 }
 
-/* Returns a child. Another thread may add the child's node to the skeleton at the same time. */
+/* Returns a child. Another thread may be adding the child's node to the skeleton at the same time.
+ */
 static uint32_t child_of(const kept_node *n, int lane)
 {
     return __atomic_load_n(&n->bound.child[lane], __ATOMIC_ACQUIRE);
 }
 static bool is_kept(uint32_t child) { return (child & (IS_KEPT | EBPO_IS_BLOCK)) == IS_KEPT; }
 
-/* Limits of the frame's scale and of coordinates in the frame: within them, squares and results are
- * far from overflow and underflow of doubles. */
+/* Limits of the frame's scale and of coordinates in the frame. Within these limits, squares and
+ * results neither overflow nor underflow. */
 static const double scale_max = 0x1p500, coordinate_max = 0x1p200;
 
 static uint64_t part_bytes(unsigned nodes) { return nodes * (uint64_t)sizeof(kept_node); }
 uint64_t ebpo_skeleton_bytes(unsigned nodes) { return sizeof(ebpo_skeleton) + part_bytes(nodes); }
 
-/* Adds the node of a child. `place`: the entry of the child in its parent. */
-static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
+/* Adds the node of a child to the skeleton. `entry`: the child in bound.child of its parent. */
+static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *entry)
 {
-    uint32_t number = k->count++;
-    kept_node *n = node_at(k, number);
-    n->bound = s->bound[*place];
-    n->cylinder = s->cylinder[*place];
-    __atomic_store_n(place, IS_KEPT | number, __ATOMIC_RELEASE);
+    uint32_t index = k->count++;
+    kept_node *n = node_at(k, index);
+    n->bound = s->bound[*entry];
+    n->cylinder = s->cylinder[*entry];
+    __atomic_store_n(entry, IS_KEPT | index, __ATOMIC_RELEASE);
 }
 
 static double squared_diagonal(const ebpo_bound *b, int lane)
@@ -78,7 +86,7 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
     return sum;
 }
 
-/* Returns true if the faces below a child of the topmost node are shared. (Below such a child,
+/* Returns true if the faces below a child of the hierarchy's root are shared. (Below such a child,
  * either all faces are shared or all are owned: blocks.c.) */
 static bool is_shared(const ebpo_accel *s, uint32_t child)
 {
@@ -87,6 +95,7 @@ static bool is_shared(const ebpo_accel *s, uint32_t child)
     return ebpo_accel_slot_face(s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK) < s->shared_count;
 }
 
+/* Sets k->owned and k->shared. */
 static void record_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
     const ebpo_bound *top = &s->bound[s->root_bound];
@@ -97,8 +106,8 @@ static void record_kinds(ebpo_skeleton *k, const ebpo_accel *s)
             k->owned |= (uint8_t)(1u << lane);
 }
 
-/* Adds the nodes of children of the topmost node with shared faces. Small boxes around shared faces
- * are needed to find the subtrees that own them. */
+/* Adds the nodes of those children of the root that have shared faces, because small boxes around
+ * shared faces are needed to find the subtrees that own them. */
 static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
 {
     kept_node *top = node_at(k, 0);
@@ -107,28 +116,28 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
             keep_child(k, s, &top->bound.child[lane]);
 }
 
-/* Adds the node of the largest child with owned faces whose node is not in the skeleton, because
- * its box is the loosest. Returns false if there is none. `shared_end`: number of the first node
+/* Adds the node of the largest child with owned faces that is not in the skeleton: its node
+ * improves the bounds most. Returns false if there is none. `shared_end`: index of the first node
  * after the nodes of shared faces. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t shared_end)
 {
     double largest = -1;
-    uint32_t *place = NULL;
-    for (uint32_t number = 0; number < k->count; number += number ? 1 : shared_end) {
-        ebpo_bound *b = &node_at(k, number)->bound;
+    uint32_t *entry = NULL;
+    for (uint32_t index = 0; index < k->count; index += index ? 1 : shared_end) {
+        ebpo_bound *b = &node_at(k, index)->bound;
         for (int lane = 0; lane < b->count; lane++) {
             bool can_be_added =
-                !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->owned >> lane & 1);
+                !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (index || k->owned >> lane & 1);
             double size = can_be_added ? squared_diagonal(b, lane) : -1;
             if (size > largest) {
                 largest = size;
-                place = &b->child[lane];
+                entry = &b->child[lane];
             }
         }
     }
-    if (place)
-        keep_child(k, s, place);
-    return place != NULL;
+    if (entry)
+        keep_child(k, s, entry);
+    return entry != NULL;
 }
 
 ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
@@ -136,8 +145,8 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     if (s->bound_count == 0 || !(s->scale <= scale_max && s->scale >= 1 / scale_max))
         return NULL;
     ebpo_skeleton *k = ebpo_alloc_zero(1, sizeof *k);
-    unsigned most = s->bound_count < nodes ? s->bound_count : nodes;
-    kept_node *first = k ? aligned_alloc(64, part_bytes(most)) : NULL;
+    unsigned node_count = s->bound_count < nodes ? s->bound_count : nodes;
+    kept_node *first = k ? aligned_alloc(64, part_bytes(node_count)) : NULL;
     if (!first) {
         free(k);
         return NULL;
@@ -145,12 +154,12 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     memcpy(k->centre, s->centre, sizeof k->centre);
     k->scale = s->scale;
     k->part[0] = first;
-    k->first = most;
+    k->first = node_count;
     uint32_t top = s->root_bound;
     keep_child(k, s, &top);
     record_kinds(k, s);
     keep_shared(k, s);
-    for (uint32_t shared_end = k->count; k->count < most && keep_largest(k, s, shared_end);)
+    for (uint32_t shared_end = k->count; k->count < node_count && keep_largest(k, s, shared_end);)
         ;
     return k;
 }
@@ -164,9 +173,10 @@ void ebpo_skeleton_free(ebpo_skeleton *k)
 
 /* --- bounds --- */
 
-/* Factor for rounding. Near the point, the enlargement of boxes and cylinders covers the rounding
- * errors of doubles. Elsewhere these errors are below 2^-45 of the distance, which this factor
- * covers (docs/develop/bounds.md, "Points against skeletons"). */
+/* A factor that makes distances lower bounds despite rounding. Near the point, the enlargement of
+ * boxes and cylinders covers the rounding errors of doubles. Elsewhere these errors are below 2^-45
+ * of the distance, which this factor covers (docs/develop/bounds.md, "Points against skeletons").
+ */
 static const double certainly = 1 - 0x1p-40;
 
 /* Returns a squared lower bound of the distance to a cylinder, as in nearest_kernels.c. `to` is the
@@ -179,7 +189,7 @@ static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3
         square += to[k] * to[k];
     }
     double over = fmax(fmax(cylinder->from - along, along - cylinder->to), 0);
-    /* the factor makes the root of a small difference of large squares a lower bound */
+    /* Because of the factor, the root of a small difference of large squares is a lower bound. */
     double aside2 = fmax(square * (1 - 0x1p-48) - along * along, 0);
     double aside = fmax(sqrt(aside2) - cylinder->radius, 0);
     return aside * aside + over * over;
@@ -202,6 +212,7 @@ static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
         }
 }
 
+/* Returns a squared lower bound of the distance to a child, from its bounding cylinder. */
 static double by_child_cylinder(const kept_node *n, int lane, const double p[3])
 {
     double to[3];
@@ -213,19 +224,21 @@ static double by_child_cylinder(const kept_node *n, int lane, const double p[3])
     return by_cylinder(&cylinder, to);
 }
 
-/* The nearest child whose node is not in the skeleton. */
-typedef struct nearest_place {
+/* The nearest child whose node is not in the skeleton (nearest_child.entry, see keep_child), and
+ * its squared lower bound. The bound is a lower bound for all faces below the searched nodes. */
+typedef struct nearest_child {
     double lower2;
-    uint32_t *place;
-} nearest_place;
+    uint32_t *entry; /* NULL: none found */
+} nearest_child;
 
-/* Searches, below the children of a node in `lanes`, for the nearest child whose node is not in the
- * skeleton, nearer than `best`. Visits the nearest child first; tests its bounding cylinder only if
- * its box is near enough. `parent`: squared bound of the node. */
-static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
-                         double parent, nearest_place *best)
+/* Searches, at or below the children `lanes` of a node, for a child whose node is not in the
+ * skeleton and which is nearer than *best. Visits the nearest child first; tests its bounding
+ * cylinder only if its box is near enough. `index`: of the node in the skeleton. `parent`: squared
+ * bound of the node. */
+static void search_below(const ebpo_skeleton *k, uint32_t index, unsigned lanes, const double p[3],
+                         double parent, nearest_child *best)
 {
-    kept_node *n = node_at(k, number);
+    kept_node *n = node_at(k, index);
     double lower2[8];
     unsigned tested = 0; /* lanes whose bound includes the cylinder */
     by_boxes(&n->bound, p, lower2);
@@ -247,7 +260,7 @@ static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes
         if (is_kept(child))
             search_below(k, child & ~IS_KEPT, 255, p, lower2[lane], best);
         else
-            *best = (nearest_place){ lower2[lane], &n->bound.child[lane] };
+            *best = (nearest_child){ lower2[lane], &n->bound.child[lane] };
     }
 }
 
@@ -271,14 +284,14 @@ static double frame_limit2(const ebpo_skeleton *k, double limit)
     return local < coordinate_max ? local * local * (1 + 0x1p-38) + DBL_MIN : INFINITY;
 }
 
-/* Returns a lower bound of the distance to the faces below the children of the topmost node in
- * `lanes`; INFINITY: there are none within the limit. */
+/* Returns a lower bound of the distance to the faces below the children `lanes` of the root;
+ * INFINITY: there are no faces within the limit. */
 static double lower_bound(const ebpo_skeleton *k, unsigned lanes, const double p[3], double limit2)
 {
-    nearest_place best = { limit2, NULL };
+    nearest_child best = { limit2, NULL };
     if (lanes)
         search_below(k, 0, lanes, p, 0, &best);
-    return best.place ? sqrt(best.lower2) * certainly / k->scale : INFINITY;
+    return best.entry ? sqrt(best.lower2) * certainly / k->scale : INFINITY;
 }
 
 ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *k, const double point[3],
@@ -297,12 +310,13 @@ typedef struct far_search {
     const ebpo_skeleton *skeleton;
     const ebpo_far *far;
     ebpo_far_frame frame;
-    double best;
+    double best; /* least lower bound so far of a child whose node is not in the skeleton; a key */
 } far_search;
 
-static void search_below_far(far_search *g, uint32_t number, unsigned lanes)
+/* Does the same as search_below, with keys (point_bounds.h). */
+static void search_below_far(far_search *g, uint32_t index, unsigned lanes)
 {
-    const kept_node *n = node_at(g->skeleton, number);
+    const kept_node *n = node_at(g->skeleton, index);
     double lower[8];
     ebpo_far_boxes(g->far, &g->frame, &n->bound, lower);
     for (int lane = 0; lane < n->bound.count; lane++) {
@@ -335,7 +349,7 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
 }
 
 /* Makes space for another node: allocates the next part of nodes if needed. Returns false if the
- * skeleton has its maximum size, or without memory. */
+ * skeleton has its maximum size, or if there is no memory. `take`: as for ebpo_skeleton_grow. */
 static bool reserve_node(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
 {
     unsigned part = k->count / PART_NODES;
@@ -357,11 +371,11 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
     if (!k->owned || !to_frame(k, point, p))
         return;
     for (int added = 0; added < GROWN_AT_ONCE; added++) {
-        nearest_place best = { limit2, NULL };
+        nearest_child best = { limit2, NULL };
         search_below(k, 0, k->owned, p, 0, &best);
-        if (!best.place || *best.place & EBPO_IS_BLOCK || !reserve_node(k, take, user))
+        if (!best.entry || *best.entry & EBPO_IS_BLOCK || !reserve_node(k, take, user))
             return;
-        keep_child(k, s, best.place);
+        keep_child(k, s, best.entry);
     }
 }
 
@@ -378,14 +392,14 @@ static ebpo_shared_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int l
     return out;
 }
 
-/* Writes the boxes of those children of a node, and of nodes of the skeleton below it, that may be
- * within the limit and whose own nodes are not in the skeleton. Returns their number. */
-static unsigned boxes_of(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
+/* Writes the boxes of all children, at or below the children `lanes` of a node, that may be within
+ * the limit and whose nodes are not in the skeleton. Returns their number. */
+static unsigned boxes_of(const ebpo_skeleton *k, uint32_t index, unsigned lanes, const double p[3],
                          double limit2, ebpo_shared_box out[])
 {
     unsigned count = 0;
     double lower2[8];
-    const kept_node *n = node_at(k, number);
+    const kept_node *n = node_at(k, index);
     by_boxes(&n->bound, p, lower2);
     for (int lane = 0; lane < n->bound.count; lane++) {
         if (!(lanes >> lane & 1) || lower2[lane] > limit2 || by_child_cylinder(n, lane, p) > limit2)
@@ -409,20 +423,21 @@ unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *k, const double point[3
 
 /* --- the skeletons of a model --- */
 
-/* Initial number of nodes of each skeleton, if the quota allows it for all. */
+/* Initial number of nodes of each skeleton, if the quota is sufficient for all skeletons. */
 enum { BEGIN_NODES = PART_NODES };
 
 struct ebpo_skeletons {
-    uint64_t count, space;
-    ebpo_cache *cache;    /* the cache whose budget is used, or NULL */
-    unsigned nodes;       /* initial number of nodes of each skeleton */
-    pthread_mutex_t lock; /* protects the changing fields; searches do not wait for it */
-    uint64_t missing;     /* number of subtrees without a skeleton */
+    uint64_t count, space; /* number of subtrees; quota in bytes */
+    ebpo_cache *cache;     /* the cache whose budget is used, or NULL */
+    unsigned nodes;        /* initial number of nodes of each skeleton */
+    pthread_mutex_t lock;  /* protects the changing fields; searches do not wait for it */
+    uint64_t missing;      /* number of subtrees without a skeleton */
     _Atomic uint64_t bytes;
     _Atomic(ebpo_skeleton *) of[]; /* [count] NULL: none */
 };
 
-static uint64_t frame_bytes(uint64_t count)
+/* Returns the bytes of the table without skeletons. */
+static uint64_t table_bytes(uint64_t count)
 {
     return sizeof(ebpo_skeletons) + count * sizeof(ebpo_skeleton *);
 }
@@ -431,28 +446,32 @@ static uint64_t frame_bytes(uint64_t count)
 static unsigned nodes_each(uint64_t count, uint64_t space)
 {
     unsigned nodes = BEGIN_NODES;
-    while (nodes > 1 && frame_bytes(count) + count * ebpo_skeleton_bytes(nodes) > space)
+    while (nodes > 1 && table_bytes(count) + count * ebpo_skeleton_bytes(nodes) > space)
         nodes--;
     return nodes;
 }
 
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space)
 {
-    uint64_t most = frame_bytes(count) + count * ebpo_skeleton_bytes(EBPO_SKELETON_NODES);
-    return space < frame_bytes(count) + ebpo_skeleton_bytes(1) ? 0 : space < most ? space : most;
+    uint64_t usable = table_bytes(count) + count * ebpo_skeleton_bytes(EBPO_SKELETON_NODES);
+    return space < table_bytes(count) + ebpo_skeleton_bytes(1) ? 0
+           : space < usable                                    ? space
+                                                               : usable;
 }
 
-/* Reserves bytes of the quota. `later`: bytes that must remain afterwards. */
-static bool reserve_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
+/* Reserves bytes of the quota. `reserve`: bytes that must still be free afterwards. Returns false
+ * if the quota is too small. */
+static bool reserve_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t reserve)
 {
-    if (all->bytes + bytes > all->space || all->space - all->bytes - bytes < later ||
+    if (all->bytes + bytes > all->space || all->space - all->bytes - bytes < reserve ||
         (all->cache && !ebpo_cache_take_aside(all->cache, bytes)))
         return false;
     all->bytes += bytes;
     return true;
 }
 
-/* Reserves bytes for growing; leaves the bytes of the initial nodes of all other skeletons. */
+/* Reserves bytes for a skeleton that grows. The bytes for the initial nodes of all skeletons that
+ * are not made yet stay free. */
 static bool reserve_more(void *user, uint64_t bytes)
 {
     ebpo_skeletons *all = user;
@@ -461,7 +480,7 @@ static bool reserve_more(void *user, uint64_t bytes)
 
 ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache)
 {
-    ebpo_skeletons *all = ebpo_alloc_zero(1, frame_bytes(count));
+    ebpo_skeletons *all = ebpo_alloc_zero(1, table_bytes(count));
     if (!all)
         return NULL;
     all->count = all->missing = count;
@@ -471,7 +490,7 @@ ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *
     pthread_mutex_init(&all->lock, NULL);
     if (cache)
         ebpo_cache_set_aside(cache, space);
-    if (reserve_capacity(all, frame_bytes(count), 0))
+    if (reserve_capacity(all, table_bytes(count), 0))
         return all;
     ebpo_skeletons_free(all);
     return NULL;
@@ -512,7 +531,7 @@ void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
         return;
     ebpo_skeleton *made = ebpo_skeleton_make(subtree, all->nodes);
     pthread_mutex_lock(&all->lock);
-    /* another thread may have loaded the same subtree at the same time, with planes */
+    /* Another thread may have loaded the same subtree at the same time (with planes). */
     if (made && !all->of[number] && reserve_capacity(all, ebpo_skeleton_bytes(made->first), 0)) {
         atomic_store_explicit(&all->of[number], made, memory_order_release);
         all->missing--;

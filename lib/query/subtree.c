@@ -1,11 +1,11 @@
 /* Reads a subtree as plain arrays, for ebpo/subtree.h.
  *
- * A node is found by its octcode (locational code). The subtree below it is read as a slice
- * (format/slice.h), if an upper bound of the memory, computed from counts, is within the caller's
- * limit. A slice has separate arrays for each type of node. From them, this file makes arrays with
- * a row for each node, arrays of faces, and the leaves' lists of faces. A single node can then be
- * described in the model's coordinates: the half-spaces that it inherits from all nodes above it,
- * and the polygons of its envelope. */
+ * A node is found by its octcode (locational code). If an upper bound of the memory, computed from
+ * counts, is within the caller's limit, the subtree at and below the node is read as a slice
+ * (format/slice.h). A slice has separate arrays for each type of node. From a slice, this file
+ * makes arrays with a row for each node, arrays of faces, and the leaves' lists of faces. A single
+ * node can then be described in the model's coordinates: its planes, the half-spaces that it
+ * inherits from all nodes above it, and the polygons of its envelope. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -29,10 +29,11 @@
 typedef struct subtree_scratch subtree_scratch; /* memory for describing a node */
 
 struct ebpo_subtree {
-    ebpo_box box;
+    ebpo_box box; /* the model's root cell */
     bool solid;
     ebpo_rule rule;
-    ebpo_node root;
+    ebpo_node root; /* of the subtree */
+    /* The names of arrays are those of ebpo_subtree_nodes and ebpo_subtree_faces. */
     int level_count;
     uint64_t level_first[EBPO_LEVELS_MAX + 1];
     uint64_t node_count;
@@ -52,8 +53,8 @@ struct ebpo_subtree {
     float *corners32;
     double *corners64;
     uint32_t *file_faces, *source, *list_first, *list;
-    uint64_t memory;
-    subtree_scratch *scratch; /* made for the first node that is described */
+    uint64_t memory;          /* bytes of the subtree */
+    subtree_scratch *scratch; /* NULL until the first node is described */
 };
 
 /* --- capacity --- */
@@ -71,7 +72,7 @@ static ebpo_status too_many(const char *what, ebpo_error *error)
                      "the subtree has more than 2^32 - 2 %s; open the subtrees below it", what);
 }
 
-/* Counts nodes by level, and all planes. */
+/* Counts the nodes of each level, and all planes. */
 static ebpo_status count_nodes(ebpo_subtree *s, const ebpo_slice *slice, uint64_t *planes,
                                ebpo_error *error)
 {
@@ -117,13 +118,13 @@ static ebpo_status reserve_space(ebpo_subtree *s, uint64_t planes, ebpo_error *e
 
 /* --- one level --- */
 
-/* Position in a level's arrays: the file_faces of nodes of each type, planes and leaf planes so
- * far.
- */
+/* Position in a level's arrays: how many nodes of each type, planes and leaf planes were copied. */
 typedef struct level_position {
     uint64_t rank[4], plane, leaf_plane;
 } level_position;
 
+/* Returns the stored winding number of a node. If the file stores none, the winding number is 1 for
+ * black nodes and 0 for other nodes. */
 static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t rank)
 {
     switch (type) {
@@ -134,7 +135,7 @@ static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t
     }
 }
 
-/* Copies the planes of the next gray node or leaf of its type. */
+/* Copies the planes of the next node of this type. `node`: the node's index in the subtree. */
 static void copy_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
                         level_position *at, uint64_t node)
 {
@@ -155,6 +156,7 @@ static void copy_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type
     s->plane_first[node + 1] = next + count;
 }
 
+/* Copies the next node of this type as node number `node` of the subtree, without its children. */
 static void add_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
                      uint64_t octcode, level_position *at, uint64_t node)
 {
@@ -189,7 +191,7 @@ static void copy_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
     }
 }
 
-/* Copies nodes, winding file_faces and planes from the slice. */
+/* Copies nodes, winding numbers and planes from the slice. */
 static ebpo_status copy_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t planes;
@@ -209,8 +211,9 @@ static ebpo_status copy_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_err
 
 /* --- faces --- */
 
-/* Copies a leaf's list: its references, then its new faces, which have greater indices. *ref:
- * position in the level's references; *next: position in s->list. */
+/* Copies a leaf's list: first its references (faces that an earlier leaf lists, too), then its new
+ * faces, which have greater indices. *ref: position in the level's references; *next: position in
+ * s->list. */
 static void copy_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, uint64_t *ref,
                       uint64_t *next)
 {
@@ -342,7 +345,8 @@ ebpo_status ebpo_subtree_get_faces(const ebpo_subtree *s, ebpo_subtree_faces *ou
 struct subtree_scratch {
     ebpo_envelope_stack envelopes;
     ebpo_polytope leaf; /* envelope of a leaf, cut by derived planes */
-    ebpo_node_buffers lent;
+    ebpo_node_buffers
+        buffers; /* arrays of the described node, to which the caller's result refers */
     double inherited[EBPO_HALF_SPACES_MAX][4];
     ebpo_triangle *faces; /* faces of the leaf that is described */
     uint64_t face_capacity;
@@ -358,7 +362,7 @@ static void subtree_free_scratch(subtree_scratch *scratch)
 /* --- the path from the tree's root to a node --- */
 
 /* Returns the planes of the node at this level on the path from the tree's root to `octcode`. If
- * the node is in the subtree, *node must be its number, and is set to the number of the path's next
+ * the node is in the subtree, *node must be its index, and becomes the index of the path's next
  * node. */
 static const uint32_t *planes_on_path(const ebpo_subtree *s, uint64_t octcode, int level,
                                       uint64_t *node, uint32_t *count)
@@ -380,7 +384,7 @@ static const uint32_t *planes_on_path(const ebpo_subtree *s, uint64_t octcode, i
     return s->planes + s->plane_first[at];
 }
 
-/* Sets the half-spaces of all nodes above the node, in the model's coordinates. */
+/* Sets out->inherited: the half-spaces of all nodes above the node, in the model's coordinates. */
 static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
@@ -398,8 +402,8 @@ static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *
     out->inherited = (const double(*)[4])s->scratch->inherited;
 }
 
-/* Returns the node's envelope, cut by the planes in the file only. (Planes that are derived from a
- * leaf's faces: derive_planes.) */
+/* Returns the node's envelope, cut only by planes that the file stores. (derive_planes cuts by
+ * planes that are derived from a leaf's faces.) */
 static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, ebpo_node_type type)
 {
     ebpo_envelope_stack *stack = &s->scratch->envelopes;
@@ -459,6 +463,7 @@ static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[
 
 /* --- description of a node --- */
 
+/* Describes node `number`; with `polygons`, also the polygons of its envelope. */
 static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons,
                                  ebpo_subtree_node *out, ebpo_error *error)
 {
@@ -466,6 +471,8 @@ static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons
     ebpo_node_type type = (ebpo_node_type)s->types[number];
     uint32_t derived[EBPO_PLANES_MAX], *codes = s->planes;
     unsigned count = 0;
+    /* derives: the leaf's planes are derived from its faces, because the file does not store them
+     */
     bool derives = type == EBPO_LEAF && !s->has_leaf_planes && !s->no_faces;
     ebpo_node_begin(&out->node, &s->box, octcode, type);
     out->node.winding = s->windings ? s->windings[number] : 0;
@@ -483,9 +490,9 @@ static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons
             return status;
         envelope = &s->scratch->leaf;
     }
-    ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->scratch->lent);
+    ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->scratch->buffers);
     if (polygons && envelope)
-        ebpo_node_add_polygons(&out->node, &s->box, envelope, &s->scratch->lent);
+        ebpo_node_add_polygons(&out->node, &s->box, envelope, &s->scratch->buffers);
     return EBPO_OK;
 }
 
@@ -499,8 +506,8 @@ ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygon
         return status;
     if (number >= s->node_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "there is no node with the number %" PRIu64 "; the subtree has %" PRIu64
-                         " nodes",
+                         "there is no node %" PRIu64 "; the subtree has %" PRIu64
+                         " nodes, counted from 0",
                          number, s->node_count);
     if (!s->scratch && !(s->scratch = ebpo_alloc_zero(1, sizeof *s->scratch)))
         return ebpo_fail_memory(error, sizeof *s->scratch);
@@ -510,6 +517,8 @@ ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygon
 
 /* --- the node of an octcode --- */
 
+/* Returns the error for an octcode at or below a white or black node, which is the cursor's node.
+ */
 static ebpo_status fail_uniform(const ebpo_chunks *chunks, uint64_t octcode, ebpo_cursor *c,
                                 ebpo_error *error)
 {
@@ -533,7 +542,8 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
 {
     const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
     ebpo_octcode found = ebpo_cursor_octcode(c);
-    ebpo_status status = ebpo_cursor_children(c, &child, error); /* finds if the node is pruned */
+    /* Only after its children have been requested, it is known if the node is pruned. */
+    ebpo_status status = ebpo_cursor_children(c, &child, error);
     if (status != EBPO_OK)
         return status;
     if (ebpo_node_is_uniform(node))
@@ -548,10 +558,12 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
                           "there is no node %" PRIu64 ": the tree ends above it, with leaf %" PRIu64
-                          "; open that leaf (or_leaf_above does)",
+                          "; open this leaf (the option or_leaf_above does this)",
                           octcode, found);
 }
 
+/* Moves the cursor to the node with an octcode or, with or_leaf_above, to the leaf that contains
+ * its cell. */
 static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf_above,
                              ebpo_cursor *c, ebpo_error *error)
 {
@@ -569,7 +581,7 @@ static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf
     return status == EBPO_OK ? check_found(chunks, octcode, or_leaf_above, c, error) : status;
 }
 
-/* Reads the planes of the nodes on the way to the subtree's root. */
+/* Reads the planes of the nodes above the subtree's root. */
 static ebpo_status read_planes_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error)
 {
     uint32_t codes[EBPO_NODE_PLANES];
@@ -591,8 +603,8 @@ static ebpo_status read_planes_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error
 
 /* --- memory --- */
 
-/* Limits of the bytes for decoded chunks while reading, which are a quarter of the caller's limit.
- */
+/* While the subtree is read, a quarter of the caller's memory is for decoded chunks, but at least
+ * CHUNKS_LEAST and at most CHUNKS_MAX bytes. */
 enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MAX = 32 << 20 };
 
 static uint64_t chunk_budget(uint64_t memory)
@@ -602,7 +614,7 @@ static uint64_t chunk_budget(uint64_t memory)
                                                   : memory / 4;
 }
 
-/* Returns the smallest limit that holds `bytes` beside the chunks. */
+/* Returns the least memory that the caller must allow for `bytes` bytes and the decoded chunks. */
 static uint64_t least_memory(uint64_t bytes)
 {
     if (bytes <= 3 * (uint64_t)CHUNKS_LEAST)
@@ -616,29 +628,29 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
                             bool corners)
 {
     enum {
-        /* bytes of each item */
-        NODE = 32,      /* of a node: octcode, type, winding, children, planes, list; winding
-                         * in the slice */
-        GROUP = 4,      /* of a group: types, plane counts */
-        LEAF = 24,      /* of a leaf: data of a level */
-        PLANE = 8,      /* of a plane: in the slice and in the subtree */
-        REFERENCE = 52, /* of a reference: in the slice, in the list, and in the table that numbers
-                         * the shared faces */
-        FACE = 24,      /* of a face: corners, number, number in the source, list */
-        OLDER = 36,     /* of each corner: the table that file_faces vertices of earlier faces */
-        ALWAYS = 1 << 20
+        /* bytes for each item */
+        NODE = 32,       /* node: octcode, type, winding, children, planes, list; and its winding in
+                          * the slice */
+        GROUP = 4,       /* group of siblings: types, plane counts */
+        LEAF = 24,       /* leaf: data of a level */
+        PLANE = 8,       /* plane: in the slice and in the subtree */
+        REFERENCE = 52,  /* reference: in the slice, in the list, and in the table that gives shared
+                          * faces local indices */
+        FACE = 24,       /* face: corners, index in the file, index in the source, list */
+        OLDER = 36,      /* corner: the table that gives vertices of earlier faces local indices */
+        ALWAYS = 1 << 20 /* bytes for all other memory */
     };
-    uint64_t number = info->double_coordinates ? sizeof(double) : sizeof(float),
+    uint64_t coordinate = info->double_coordinates ? sizeof(double) : sizeof(float),
              faces = size->new_faces + size->shared,
              vertices = 3 * faces < info->vertex_count ? 3 * faces : info->vertex_count;
     return ALWAYS + size->groups * (8 * NODE + GROUP) + size->leaves * LEAF + size->planes * PLANE +
-           size->refs * REFERENCE + faces * (FACE + (corners ? 9 * number : 0)) +
-           (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * number;
+           size->refs * REFERENCE + faces * (FACE + (corners ? 9 * coordinate : 0)) +
+           (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * coordinate;
 }
 
-/* Counts the references to faces that precede the subtree's faces in the file: an upper bound of
- * the number of shared faces. (Most references are to faces that the subtree owns, so the number of
- * all references would be a much greater bound.) Reads the lists. */
+/* Counts the references to faces before the first face that the subtree owns, which is an upper
+ * bound of the number of shared faces. (Most references are to owned faces, so the number of all
+ * references would be a much greater bound.) Reads the leaves' lists. */
 static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *shared,
                                 ebpo_error *error)
 {
@@ -660,6 +672,7 @@ static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint
     return EBPO_OK;
 }
 
+/* Fails if the subtree may take more memory than the options allow. */
 static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint32_t needs,
                                 const ebpo_subtree_options *o, ebpo_error *error)
 {
@@ -689,7 +702,7 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
 
 /* --- reading --- */
 
-/* Returns the parts of the file that must be read; sets s->no_faces. */
+/* Returns the data of the file that must be read (EBPO_NEEDS_...); sets s->no_faces. */
 static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uint32_t parts)
 {
     uint32_t most = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES,

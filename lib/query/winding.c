@@ -1,5 +1,5 @@
-/* Computes winding numbers of points: integers for solids, bounds of real numbers for surfaces with
- * holes. */
+/* Computes winding numbers of points. For a solid they are integers; for a surface with holes, the
+ * winding number is a real number, and bounds of it are returned. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,8 +19,9 @@ ebpo_status ebpo_winding(ebpo_context *context, const double *points, uint64_t c
         status = ebpo_fail(error, EBPO_E_ARGUMENT, "width %g is invalid; give 0 or more", width);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_bounded w = { 0, 0 };
-        bool apart = true;
+        bool apart = true; /* the point is on no face */
         ebpo_inside_result r;
+        /* For a surface, r.winding becomes the winding number of surface and caps. */
         context->undecided = m->holes != NULL;
         status = ebpo_inside(context, points + 3 * i, NULL, &r, error);
         context->undecided = false;
