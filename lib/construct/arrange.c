@@ -1,12 +1,13 @@
 /* Sorts a mesh's vertices and faces along a Morton curve. Afterwards, the vertices of every cell
- * are one contiguous range, and neighbours in space are neighbours in memory.
+ * are one contiguous range, and neighbours in space are mostly neighbours in memory.
  *
- * The curve's box is chosen first: every cell face has to be exact in doubles, at every level in
- * use. Vertices are sorted by the octcode of their cell and, within a cell, by position, so that
- * equal positions are neighbours; vertices without faces come after the others. Faces are sorted by
- * their least vertex. Sorting uses the mesh's workspace, so that meshes larger than memory are
- * sorted too. The order of the source is kept in the mesh's arrangement. The result depends on the
- * mesh alone, not on the number of threads. */
+ * The root box of the grid is chosen first: every cell face has to be exact in doubles, at every
+ * level in use. Vertices are sorted by the octcode of their cell (the cell's position on the curve)
+ * and, within a cell, by position, so that equal positions are neighbours. Vertices without faces
+ * ("unreferenced") come after the others. Faces are sorted by the least of their vertices' new
+ * indices. Sorting uses the mesh's workspace (arrays in files), so that meshes larger than memory
+ * are sorted too. The mesh's arrangement stores the source index of each vertex and face. The
+ * result depends on the mesh alone, not on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,23 +23,27 @@
 #include "geometry/cells.h"
 #include "mesh/mesh_parts.h"
 
-enum { GRAIN = 1 << 15 };
+enum { GRAIN = 1 << 15 }; /* number of vertices or faces of a parallel task */
 
+/* bit of a vertex's sort key: the vertex must come after all vertices without this bit */
 #define UNREFERENCED (UINT64_C(1) << 63)
 
 typedef struct arranging {
     ebpo_mesh *mesh;
     unsigned threads;
-    bool all_by_position; /* false: unreferenced vertices come after all others */
+    bool all_by_position; /* false: unreferenced vertices come after all others; true: they are
+                           * sorted like the others */
     const ebpo_progress *progress;
-    uint8_t *referenced;         /* bit v: a face uses vertex v */
-    double (*bounds)[2][3];      /* box around the referenced vertices of each GRAIN of vertices */
+    uint8_t *referenced; /* bit v: a face uses vertex v */
+    /* [block of GRAIN vertices] least and greatest coordinates of its referenced vertices */
+    double (*bounds)[2][3];
     struct ebpo_arrangement *to; /* result */
     float *xyz32; /* sorted coordinates: floats or doubles; the other array is NULL */
     double *xyz64;
     uint32_t *corners; /* faces in their old order, with the vertices' new indices */
     uint32_t *faces;   /* sorted faces */
-    /* [rank_count] new indices of the vertices with the old indices rank_first, ... */
+    /* [rank_count] new indices of the vertices with the old indices rank_first to rank_first +
+     * rank_count - 1 */
     uint32_t *rank;
     uint64_t rank_first, rank_count;
 } arranging;
@@ -99,12 +104,13 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Makes the root box. Cell faces must be exact in doubles down to `level`; around a small model far
- * from the origin, this condition can enlarge the box much. With level -1, takes the deepest level
- * at which it hardly enlarges the box. */
+/* Makes the root box around the model, so that cell faces are exact in doubles down to `level`. If
+ * the model is small and far from the origin, this condition can enlarge the box much. With level
+ * -1, takes the deepest level at which the condition hardly enlarges the box. Returns false if the
+ * coordinates are too large for every box. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
-    static const double allowed = 1 + 0x1p-16; /* ratio of sizes */
+    static const double allowed = 1 + 0x1p-16; /* maximum ratio of the sizes of `out` and `least` */
     ebpo_box least;
     if (level >= 0)
         return ebpo_box_make(out, min, max, level);
@@ -152,26 +158,28 @@ static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
 
 /* --- vertices --- */
 
-/* What is sorted for each vertex. */
+/* The record that is sorted for each vertex of a mesh with double coordinates. */
 typedef struct vertex_record {
-    uint64_t key;        /* key_of */
-    uint32_t at, unused; /* at: index in the mesh before sorting */
-    double p[3];
+    uint64_t key;               /* result of key_of */
+    uint32_t old_index, unused; /* old_index: index in the mesh before sorting */
+    double p[3];                /* position */
 } vertex_record;
 
-/* As vertex_record, for float coordinates, in 24 bytes. */
+/* The same for a mesh with float coordinates, in 24 bytes. */
 typedef struct float_record {
     uint64_t key;
-    uint32_t at;
+    uint32_t old_index;
     float p[3];
 } float_record;
 
-/* Returns the index of the cell that contains a coordinate. The division may round to the wrong
- * side of a cell face; the comparison with the exact cell face corrects this. */
+/* Returns the index, along one axis, of the cell that contains the coordinate x. The division may
+ * round to the wrong side of a cell face; the comparisons with the exact cell faces correct this.
+ */
 static uint32_t cell_index(const ebpo_box *box, int axis, int level, double x)
 {
-    double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
-    uint32_t k = at <= 0 ? 0 : at >= cells ? (1u << level) - 1 : (uint32_t)at;
+    double cells = (double)(1u << level),
+           quotient = (x - box->origin[axis]) / (box->size[axis] / cells);
+    uint32_t k = quotient <= 0 ? 0 : quotient >= cells ? (1u << level) - 1 : (uint32_t)quotient;
     while (k > 0 && x < ebpo_cell_face(box, axis, level, k))
         k--;
     while (k + 1 < 1u << level && x >= ebpo_cell_face(box, axis, level, k + 1))
@@ -179,8 +187,9 @@ static uint32_t cell_index(const ebpo_box *box, int axis, int level, double x)
     return k;
 }
 
-/* Returns the octcode of the vertex's cell, shifted so that its leading bit is always at the same
- * position; with the bit UNREFERENCED for a vertex that must come after all others. */
+/* Returns the sort key of a vertex: the octcode of its cell, shifted so that the code's leading bit
+ * is always at the same position. The bit UNREFERENCED is added if the vertex must come after all
+ * referenced vertices. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;
@@ -202,19 +211,19 @@ static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, vo
     for (uint64_t v = begin; v < end; v++) {
         if (mesh->xyz32) {
             float_record *r = (float_record *)records + (v - begin);
-            *r = (float_record){ .key = key_of(a, v), .at = (uint32_t)v };
+            *r = (float_record){ .key = key_of(a, v), .old_index = (uint32_t)v };
             memcpy(r->p, mesh->xyz32 + 3 * v, sizeof r->p);
         } else {
             vertex_record *r = (vertex_record *)records + (v - begin);
-            *r = (vertex_record){ .key = key_of(a, v), .at = (uint32_t)v };
+            *r = (vertex_record){ .key = key_of(a, v), .old_index = (uint32_t)v };
             memcpy(r->p, mesh->xyz64 + 3 * v, sizeof r->p);
         }
     }
     return EBPO_OK;
 }
 
-/* Orders vertices of one cell by position, so that vertices with equal positions are neighbours;
- * then by their old indices `a` and `b`. */
+/* Compares two vertices of one cell: by position, so that vertices with equal positions are
+ * neighbours, then by their old indices `a` and `b`. */
 static int compare_points(const double p[3], const double q[3], uint32_t a, uint32_t b)
 {
     for (int k = 0; k < 3; k++)
@@ -227,34 +236,35 @@ static int compare_floats(const void *x, const void *y)
 {
     const float_record *a = x, *b = y;
     double p[3] = { a->p[0], a->p[1], a->p[2] }, q[3] = { b->p[0], b->p[1], b->p[2] };
-    return compare_points(p, q, a->at, b->at);
+    return compare_points(p, q, a->old_index, b->old_index);
 }
 
 static int compare_doubles(const void *x, const void *y)
 {
     const vertex_record *a = x, *b = y;
-    return compare_points(a->p, b->p, a->at, b->at);
+    return compare_points(a->p, b->p, a->old_index, b->old_index);
 }
 
-static void store_vertices(void *context, uint64_t place, const void *records, uint64_t count)
+/* Stores sorted records as the vertices with the new indices new_index, new_index + 1, ... */
+static void store_vertices(void *context, uint64_t new_index, const void *records, uint64_t count)
 {
     arranging *a = context;
-    for (uint64_t i = 0; i < count; i++, place++) {
+    for (uint64_t i = 0; i < count; i++, new_index++) {
         uint64_t key;
-        uint32_t at;
+        uint32_t old_index;
         if (a->xyz32) {
             const float_record *r = (const float_record *)records + i;
-            memcpy(a->xyz32 + 3 * place, r->p, sizeof r->p);
-            key = r->key, at = r->at;
+            memcpy(a->xyz32 + 3 * new_index, r->p, sizeof r->p);
+            key = r->key, old_index = r->old_index;
         } else {
             const vertex_record *r = (const vertex_record *)records + i;
-            memcpy(a->xyz64 + 3 * place, r->p, sizeof r->p);
-            key = r->key, at = r->at;
+            memcpy(a->xyz64 + 3 * new_index, r->p, sizeof r->p);
+            key = r->key, old_index = r->old_index;
         }
         if (a->to->key)
-            a->to->key[place] =
+            a->to->key[new_index] =
                 (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
-        a->to->vertex_source[place] = at; /* converted to source indices at the end */
+        a->to->vertex_source[new_index] = old_index; /* compose_maps makes source indices of it */
     }
 }
 
@@ -278,7 +288,7 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
                        .stage = "ordering vertices",
                        .count = n,
                        .record = mesh->xyz32 ? sizeof(float_record) : sizeof(vertex_record),
-                       .shift = 46,
+                       .shift = 46, /* bins are chosen by the highest 18 bits of the key */
                        .context = a,
                        .make = make_vertices,
                        .compare = mesh->xyz32 ? compare_floats : compare_doubles,
@@ -286,7 +296,8 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
     return ebpo_sort_run(&sort, error);
 }
 
-/* --- faces: get the vertices' new indices, and are then sorted by the least of them --- */
+/* --- faces: their vertices' indices are replaced by the new ones; then they are sorted by their
+ * least vertex --- */
 
 static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
@@ -353,10 +364,10 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
 }
 
 typedef struct face_record {
-    /* least vertex << 32 | index in the source, so that the result does not depend on the old order
-     */
+    /* least vertex << 32 | index of the face in the source, so that the result does not depend on
+     * the old order */
     uint64_t key;
-    uint32_t corner[3], unused;
+    uint32_t corner[3], unused; /* corner: new indices of the vertices */
 } face_record;
 
 static ebpo_status make_faces(void *context, uint64_t begin, uint64_t end, void *records,
@@ -381,13 +392,14 @@ static int compare_faces(const void *x, const void *y)
     return (a->key > b->key) - (a->key < b->key); /* keys differ */
 }
 
-static void store_faces(void *context, uint64_t place, const void *records, uint64_t count)
+/* Stores sorted records as the faces with the new indices new_index, new_index + 1, ... */
+static void store_faces(void *context, uint64_t new_index, const void *records, uint64_t count)
 {
     arranging *a = context;
     const face_record *r = records;
-    for (uint64_t i = 0; i < count; i++, place++) {
-        memcpy(a->faces + 3 * place, r[i].corner, sizeof r[i].corner);
-        a->to->face_source[place] = (uint32_t)r[i].key;
+    for (uint64_t i = 0; i < count; i++, new_index++) {
+        memcpy(a->faces + 3 * new_index, r[i].corner, sizeof r[i].corner);
+        a->to->face_source[new_index] = (uint32_t)r[i].key;
     }
 }
 

@@ -1,11 +1,12 @@
 /* Finds the border of a surface, and the winding numbers of the surface with its caps.
  *
  * The caps (geometry/cap_triangles.h) close the border, so the winding number of surface and caps
- * is an integer. The number of a white node or a leaf is the winding number of its lowest corner,
+ * is an integer. The winding number of a white node or a leaf is the one at its lowest corner,
  * shifted as in corner_windings.c. The nodes are visited depth first. Each visit returns the
- * differences of the numbers at the cell's corners from the number at the lowest corner: the
- * crossings of the leaf's faces and of caps along the edges of the cell. The lowest corner of a
- * child is a corner of an earlier sibling, so its number is known before the child is visited.
+ * cell's corner differences: the winding numbers at its corners minus the winding number at its
+ * lowest corner. They are sums of the crossings of the leaf's faces and of caps along the edges of
+ * the cell. The lowest corner of a child is a corner of an earlier sibling, so its winding number
+ * is known before the child is visited.
  * Source: format-spec/border.md. */
 #include "core/strict_fp.h"
 
@@ -30,16 +31,17 @@
 #include "mesh/border.h"
 #include "mesh/mesh_parts.h"
 
-enum { BUFFER_FACES = 256 };
+enum { BUFFER_FACES = 256 }; /* number of faces whose crossings are computed at a time */
 
 typedef struct winding_walk {
     ebpo_tree *tree;
     ebpo_box box;
     const ebpo_cap_tree *caps;
-    /* next item of each level: depth first, the items of a level have ascending octcodes */
+    /* [level] index of the next group, leaf, white node and reference: in a depth-first visit, the
+     * items of a level come in the order of the level's arrays */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], white[EBPO_LEVELS_MAX],
         ref[EBPO_LEVELS_MAX];
-    bool agree; /* all paths to a corner give the same number */
+    bool agree; /* so far, all paths to a corner gave the same winding number */
     ebpo_triangle buffer[BUFFER_FACES];
 } winding_walk;
 
@@ -65,26 +67,28 @@ static void add_cap_crossings(const winding_walk *w, ebpo_cell cell, int32_t del
     }
 }
 
+/* Adds the crossings of faces along the edges of a cell to the differences of its corners. The
+ * faces are faces[0 .. count - 1]; if `faces` is NULL, first .. first + count - 1. */
 static void add_faces(winding_walk *w, ebpo_cell cell, const uint32_t *faces, uint64_t first,
                       uint64_t count, int32_t delta[8])
 {
     const ebpo_mesh *mesh = &w->tree->mesh;
     int32_t part[8];
-    for (uint64_t at = 0; at < count; at += BUFFER_FACES) {
-        uint64_t some = count - at < BUFFER_FACES ? count - at : BUFFER_FACES;
-        for (uint64_t i = 0; i < some; i++) {
-            uint64_t face = faces ? faces[at + i] : first + at + i;
+    for (uint64_t done = 0; done < count; done += BUFFER_FACES) {
+        uint64_t buffered = count - done < BUFFER_FACES ? count - done : BUFFER_FACES;
+        for (uint64_t i = 0; i < buffered; i++) {
+            uint64_t face = faces ? faces[done + i] : first + done + i;
             for (int k = 0; k < 3; k++)
                 ebpo_mesh_position(mesh, mesh->faces[3 * face + (uint64_t)k],
                                    w->buffer[i].corner[k]);
         }
-        ebpo_corner_windings(&w->box, cell, w->buffer, some, part);
+        ebpo_corner_windings(&w->box, cell, w->buffer, buffered, part);
         for (int i = 0; i < 8; i++)
             delta[i] += part[i];
     }
 }
 
-/* Sets the number of a leaf, and the differences of its corners. */
+/* Stores the winding number of a leaf, and adds its corner differences to `delta`. */
 static void visit_leaf(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t delta[8])
 {
     ebpo_level *level = &w->tree->level[cell.level];
@@ -100,30 +104,33 @@ static void visit_leaf(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t
 static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
                        int32_t delta[8]);
 
-/* Visits the children of a gray node. */
+/* Visits the children of a gray node, and sets `delta` to its corner differences. */
 static void visit_gray(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t delta[8])
 {
     const ebpo_level *below = &w->tree->level[cell.level + 1];
     uint16_t types = below->types[w->group[cell.level + 1]++];
-    int32_t offset[8] = { 0 }, of_child[8][8];
+    /* offset: winding number at each child's lowest corner, minus the one at the node's */
+    int32_t offset[8] = { 0 }, child_delta[8][8];
     for (int o = 0; o < 8; o++) {
         bool known = o == 0;
         for (int axis = 0; axis < 3; axis++) {
             if (!(o >> axis & 1))
                 continue;
             int before = o & ~(1 << axis);
-            int32_t sum = offset[before] + of_child[before][1 << axis];
+            int32_t sum = offset[before] + child_delta[before][1 << axis];
             w->agree = w->agree && (!known || sum == offset[o]);
             offset[o] = sum;
             known = true;
         }
         visit_node(w, ebpo_cell_child(cell, (unsigned)o), ebpo_group_type(types, (unsigned)o),
-                   winding + offset[o], of_child[o]);
+                   winding + offset[o], child_delta[o]);
     }
     for (int o = 0; o < 8; o++)
-        delta[o] = offset[o] + of_child[o][o];
+        delta[o] = offset[o] + child_delta[o][o];
 }
 
+/* Stores the winding numbers of a node and of all nodes below, and sets `delta` to the node's
+ * corner differences. `winding`: winding number at the node's lowest corner. */
 static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
                        int32_t delta[8])
 {
@@ -138,6 +145,8 @@ static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int
     }
 }
 
+/* Computes the winding numbers of all white nodes and leaves. Returns EBPO_E_NOT_SOLID if the caps
+ * do not close the mesh. */
 static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebpo_error *error)
 {
     winding_walk *w = ebpo_alloc_zero(1, sizeof *w);
@@ -174,7 +183,7 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
     return status;
 }
 
-/* Sets the counts and the area of the caps. */
+/* Sets the counts of the border's loops and points, and the area of the caps. */
 static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
                            const ebpo_border_loops *loops)
 {
@@ -198,6 +207,7 @@ static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
     }
 }
 
+/* Finds the border of the mesh, and copies the positions of its points. */
 static ebpo_status find_loops(ebpo_border_loops *out, const ebpo_mesh *mesh, unsigned threads,
                               ebpo_error *error)
 {
@@ -250,6 +260,7 @@ ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *err
 
 /* --- files --- */
 
+/* Adds the border to a tree that can have one and has none. */
 static ebpo_status add_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
 {
     const ebpo_info *info = &tree->info;

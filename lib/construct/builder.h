@@ -1,6 +1,14 @@
-/* Defines the builder's state, which its stages share. Before the stages, vertices and faces are
- * arranged along the Morton curve. A piece is a subtree that one thread builds; the top is the
- * nodes above all pieces. The stages are:
+/* Defines the builder's state, which its stages share.
+ *
+ * Terms: a piece is a subtree that one thread builds. The top is the set of the nodes above all
+ * pieces. A branch is the top or a piece. The fresh faces of a piece are the faces in its list that
+ * no earlier piece lists. The index of a face or vertex along the curve is its index in the
+ * arranged mesh; its final index is its index in the result and in the file. The corner differences
+ * of a cell are the winding numbers at its eight corners minus the winding number at corner 0, the
+ * lowest corner. In the code, `b` is the builder and `s` is a branch.
+ *
+ * Before the stages, vertices and faces are arranged along the Morton curve (arrange.h). The stages
+ * are:
  *   1. The top of the tree:
  *      - partition assigns faces to the pieces into which the tree is cut;
  *      - corner_windings computes winding numbers;
@@ -8,15 +16,15 @@
  *      - envelopes computes the envelopes above the pieces.
  *   2. Piece by piece, on all cores:
  *      - partition assigns faces to cells;
- *      - face_numbers numbers the faces;
+ *      - face_numbers assigns final indices to the piece's fresh faces;
  *      - emit_levels computes envelopes and the piece's part of each level;
  *      - pieces moves these results to the store.
  *   3. The entire tree:
  *      - emit_levels joins the levels' arrays;
- *      - face_numbers computes the final numbers of the vertices.
+ *      - face_numbers computes the final indices of the vertices.
  *
  * A piece gets data about other pieces only from the top. Its only results are its part of the
- * levels and the final indices of its faces. */
+ * levels and the final indices of its fresh faces. */
 #ifndef EBPO_CONSTRUCT_BUILDER_H
 #define EBPO_CONSTRUCT_BUILDER_H
 
@@ -30,7 +38,6 @@
 #include "geometry/level_nodes.h"
 #include "construct/planes.h"
 
-#define EBPO_NO_NUMBER UINT32_MAX
 #define EBPO_NO_VERTEX UINT64_MAX
 
 /* A node of a subtree under construction. An empty node becomes white or black after the winding
@@ -38,20 +45,22 @@
 typedef struct ebpo_build_node {
     uint8_t type;   /* ebpo_node_type; empty nodes are EBPO_WHITE */
     uint32_t child; /* gray: index of the first of eight children */
-    /* gray node or leaf: index in `details`; leaf of the top: index of a piece in ebpo_builder.sub
-     */
+    /* gray node or leaf: index in ebpo_branch.details; leaf of the top: index of a piece in
+     * ebpo_builder.sub */
     uint32_t detail;
 } ebpo_build_node;
 
+/* Data of a node that is not empty. */
 typedef struct ebpo_build_detail {
-    /* corner differences: winding numbers of the corners minus the winding number of corner 0 */
-    int32_t delta[8];
-    /* range in `entries`: list of the leaf, or lists of all leaves below the gray node; in the top:
-     * range of the pieces below the gray node */
+    int32_t delta[8]; /* corner differences */
+    /* leaf: its list is entries[entry_begin .. entry_end - 1] of the branch; gray node of a piece:
+     * the same range for the lists of all leaves below; gray node of the top: range of the pieces
+     * below, in ebpo_builder.sub */
     uint64_t entry_begin, entry_end;
-    /* gray: range in `crossing`: faces that are not entirely inside the cell */
+    /* gray: range in `crossing` of the branch: the faces that are not entirely inside the cell */
     uint64_t cross_begin, cross_end;
-    uint32_t first, new_count; /* leaf: final index of its first new face; number of new faces */
+    /* leaf: final index of its first new face (no earlier leaf lists it); number of new faces */
+    uint32_t first, new_count;
 } ebpo_build_detail;
 
 /* A piece, or the top of the tree. Its nodes are stored depth first; nodes[0] is the root. */
@@ -62,31 +71,34 @@ typedef struct ebpo_branch {
     uint32_t *list;
     uint64_t list_count;
     uint8_t *fresh;              /* bit i: no piece before this one lists face list[i] */
-    uint64_t fresh_count, first; /* number of these fresh faces; final index of the first one */
+    uint64_t fresh_count, first; /* number of fresh faces; final index of the first one */
     ebpo_build_node *nodes;
     uint64_t node_count, node_capacity;
     ebpo_build_detail *details;
     uint64_t detail_count, detail_capacity;
-    uint32_t *entries; /* indices in `list` */
+    uint32_t *entries; /* the lists of the leaves, one after the other: indices in `list` */
     uint64_t entry_count, entry_capacity;
     uint32_t *crossing; /* indices in `list` */
     uint64_t cross_count, cross_capacity;
-    int32_t winding; /* winding number at the lowest corner */
-    /* type and corner differences of nodes[0]: kept longer than the nodes */
+    int32_t winding; /* winding number at the lowest corner of the cell */
+    /* type and corner differences of nodes[0]; they remain when the nodes are freed */
     uint8_t root_type;
     int32_t root_delta[8];
-    struct ebpo_proposals *proposals; /* NULL: planes are chosen on the way down */
+    struct ebpo_proposals *proposals; /* planes that were chosen from the leaves up; NULL: planes
+                                       * are chosen on the way down from the root */
     struct ebpo_piece_level *out;     /* [EBPO_LEVELS_MAX] results of ebpo_emit_piece */
-    ebpo_polytope *above;             /* the parent's envelope cut to this cell */
+    ebpo_polytope *above;             /* the envelope of the root's parent, cut to this cell */
     ebpo_workspace *workspace;        /* the builder's workspace, for all arrays */
 } ebpo_branch;
 
-/* Boxes around ranges of vertices, in a hierarchy: a block has 16 vertices, or 16 blocks of the
- * level below. */
+/* Boxes around blocks of consecutive vertices, in a hierarchy: a block of level 0 has 16 vertices,
+ * and a block of a higher level has 16 blocks of the level below. */
 enum { EBPO_BOUNDS_FAN = 16, EBPO_BOUNDS_LEVELS = 8 };
 typedef struct ebpo_bounds {
-    double (*box[EBPO_BOUNDS_LEVELS])[2][3]; /* box[k][i]: box of vertices [i * 16^(k+1), ...) */
-    uint64_t count[EBPO_BOUNDS_LEVELS];
+    /* box[k][i]: least and greatest coordinates in block i of level k, whose first vertex is
+     * i * 16^(k+1) */
+    double (*box[EBPO_BOUNDS_LEVELS])[2][3];
+    uint64_t count[EBPO_BOUNDS_LEVELS]; /* number of blocks of each level */
     int levels;
     ebpo_workspace *workspace; /* the builder's workspace */
 } ebpo_bounds;
@@ -96,37 +108,40 @@ typedef struct ebpo_builder {
     ebpo_workspace *workspace;
     unsigned threads;
     bool solid;
-    int max_level;
-    ebpo_box box;
+    int max_level;         /* deepest level */
+    ebpo_box box;          /* root box */
     const ebpo_mesh *mesh; /* arranged along the curve */
     uint64_t vertex_count; /* number of referenced vertices, which come first */
     uint64_t face_count;
     const uint64_t *key; /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3];
     ebpo_bounds bounds;
-    uint32_t *number; /* [face] final index; a piece sets the indices of its fresh faces */
-    /* the nodes above the pieces; `detail` of a leaf of the top is the index of a piece in `sub` */
-    ebpo_branch top;
-    ebpo_branch *sub; /* [sub_count] the pieces */
+    uint32_t *final_index; /* [face] EBPO_NO_INDEX until its piece sets it */
+    ebpo_branch top;       /* each of its leaves is a piece: `detail` is an index in `sub` */
+    ebpo_branch *sub;      /* [sub_count] the pieces */
     uint64_t sub_count, sub_capacity;
-    _Atomic uint64_t leaf_count, entry_count; /* in all pieces so far */
-    struct ebpo_top_envelope *top_envelope;   /* envelopes of the top's gray nodes, by detail */
-    struct ebpo_store *store;
-    const struct ebpo_thesis_run *thesis; /* NULL: a tree for a file is built */
+    /* numbers of leaves, and of entries of their lists, in all pieces so far */
+    _Atomic uint64_t leaf_count, entry_count;
+    struct ebpo_top_envelope *top_envelope; /* envelopes of the top's gray nodes, by detail */
+    struct ebpo_store *store;               /* pieces.c; NULL: nothing is stored yet */
+    const struct ebpo_thesis_run *thesis;   /* NULL: a tree for a file is built */
 } ebpo_builder;
 
+/* Sets `out` to the corners of a face. */
 static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebpo_triangle *out)
 {
     for (int i = 0; i < 3; i++)
         ebpo_mesh_position(b->mesh, b->face[face][i], out->corner[i]);
 }
 
-/* Returns the index of a face from an entry of a piece, or from `crossing` of the top. */
+/* Returns the index of a face along the curve. `entry`: an element of `entries` or `crossing` of
+ * the branch. */
 static inline uint32_t ebpo_branch_face(const ebpo_branch *s, uint32_t entry)
 {
     return s->list ? s->list[entry] : entry;
 }
 
+/* Sets `out` to the corners of the face ebpo_branch_face(s, entry). */
 static inline void ebpo_branch_triangle(const ebpo_builder *b, const ebpo_branch *s, uint32_t entry,
                                         ebpo_triangle *out)
 {

@@ -2,12 +2,12 @@
  * result's ebpo_info.
  *
  * This file checks options and chooses the deepest level (EBP 2017, equation 3). The tree is cut
- * into pieces, which are subtrees, and the top, which is the nodes above the pieces. In the code,
- * the top and each piece are an `ebpo_branch`: `b->top` and `b->sub[i]` (builder.h). All threads
- * process pieces. The envelopes of a piece need the envelope of the parent of its root, so the
- * envelopes of the top are computed first. With a selection from the leaves up, the planes of all
- * nodes are chosen before any envelope is computed. ebpo_build takes over the mesh and frees it,
- * also on failure. */
+ * into pieces, which are subtrees, and the top, which is the set of the nodes above the pieces. In
+ * the code, the top and each piece are an `ebpo_branch`: `b->top` and `b->sub[i]` (builder.h).
+ * Several threads process the pieces, one piece per thread at a time. The envelopes of a piece need
+ * the envelope of the parent of its root, so the envelopes of the top are computed first. With a
+ * selection from the leaves up, the planes of all nodes are chosen before any envelope is computed.
+ * ebpo_build takes over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -41,7 +41,8 @@ static int level_limit(const ebpo_mesh_report *report)
     return level;
 }
 
-/* Returns an error if a text option is too long for ebpo_info or has control characters. */
+/* Returns an error if a text option is too long for its field of ebpo_info, which has `capacity`
+ * bytes, or has control characters. */
 static ebpo_status check_text(const char *name, const char *text, size_t capacity,
                               ebpo_error *error)
 {
@@ -64,9 +65,12 @@ static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *i
     if (!(o->epsilon >= 0) || o->epsilon > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "epsilon %g is not in 0 .. 1", o->epsilon);
     if (o->rule > EBPO_RULE_POSITIVE)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)o->rule);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "unknown winding rule %d; give a value of ebpo_rule", (int)o->rule);
     if (!ebpo_selection_function(o->select))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown selection %d", (int)o->select);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "unknown selection %d of planes; give a value of ebpo_selection",
+                         (int)o->select);
     if (!(o->percent > 0 && o->percent <= 100))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "percent %g is not above 0 and at most 100",
                          o->percent);
@@ -74,7 +78,9 @@ static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *i
         return ebpo_fail(error, EBPO_E_ARGUMENT, "k_root %g is neither 0 nor in 1 .. 1e9",
                          o->k_root);
     if ((unsigned)o->normals > EBPO_NORMALS_ANGLE)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown distance of normals %d", (int)o->normals);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "unknown distance of normals %d; give a value of ebpo_normal_distance",
+                         (int)o->normals);
     ebpo_status status = check_text("unit", o->unit, sizeof info->unit, error);
     if (status == EBPO_OK)
         status = check_text("crs", o->crs, sizeof info->crs, error);
@@ -89,8 +95,8 @@ static void copy_text(char *to, const char *from)
         strcpy(to, from); /* check_options checked the length */
 }
 
-/* Copies a name. Names of files may contain any bytes, but the format requires text. A byte that is
- * neither printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
+/* Copies the name of the source file. Names of files may contain any bytes, but the format requires
+ * text: a byte that is neither printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
 static void copy_name(char *to, const char *from)
 {
     while (*from) {
@@ -116,6 +122,7 @@ static void copy_name(char *to, const char *from)
     *to = 0;
 }
 
+/* Sets the fields of the result's info that are known before the stages. */
 static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh,
                       const ebpo_mesh_report *report, const ebpo_repair_record *repair_record)
 {
@@ -186,6 +193,7 @@ static ebpo_status arrange_for_levels(ebpo_builder *b, ebpo_mesh *mesh, ebpo_err
     return ebpo_bounds_make(b, error);
 }
 
+/* Sets the builder's options and deepest level, and arranges the mesh. */
 static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                  const ebpo_build_options *options, ebpo_error *error)
 {
@@ -207,7 +215,7 @@ static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_me
 static void builder_free(ebpo_builder *b)
 {
     ebpo_bounds_free(&b->bounds);
-    ebpo_array_free(b->workspace, b->number);
+    ebpo_array_free(b->workspace, b->final_index);
     ebpo_branch_free(&b->top);
     for (uint64_t i = 0; i < b->sub_count; i++)
         ebpo_branch_free(&b->sub[i]);
@@ -216,13 +224,16 @@ static void builder_free(ebpo_builder *b)
     ebpo_store_free(b->store);
 }
 
-/* The parallel task of all pieces. */
+/* The parallel job in which each task processes one piece. */
 typedef struct piece_job {
     ebpo_builder *b;
-    ebpo_emit_scratch **scratch;             /* [threads] */
-    _Atomic uint64_t cells_ns, envelopes_ns; /* sums over all threads */
+    ebpo_emit_scratch **scratch; /* [threads] */
+    /* time for making cells, and for computing envelopes: nanoseconds, sums over all threads */
+    _Atomic uint64_t cells_ns, envelopes_ns;
 } piece_job;
 
+/* Makes the nodes of pieces, numbers their fresh faces, computes their envelopes and moves the
+ * results to the store. */
 static ebpo_status process_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
@@ -265,9 +276,10 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* Builds the tree. With a selection from the root down, each piece is finished in one pass. With
- * a selection from the leaves up, the top first needs the planes of all pieces. In this case
- * each piece is divided into nodes twice, because its nodes are not kept. */
+/* Builds the top and the pieces. With a selection from the root down, each piece is finished in one
+ * pass. With a selection from the leaves up, the top first needs the planes of all pieces; then
+ * each piece is divided into nodes twice, because its nodes are not kept. A build as in the theses
+ * ends when the planes are chosen. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);
@@ -282,6 +294,7 @@ static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
+/* Runs the stages, from cutting the tree into pieces to the optional parts. */
 static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_split(b, error);
@@ -312,6 +325,7 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
                : status;
 }
 
+/* Builds a tree, or the sums of ebpo_build_as_theses if `thesis` is not NULL. */
 static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                               const ebpo_repair_record *repair_record,
                               const ebpo_build_options *options, const ebpo_thesis_run *thesis,
@@ -319,6 +333,7 @@ static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
+    /* requested: the caller's structure, which may have the size of another version */
     ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *requested = NULL;
     ebpo_builder b = { .workspace = mesh->workspace,
                        .top.workspace = mesh->workspace,
@@ -375,11 +390,14 @@ ebpo_status ebpo_build_as_theses(ebpo_mesh *mesh, const ebpo_mesh_report *report
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_thesis_levels, out, error);
     if (status == EBPO_OK && (unsigned)coalesce > EBPO_COALESCE_MEAN)
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "unknown criterion of leaves %d", (int)coalesce);
+        status = ebpo_fail(error, EBPO_E_ARGUMENT,
+                           "unknown criterion of leaves %d; give a value of ebpo_coalescing",
+                           (int)coalesce);
     const ebpo_selection_traits *traits = ebpo_selection_describe(wanted.select);
     if (status == EBPO_OK && !(traits && traits->from_leaves))
         status = ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "selection %d is not one of the theses: kmedoids, offset or random",
+                           "selection %d is not a selection of the theses; give "
+                           "EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET or EBPO_SELECT_RANDOM",
                            (int)wanted.select);
     if (status != EBPO_OK) {
         ebpo_mesh_free(mesh);

@@ -1,6 +1,7 @@
-/* Declares the stages of building, which construct.c runs; builder.h lists them in order. A
- * function processes one piece (ebpo_branch, a subtree) or the whole builder. Functions that
- * allocate return EBPO_E_MEMORY or EBPO_E_IO; functions that take long return EBPO_E_CANCELLED. */
+/* Declares the stages of building, which construct.c runs. builder.h lists them in order and
+ * explains the terms. A function processes one branch `s` (a piece, which is a subtree, or the top)
+ * or all of them. Functions that allocate can return EBPO_E_MEMORY and EBPO_E_IO; functions that
+ * take long can return EBPO_E_CANCELLED. */
 #ifndef EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 #define EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 
@@ -9,55 +10,56 @@
 
 /* --- partition.c: the nodes of a piece and the face lists of its leaves --- */
 
-/* Makes the piece's nodes, and assigns its faces to leaves. */
+/* Makes the piece's nodes, and assigns its faces to leaves. Can return EBPO_E_LIMIT. */
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-/* Returns EBPO_E_LIMIT if a mesh with this number of faces may not have so many leaves, or so many
- * entries of leaves' face lists. */
+/* Returns EBPO_E_LIMIT if `leaves` leaves, or `entries` entries of their face lists, are too many
+ * for a mesh with `face_count` faces. */
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
                                    ebpo_error *error);
 
-/* Builds the top of the tree, and lists the faces of the pieces below the top. */
+/* Makes the nodes of the top, and lists the faces of the pieces below the top. */
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
 
 /* --- propose.c: selections from the leaves up (of the theses) --- */
 
-/* Chooses planes for all pieces, after the corner windings are computed. Does nothing for a
- * selection from the root. Partitions each piece for this, and frees its nodes again. */
+/* Chooses planes for all pieces and for the top, after the corner windings are computed. Makes the
+ * nodes of each piece for this purpose, and frees them again. Does nothing if the selection works
+ * from the root down. */
 EBPO_MUST_USE ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error);
 
-/* --- emit_levels.c --- */
+/* --- emit_levels.c: envelopes, and the arrays of the levels --- */
 
-typedef struct ebpo_emit_scratch ebpo_emit_scratch;
+typedef struct ebpo_emit_scratch ebpo_emit_scratch; /* work space of one thread */
 ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *workspace,
                                    ebpo_error *error);
 void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
 
-/* Computes the envelopes of a piece, and writes its part of the levels' arrays. Their leaf_refs
- * have the faces' indices along the curve, not the final indices. */
+/* Computes the envelopes of a piece, and writes its part of the levels' arrays. The array leaf_refs
+ * gets the faces' indices along the curve; ebpo_build_levels replaces them by final indices. */
 ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
                             ebpo_error *error);
 
-/* Joins the levels' arrays from the parts of the pieces. */
+/* Joins the pieces' parts of the levels' arrays to the arrays of `out`. */
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error);
 
-/* --- triangle_cell.c --- */
+/* --- triangle_cell.c: a face and a cell --- */
 
-/* Returns a mask for a face that touches the cell: bit i is set if the face may touch octant i of
- * the cell. The bit of each octant that the face touches is set. */
+/* Returns a mask for a face that touches the cell: bit i is set if the face touches octant i of the
+ * cell. It may also be set if the face misses octant i by a rounding error. */
 unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
 
 /* --- face_numbers.c: final indices of faces, in the order of the leaves that list them first ---
  */
 
-/* Numbers a piece's fresh faces (faces that no earlier piece lists). */
+/* Assigns final indices to a piece's fresh faces (faces that no earlier piece lists). */
 ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-/* Puts the mesh into its final order. */
+/* Moves the mesh's data to `out`, in the final order. */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
 
 /* --- gray_colours.c (format-spec/colours.md) --- */
 
-/* Computes colours for a tree with levels, mesh and coloured attributes. Returns EBPO_E_MEMORY,
- * EBPO_E_IO, EBPO_E_CANCELLED. */
+/* Computes the colours of gray nodes for a tree with levels, mesh and coloured attributes. Returns
+ * EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. */
 EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tree *out,
                                                   ebpo_error *error);
 
@@ -74,24 +76,28 @@ EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, e
 EBPO_MUST_USE ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads,
                                              const ebpo_progress *progress, ebpo_error *error);
 
-/* --- corner_windings.c --- */
+/* --- corner_windings.c: winding numbers at the corners of cells. `delta`: corner differences, the
+ * winding numbers at the eight corners minus the winding number at corner 0 --- */
 
-/* Computes the winding numbers of all pieces, before the pieces are partitioned. */
+/* Computes the corner differences of the top's gray nodes from those of the pieces' roots. Does
+ * nothing for a surface. Returns EBPO_E_NOT_SOLID if they disagree. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
-/* For each child, computes the winding number at the child's corner 0 minus the winding number at
- * the parent's corner 0, from the children's corner differences. */
+/* Computes, from the children's corner differences, the offset of each child: the winding number at
+ * the child's corner 0 minus the winding number at the parent's corner 0. `child`: index of the
+ * first child's node. */
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
 /* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces
- * are list[entries[i]]; if `entries` is NULL, the first `count` of the list. Long lists are
- * processed EBPO_CORNER_FACES at a time, so `buffer` has space for the lesser of EBPO_CORNER_FACES
- * and `count` triangles. */
+ * are list[entries[0]] to list[entries[count - 1]]; if `entries` is NULL, the first `count` faces
+ * of the list. Long lists are processed EBPO_CORNER_FACES faces at a time, so `buffer` must have
+ * space for the lesser of EBPO_CORNER_FACES and `count` triangles. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);
-/* Computes a gray node's corner differences from those of its children. Returns false when the
- * crossings along two paths between corners disagree; then the mesh does not balance. */
+/* Computes a gray node's corner differences from those of its children. Returns false if two paths
+ * along the children's edges give different winding numbers for a corner; then the mesh does not
+ * balance. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
 /* Returns a mask: bit i is set if corner i of a cell is inside by the builder's rule. `winding`:
@@ -100,14 +106,14 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 
 /* --- envelopes.c --- */
 
-typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
+typedef struct ebpo_envelope_scratch ebpo_envelope_scratch; /* work space of one thread */
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 
-/* Sets the planes that a gray node adds: the planes that were chosen from the leaves up, or if
- * there are none, planes that are chosen now. On entry, `envelope` is the parent's envelope cut to
- * the node's cell; on return, it is the node's envelope. Returns the number of planes, or -1 when
- * out of memory. */
+/* Sets `codes` to the planes that a gray node adds: the planes that were chosen from the leaves up
+ * if the branch has proposals, or else planes that are chosen now. On entry, `envelope` is the
+ * parent's envelope cut to the node's cell; on return, it is the node's envelope. Returns the
+ * number of planes, or -1 when out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);
@@ -119,7 +125,7 @@ typedef struct ebpo_top_envelope {
     double volume;
 } ebpo_top_envelope;
 
-/* Computes the envelopes of the nodes above the pieces. */
+/* Computes the envelopes of the top's nodes, and passes them to the pieces (ebpo_branch.above). */
 ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
 
 #endif

@@ -1,14 +1,15 @@
-/* Computes winding numbers at the corners of cells. These numbers decide which corners, and which
- * cells without faces, are inside.
+/* Computes winding numbers at the corners of cells. A corner's winding number decides whether the
+ * corner is inside the solid; so does the winding number of a cell without faces.
  *
- * In one cell, a corner's number follows from another corner's number by the signed crossings of
- * faces along the cell's edges. All corners are shifted by the same infinitely small amount, so a
- * face through a corner is no special case (ebpo_axis_crossing). Each node of the tree keeps the
- * differences of its corners' numbers from the number of its corner 0. The differences of a gray
- * node are computed from those of its children, added along the children's edges. The root's lowest
- * corner is outside the model: its winding number is 0. This replaces the special cases of BP 2008,
- * 3.4.1.1. Where two paths to a corner disagree, the mesh does not balance, and the model is a
- * surface. */
+ * In one cell, the winding number at a corner is the one at another corner plus the signed
+ * crossings of faces along the cell's edges between them. All corners are shifted by the same
+ * infinitely small amount, so a face through a corner is no special case (ebpo_axis_crossing). Each
+ * node of the tree stores corner differences: the winding numbers at its corners minus the winding
+ * number at its corner 0, the lowest corner. The corner differences of a gray node are computed
+ * from those of its children, added along the children's edges. The root's lowest corner is outside
+ * the model: its winding number is 0. This method replaces the special cases of BP 2008, 3.4.1.1.
+ * If two paths to a corner give different winding numbers, the mesh does not balance, and the model
+ * is a surface. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -28,17 +29,18 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
     ebpo_workspace *workspace = count < EBPO_CORNER_FACES ? NULL : b->workspace;
     EBPO_FOR_PIECES(workspace, first, count, EBPO_CORNER_FACES) {
         uint64_t part = count - first < EBPO_CORNER_FACES ? count - first : EBPO_CORNER_FACES;
-        int32_t own[8];
+        int32_t part_delta[8];
         for (uint64_t i = 0; i < part; i++)
             ebpo_branch_triangle(b, s, entries ? entries[first + i] : (uint32_t)(first + i),
                                  &buffer[i]);
-        ebpo_corner_windings(&b->box, cell, buffer, part, own);
+        ebpo_corner_windings(&b->box, cell, buffer, part, part_delta);
         for (int i = 0; i < 8; i++)
-            delta[i] += own[i];
+            delta[i] += part_delta[i];
     }
 }
 
-/* Returns false when crossings along two paths to a corner do not agree. */
+/* Computes the offsets of the children (ebpo_child_windings). Returns false if two paths to a
+ * child's corner 0 give different offsets. */
 static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
 {
     offset[0] = 0;
@@ -58,7 +60,8 @@ static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
     return agree;
 }
 
-/* Sets the corner differences of the eight children; the differences of an empty child are zero. */
+/* Sets child_delta[o] to the corner differences of child o; those of an empty child are zero.
+ * `child`: index of the first child's node. */
 static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          const int32_t *child_delta[8])
 {
@@ -94,6 +97,8 @@ bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t chi
     return agree;
 }
 
+/* Computes the corner differences of a node of the top and of all nodes below. Returns false if
+ * they disagree (ebpo_gather_delta). */
 static bool top_deltas(ebpo_builder *b, uint32_t index)
 {
     ebpo_branch *s = &b->top;
@@ -129,10 +134,10 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 
 /* --- the corners of one cell --- */
 
-/* Returns a mask of the cell faces that a face may touch: bit 2 k for the lower and bit 2 k + 1 for
- * the upper cell face along axis k. A face strictly on one side of a cell face crosses none of that
- * cell face's edges. A face strictly on one side of the cell crosses no edge at all. The infinitely
- * small shift of the corners does not change this. */
+/* Returns a mask of the cell faces that the triangle `f` may touch: bit 2 k for the lower and bit
+ * 2 k + 1 for the upper cell face along axis k. A triangle strictly on one side of a cell face
+ * crosses none of that cell face's edges. A triangle strictly on one side of the cell crosses no
+ * edge at all, so the mask is 0. The infinitely small shift of the corners does not change this. */
 static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_triangle *f)
 {
     unsigned reached = 0;
@@ -149,8 +154,9 @@ static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_tria
     return reached;
 }
 
-/* For each corner, the edge from an earlier corner: the axis of the edge, the earlier corner, and a
- * mask of the two cell faces that contain the edge. */
+/* For each corner except corner 0, the edge to it from an earlier corner: the axis of the edge, the
+ * earlier corner, and a mask of the two cell faces that contain the edge (as cell_faces_reached
+ * returns it). */
 static const struct {
     int axis, before;
     unsigned cell_faces;
@@ -161,7 +167,7 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
                           uint64_t count, int32_t delta[8])
 {
     double cell_face[3][2];
-    int32_t along[8] = { 0 };
+    int32_t along[8] = { 0 }; /* [corner] crossings along the edge edge_to[corner] */
     for (int k = 0; k < 3; k++)
         for (uint32_t s = 0; s < 2; s++)
             cell_face[k][s] = ebpo_cell_face(box, k, cell.level, cell.at[k] + s);

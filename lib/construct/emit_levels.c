@@ -1,10 +1,11 @@
-/* Turns finished pieces into the arrays of the levels.
+/* Turns finished pieces (subtrees that one thread builds) into the arrays of the levels.
  *
  * A depth-first walk of a piece visits the nodes of each level in the order of octcodes (locational
- * codes), so the piece's part of each array is one contiguous stretch. Stretches are joined in the
- * depth-first order of the pieces, which is also the order of octcodes. The nodes of the top have
- * separate stretches. Until all pieces are done, leaves refer to faces by their indices along the
- * curve, because the final indices of faces of other pieces are not known before.
+ * codes), so the piece's part of each array is one contiguous range, called a stretch. Stretches
+ * are joined in the depth-first order of the pieces, which is also the order of octcodes. The nodes
+ * of the top (the nodes above the pieces) have separate stretches. A leaf's references are the
+ * faces in its list that an earlier leaf also lists. Until all pieces are done, references are
+ * indices along the curve, because the final indices of other pieces' faces are not known before.
  *
  * Arrays that the options exclude, and arrays with only default values, are omitted. Volumes are
  * added in a fixed order, so the number of threads does not change the result. */
@@ -26,7 +27,7 @@
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;
-    ebpo_triangle *faces; /* faces of one leaf */
+    ebpo_triangle *faces; /* faces of the leaf whose planes are being chosen */
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
     /* [level][3] for the gray node of this level on the path: half of its envelope (cut along z), a
@@ -37,7 +38,7 @@ struct ebpo_emit_scratch {
 
 typedef struct emitter {
     const ebpo_builder *b;
-    ebpo_branch *s;
+    ebpo_branch *s; /* the piece */
     ebpo_emit_scratch *scratch;
 } emitter;
 
@@ -67,6 +68,7 @@ void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
     free(scratch);
 }
 
+/* Makes space for one more leaf with `refs` references. Returns false when out of memory. */
 static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
 {
     ebpo_level *l = &out->level;
@@ -80,7 +82,8 @@ static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
 #undef GROW
 }
 
-/* Adds a leaf's list: winding number, range of new faces, and references. */
+/* Adds a leaf's winding number, range of new faces, and references. Returns false when out of
+ * memory. */
 static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
                       int32_t winding)
 {
@@ -93,8 +96,8 @@ static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_l
     l->leaf_new[l->leaf_count] = d->new_count;
     l->leaf_ref_count[l->leaf_count] = (uint32_t)refs;
     for (uint64_t i = d->entry_begin, ref = l->ref_count; i < d->entry_end; i++) {
-        uint32_t place = e->s->entries[i], face = e->s->list[place];
-        if (!(e->s->fresh[place / 8] >> place % 8 & 1) || e->b->number[face] < d->first)
+        uint32_t entry = e->s->entries[i], face = e->s->list[entry];
+        if (!(e->s->fresh[entry / 8] >> entry % 8 & 1) || e->b->final_index[face] < d->first)
             l->leaf_refs[ref++] = face;
     }
     l->ref_count += refs;
@@ -102,6 +105,7 @@ static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_l
     return true;
 }
 
+/* Sets scratch->faces to the faces of a leaf. Returns false when out of memory. */
 static bool gather_faces(emitter *e, const ebpo_build_detail *d)
 {
     ebpo_emit_scratch *scratch = e->scratch;
@@ -114,8 +118,9 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
     return true;
 }
 
-/* Chooses the planes of a leaf that will be stored, and cuts the envelope. (If leaf planes are not
- * stored, readers derive planes.) Returns the number of planes, or -1 when out of memory. */
+/* Sets `codes` to the planes of a leaf, for a file that stores leaf planes, and cuts the envelope
+ * by them. (If leaf planes are not stored, readers derive planes from the faces.) Returns the
+ * number of planes, or -1 when out of memory. */
 static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                        ebpo_polytope *envelope, uint32_t *codes)
 {
@@ -134,9 +139,9 @@ static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t wind
     return count;
 }
 
-/* The emit functions add a node and all nodes below to the piece's stretches. `winding`: winding
- * number at the lowest corner. `envelope`: the parent's envelope cut to the cell, which they
- * change. They return false when out of memory. */
+/* The functions emit_... add a node and all nodes below to the piece's stretches. `winding`:
+ * winding number at the lowest corner of the cell. `envelope`: on entry, the parent's envelope cut
+ * to the cell; they change it. They return false when out of memory. */
 static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope)
 {
@@ -173,7 +178,7 @@ static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
 static bool emit_node(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope);
 
-/* Returns a bit for each child that is not empty. */
+/* Returns a mask: bit o is set if child o is not empty. */
 static unsigned filled_children(const ebpo_branch *s, uint32_t child)
 {
     unsigned mask = 0;
@@ -182,9 +187,10 @@ static unsigned filled_children(const ebpo_branch *s, uint32_t child)
     return mask;
 }
 
-/* Emits the children in the order of octants; neighbours share the halves and quarters from which
- * their envelopes are cut. If a half becomes empty by rounding errors, ebpo_polytope_half replaces
- * it by the whole cube: an envelope may be too large, never too small. */
+/* Emits the children in the order of octants. Their envelopes are cut from halves and quarters of
+ * the node's envelope, which neighbours share. If a half becomes empty by rounding errors,
+ * ebpo_polytope_half replaces it by the whole cube: an envelope may be too large, never too small.
+ */
 static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
@@ -263,10 +269,12 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
 
 typedef struct joiner {
     ebpo_builder *b;
-    ebpo_piece_level **stretch; /* [count] stretches of pieces and of the top, depth first */
+    /* [count][EBPO_LEVELS_MAX] stretches of pieces and of the top, depth first */
+    ebpo_piece_level **stretch;
     uint64_t count, capacity;
-    ebpo_piece_level *current; /* the top's last stretch; NULL: a piece comes after it */
-    ebpo_level *level;         /* result */
+    ebpo_piece_level *current; /* stretches of the top, if they are the last ones so far; NULL: the
+                                * last ones are those of a piece */
+    ebpo_level *level;         /* [EBPO_LEVELS_MAX] result */
 } joiner;
 
 static const char stage[] = "joining levels";
@@ -284,7 +292,7 @@ static bool push_stretch(joiner *j, ebpo_piece_level *out)
     return true;
 }
 
-/* Returns the stretch for the next node of the top, or NULL when out of memory. */
+/* Returns the stretches for the next node of the top, or NULL when out of memory. */
 static ebpo_piece_level *current_stretch(joiner *j)
 {
     if (j->current)
@@ -299,7 +307,7 @@ static ebpo_piece_level *current_stretch(joiner *j)
     return j->current = out;
 }
 
-/* Returns the type, in the file, of a node of the top. */
+/* Returns the type that the file stores for a node of the top. */
 static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
 {
     ebpo_node_type type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
@@ -308,7 +316,8 @@ static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, i
     return type;
 }
 
-/* Collects the stretches of the pieces below a node, and adds the nodes of the top. */
+/* Appends the stretches of the pieces below a node to the list, and stretches with the nodes of the
+ * top between them. Returns false when out of memory. */
 static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
 {
     ebpo_builder *b = j->b;
@@ -345,6 +354,7 @@ static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t
     return true;
 }
 
+/* Sets the count of an array unit (leaves, gray nodes, ...) of the joined level. */
 static void add_counts(const joiner *j, int level, int unit)
 {
     uint64_t total = 0;
@@ -361,6 +371,7 @@ static bool any_has(const joiner *j, int level, int id)
     return false;
 }
 
+/* Fills a part of an array with the array's default value. */
 static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
 {
     /* copies the low bytes of `value`: the machine is little-endian, like the files */
@@ -369,7 +380,8 @@ static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
         memcpy(to + i * ebpo_schema[id].held_size, &value, ebpo_schema[id].held_size);
 }
 
-/* Joins an array; omits an array that no stretch has. */
+/* Joins an array of a level; omits an array that no stretch has. Returns false when out of memory.
+ */
 static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
 {
     uint64_t total = ebpo_level_rows(out, id), size = ebpo_schema[id].held_size;
@@ -395,16 +407,18 @@ static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
     return true;
 }
 
-static int compare_numbers(const void *a, const void *b)
+static int compare_indices(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
 }
 
-static void sort_numbers(uint32_t *a, uint64_t n)
+/* Sorts a list of indices. A short list, as most leaves have, is sorted by insertion. */
+static void sort_indices(uint32_t *a, uint64_t n)
 {
-    if (n > 32) {
-        qsort(a, n, sizeof *a, compare_numbers);
+    static const uint64_t short_list = 32;
+    if (n > short_list) {
+        qsort(a, n, sizeof *a, compare_indices);
         return;
     }
     for (uint64_t i = 1; i < n; i++) {
@@ -416,15 +430,16 @@ static void sort_numbers(uint32_t *a, uint64_t n)
     }
 }
 
-enum { LEAF_GRAIN = 1 << 13 };
+enum { LEAF_GRAIN = 1 << 13 }; /* number of leaves of a parallel task */
 
+/* The job of replacing the indices in a level's leaf_refs. */
 typedef struct numbering {
     const ebpo_builder *b;
     ebpo_level *level;
     uint64_t *first; /* [block of LEAF_GRAIN leaves] index of its first reference in leaf_refs */
 } numbering;
 
-/* Replaces the faces' indices along the curve in leaf_refs by final indices. */
+/* Replaces the indices along the curve by final indices in the references of a block of leaves. */
 static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -434,15 +449,15 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
     (void)worker, (void)error;
     EBPO_FOR_ITEMS_SCATTERED(n->b->workspace, i, begin, end) {
         for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
-            refs[k] = n->b->number[refs[k]];
-        sort_numbers(refs, l->leaf_ref_count[i]);
+            refs[k] = n->b->final_index[refs[k]];
+        sort_indices(refs, l->leaf_ref_count[i]);
         refs += l->leaf_ref_count[i];
     }
     return EBPO_OK;
 }
 
-/* Replaces the indices in a level's leaf_refs by final indices. For progress: `all` is the number
- * of references of all levels, of which `before` are done. */
+/* Replaces the indices along the curve in a level's leaf_refs by final indices. For progress: `all`
+ * is the number of references of all levels, of which `before` are done. */
 static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
                                ebpo_error *error)
 {
@@ -465,7 +480,7 @@ static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t be
     return status;
 }
 
-/* Omits arrays with only default values, and arrays of unwanted parts. */
+/* Frees a level's arrays of unwanted parts, and arrays that have only default values. */
 static void omit_arrays(const ebpo_builder *b, ebpo_level *l)
 {
     uint32_t parts = b->options->parts;
@@ -479,6 +494,7 @@ static void omit_arrays(const ebpo_builder *b, ebpo_level *l)
         l->ref_count = l->new_count = 0;
 }
 
+/* Joins arrays: task i joins array i % EBPO_LEVEL_ARRAYS of level i / EBPO_LEVEL_ARRAYS. */
 static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -492,8 +508,9 @@ static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Sums volumes, in a fixed order that does not depend on the number of threads, and finishes the
- * arrays. */
+/* Adds up the volumes of a level, in a fixed order that does not depend on the number of threads,
+ * replaces the references by final indices, and omits arrays. `before`, `all`: as for number_refs.
+ */
 static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
                                 ebpo_error *error)
 {
@@ -514,8 +531,8 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    ebpo_piece_level *first = current_stretch(j); /* never a piece's stretch, whose arrays may be
-                                                   * packed */
+    /* a stretch of the top, never one of a piece, whose arrays may be in the store */
+    ebpo_piece_level *first = current_stretch(j);
     return first &&
            ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
 }

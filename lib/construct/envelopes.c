@@ -1,18 +1,20 @@
-/* Chooses the planes of gray nodes, from the root down. The directions of candidates are normals of
- * the convex hull of the solid within the cell.
+/* Chooses the planes of gray nodes, from the root down. A candidate is a plane that may be chosen:
+ * a direction and the support of the solid along this direction (the greatest n . x over the solid
+ * within the cell, supports.h). The directions are normals of the convex hull of the solid within
+ * the cell:
  *
- * - If the node has few points (supports.h), the directions are the normals of the facets of their
- * hull.
- * - If it has many points, or if they span no volume, the directions are the normals of the facets
- * of a hull of extreme points, in rounds: each round finds the supports of the solid along the
- * normals of the facets (supports.h), and adds the points of these supports to the hull. Normals of
- * the faces below the node are tried, too: they are grouped in bins of the octahedral map (of
- * normals to 10 + 10 bits), no finer than needed, and the mean of each bin is tried.
+ * - If the node has few points (supports.h), the directions are the normals of the facets of these
+ * points' hull.
+ * - If it has many points, or if they span no volume, the hull grows in rounds: each round finds
+ * the supports of the solid along the normals of the hull's facets, and adds the points of these
+ * supports (extreme points of the solid) to the hull. Normals of the faces below the node are
+ * tried, too: they are grouped in bins of the octahedral map (which maps normals to 10 + 10 bits),
+ * no finer than needed, and the mean of each bin is tried.
  *
  * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
  * plane never cuts off a part of the solid, however bad its direction is. This file also computes
- * the envelopes of the nodes above the pieces, level by level, so that every piece gets its
- * parent's envelope. */
+ * the envelopes of the nodes of the top (the nodes above the pieces), level by level, so that every
+ * piece gets the envelope of its root's parent. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -36,11 +38,11 @@
 /* Maximum number of sampled normals; size of the table of bins. */
 enum { CANDIDATES_SAMPLE = 4096, CANDIDATES_BINS = 16384 };
 
-/* A bin of the octahedral map. */
+/* A bin of the octahedral map: a square of normals. */
 typedef struct normal_bin {
-    uint32_t key;          /* position of the bin; 0: the entry of the table is free */
+    uint32_t key;          /* 1 + position of the bin; 0: the entry of the table is free */
     uint32_t count;        /* number of normals in the bin */
-    uint64_t sum_u, sum_v; /* sums of their two coordinates */
+    uint64_t sum_u, sum_v; /* sums of the normals' two coordinates in the map */
 } normal_bin;
 
 /* Memory of one thread, which is too large for its stack; initialised with zeros. */
@@ -50,9 +52,9 @@ typedef struct candidates_scratch {
     int slots[EBPO_PLANES_CANDIDATES]; /* indices in `table` of the bins that are not free */
 } candidates_scratch;
 
-/* Adds the normals of every `step`-th face to the sample, from begin + *skip on. The faces are
- * entries[begin .. end - 1], or if `entries` is NULL, the branch's list. Sets *skip for the next
- * list. */
+/* Adds the normals of every `step`-th face to the sample, from face begin + *skip on. The faces are
+ * entries[begin .. end - 1]; if `entries` is NULL, faces begin .. end - 1 of the branch's list.
+ * Sets *skip to the number of faces to skip at the beginning of the next list. */
 static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
                          uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step,
                          uint32_t *sample, int *count)
@@ -61,8 +63,8 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
     for (; i < end; i += step) {
         ebpo_triangle face;
         uint32_t normal;
-        if (step > 64 &&
-            *count % 16 == 0) /* each face is in a different part of the workspace's files */
+        /* with a large step, each face is on another page of the workspace's files */
+        if (step > 64 && *count % 16 == 0)
             ebpo_release_pages(b->workspace);
         ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);
         if (*count < CANDIDATES_SAMPLE && ebpo_face_normal_code(&b->box, &face, &normal))
@@ -90,10 +92,11 @@ static int sample_candidates(const ebpo_builder *b, const ebpo_branch *s,
     return count;
 }
 
-/* Fills the table with bins of `width` * `width` normals. Returns false if more than `most` bins
- * are occupied. *used: number of occupied bins, before and after. */
+/* Fills the table with bins of `width` * `width` normals. Returns false if more than `bins_max`
+ * bins would be occupied. *used: number of occupied bins, before and after the call; their indices
+ * in the table are in `slots`. */
 static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
-                      uint32_t width, int most)
+                      uint32_t width, int bins_max)
 {
     for (int i = 0; i < *used; i++)
         table[slots[i]].key = 0;
@@ -105,7 +108,7 @@ static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *
         EBPO_HASH_FIND(at, ebpo_hash_number(key), CANDIDATES_BINS - 1,
                        !table[at].key || table[at].key == key);
         if (!table[at].key) {
-            if (*used == most)
+            if (*used == bins_max)
                 return false;
             table[at] = (normal_bin){ key, 0, 0, 0 };
             slots[(*used)++] = (int)at;
@@ -117,15 +120,16 @@ static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *
     return true;
 }
 
-/* Makes at most `most` candidates of the means of bins. Returns their number. */
+/* Makes candidates of the means of bins, at most bins_max, without supports. Returns their number.
+ */
 static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
-                            const ebpo_branch *s, const ebpo_build_detail *detail, int most,
+                            const ebpo_branch *s, const ebpo_build_detail *detail, int bins_max,
                             ebpo_candidate *out)
 {
     normal_bin *table = scratch->table;
     int used = 0, count = sample_candidates(b, s, detail, scratch->sample);
     uint32_t width = 1;
-    while (!fill_bins(table, &used, scratch->slots, scratch->sample, count, width, most))
+    while (!fill_bins(table, &used, scratch->slots, scratch->sample, count, width, bins_max))
         width = width < 4 ? 4 : width + width / 2;
     for (int i = 0; i < used; i++) {
         normal_bin *t = &table[scratch->slots[i]];
@@ -143,24 +147,25 @@ enum {
     TOP_LEVELS = 4,        /* down to this level, planes take hardly any bytes of the file */
     MANY_LEVELS = 2,       /* down to this level (at most 73 nodes), a node may have twice as many
                             * planes, which round solids need */
-    FACES_BELOW = 16,      /* maximum number of means of face normals that are tried */
-    HULL_BELOW = 24,       /* maximum number of directions of a round below TOP_LEVELS */
+    FACES_TRIED = 16,      /* maximum number of means of face normals that are tried */
     HULL_ROUNDS = 3,       /* maximum number of rounds */
-    HULL_DIRECTIONS = 160, /* maximum number of directions of a round down to TOP_LEVELS */
+    ROUND_TRIED_TOP = 160, /* maximum number of directions tried in a round, down to TOP_LEVELS */
+    ROUND_TRIED = 24,      /* the same below TOP_LEVELS */
     TABLE = 1024           /* entries of the table of normals */
 };
 
 struct ebpo_envelope_scratch {
     ebpo_supports supports;
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
-    int count;
-    /* normals of candidates and of dropped directions */
+    int count; /* number of candidates */
+    /* normals that were tried: those of candidates and those of useless planes */
     uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
     int tried_count;
-    uint32_t normals[TABLE];          /* hash table: 1 + normal; 0: free */
-    double core[EBPO_HULL_POINTS][3]; /* known points of the solid in the cell, for the hull */
-    int core_count;
-    ebpo_hull_facet facet[EBPO_HULL_FACETS];
+    uint32_t normals[TABLE]; /* hash table: 1 + normal; 0: free */
+    /* known points of the solid in the cell, whose hull gives directions */
+    double hull_points[EBPO_HULL_POINTS][3];
+    int hull_point_count;
+    ebpo_hull_facet facet[EBPO_HULL_FACETS]; /* facets of the hull */
     candidates_scratch of_faces;
 };
 
@@ -177,11 +182,12 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     free(scratch);
 }
 
-/* Returns the largest useful support of a plane: with this support or more, the plane can remove
- * neither the volume epsilon nor a needle. Reason: the part of height h that a plane cuts off from
- * a convex body of width H and volume V has at most the volume V (1 - (1 - h/H)^3) <= 3 V h / H. */
-static double largest_useful_support(const ebpo_polytope *envelope, double volume,
-                                     const int32_t n[3], double epsilon)
+/* Returns a limit for the support of a useful plane with the normal n: a plane whose support is the
+ * limit or more can remove neither the volume epsilon nor a needle (a long, thin portion of the
+ * envelope). Reason: the part of height h that a plane cuts off from a convex body of width H and
+ * volume V has at most the volume V (1 - (1 - h/H)^3) <= 3 V h / H. */
+static double useful_support_limit(const ebpo_polytope *envelope, double volume, const int32_t n[3],
+                                   double epsilon)
 {
     double greatest = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -194,17 +200,18 @@ static double largest_useful_support(const ebpo_polytope *envelope, double volum
     return greatest - fmin((greatest - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
-/* Tries a direction: makes it a candidate if its plane may be useful. Sets `where` to the point of
- * the greatest value found; the search stops as soon as the plane is useless. */
+/* Tries a direction: adds a candidate if its plane may be useful. The search for the support stops
+ * as soon as the plane is useless. Sets `where` to the point with the greatest n . x found. */
 static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
                        double volume, double epsilon, double where[3])
 {
     int32_t n[3], d;
     ebpo_plane_code_decode(normal, n, &d);
-    double enough = largest_useful_support(envelope, volume, n, epsilon);
-    double support = ebpo_supports_find_from(&s->supports, n, enough, (const double(*)[3])s->core,
-                                             s->core_count, where);
-    if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
+    double limit = useful_support_limit(envelope, volume, n, epsilon);
+    double support =
+        ebpo_supports_find_from(&s->supports, n, limit, (const double(*)[3])s->hull_points,
+                                s->hull_point_count, where);
+    if (support < limit && s->count < EBPO_PLANES_CANDIDATES)
         s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = support };
     if (s->tried_count < 2 * EBPO_PLANES_CANDIDATES)
         s->tried[s->tried_count++] = normal;
@@ -212,26 +219,27 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
 
 /* --- directions of the hull --- */
 
-/* Adds a point to the hull's points, unless a known point is very close. */
-static void add_core(ebpo_envelope_scratch *s, const double where[3])
+/* Adds a point to the hull's points, unless one of them is very close. */
+static void add_hull_point(ebpo_envelope_scratch *s, const double where[3])
 {
-    static const double near = 1e-12;
-    for (int i = 0; i < s->core_count; i++) {
+    static const double near_squared = 1e-12; /* squared distance, in cells */
+    for (int i = 0; i < s->hull_point_count; i++) {
         double square = 0;
         for (int k = 0; k < 3; k++)
-            square += (s->core[i][k] - where[k]) * (s->core[i][k] - where[k]);
-        if (square < near)
+            square += (s->hull_points[i][k] - where[k]) * (s->hull_points[i][k] - where[k]);
+        if (square < near_squared)
             return;
     }
-    if (s->core_count == EBPO_HULL_POINTS)
+    if (s->hull_point_count == EBPO_HULL_POINTS)
         return;
     for (int k = 0; k < 3; k++)
-        s->core[s->core_count][k] = where[k];
-    s->core_count++;
+        s->hull_points[s->hull_point_count][k] = where[k];
+    s->hull_point_count++;
 }
 
-/* Adds the extreme points along the directions from the cell's centre to its faces, edges and
- * corners. So the hull has points on all sides, whatever the normals of the faces are. */
+/* Adds the extreme points of the solid along the directions from the cell's centre to the cell's
+ * faces, edges and corners. So the hull has points on all sides, whatever the normals of the
+ * model's faces are. */
 static void add_points_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
@@ -240,9 +248,9 @@ static void add_points_around(ebpo_envelope_scratch *s)
         int32_t n[3], d;
         if (!ebpo_plane_code_normal(direction, &normal) || !ebpo_plane_code_decode(normal, n, &d))
             continue;
-        if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double(*)[3])s->core,
-                                    s->core_count, where) > -1e300)
-            add_core(s, where);
+        if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double(*)[3])s->hull_points,
+                                    s->hull_point_count, where) > -1e300)
+            add_hull_point(s, where);
     }
 }
 
@@ -254,47 +262,49 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
     return false;
 }
 
-/* Runs one round: tries the normals of the facets of the hull of the known points, at most `most`
- * directions, the largest facets first. Adds the extreme points that are beyond a facet. Returns
- * false if no point was added. */
+/* Runs one round: tries the normals of the facets of the hull of the known points, the largest
+ * facets first, at most `directions_max` directions. Adds the extreme points that are beyond a
+ * facet. Returns false if no point was added. */
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
-                       double epsilon, int most)
+                       double epsilon, int directions_max)
 {
-    static const double least_distance = 1e-3; /* of an added point from the facet, in cells */
-    int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, 1e-9, s->facet,
-                                  EBPO_HULL_FACETS),
-        before = s->core_count;
+    /* least distance of an added point from the facet, in cells */
+    static const double least_distance = 1e-3;
+    int facets = ebpo_hull_facets((const double(*)[3])s->hull_points, s->hull_point_count, 1e-9,
+                                  s->facet, EBPO_HULL_FACETS),
+        before = s->hull_point_count;
     qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
-    for (int i = 0; i < facets && most > 0; i++) {
+    for (int i = 0; i < facets && directions_max > 0; i++) {
         const ebpo_hull_facet *f = &s->facet[i];
         uint32_t normal;
         double where[3] = { 0, 0, 0 };
         if (!ebpo_plane_code_normal(f->n, &normal) || was_tried(s, normal))
             continue;
         try_normal(s, normal, envelope, volume, epsilon, where);
-        most--;
+        directions_max--;
         if (ebpo_vec3_dot(f->n, where) > f->d + least_distance)
-            add_core(s, where);
+            add_hull_point(s, where);
     }
-    return s->core_count > before;
+    return s->hull_point_count > before;
 }
 
+/* Runs rounds until one adds no point, at most HULL_ROUNDS. */
 static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
-                     double epsilon, int most)
+                     double epsilon, int directions_max)
 {
-    for (int round = 0; round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, most);
-         round++)
+    for (int round = 0;
+         round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, directions_max); round++)
         ;
 }
 
 /* --- few points --- */
 
-/* Points that are outside the hull by less than this add nearly equal directions, so they are
- * omitted below TOP_LEVELS. */
+/* Points outside the hull so far are omitted below TOP_LEVELS if they are nearer to the hull than
+ * this distance (in cells), because they would only add nearly equal directions. */
 static const double hull_tolerance = 1e-3;
 
-/* Takes all points of the node for the hull. Returns false if they are too many, or if vertices are
- * not among them. */
+/* Makes all points of the node the points of the hull. Returns false if they are too many, or if
+ * some points of the node are not in the array `point` but are a range of vertices. */
 static bool use_all_points(ebpo_envelope_scratch *s)
 {
     const ebpo_supports *from = &s->supports;
@@ -302,13 +312,13 @@ static bool use_all_points(ebpo_envelope_scratch *s)
         return false;
     for (uint64_t i = 0; i < from->count; i++) {
         for (int k = 0; k < 3; k++)
-            s->core[i][k] = from->point[i / 4][k][i % 4];
+            s->hull_points[i][k] = from->point[i / 4][k][i % 4];
     }
-    s->core_count = (int)from->count;
+    s->hull_point_count = (int)from->count;
     return true;
 }
 
-/* Adds a normal to the table; returns false when the table has it already. */
+/* Adds a normal to the table. Returns false if the table has it already. */
 static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
 {
     uint64_t at;
@@ -320,12 +330,12 @@ static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
     return true;
 }
 
-/* Makes candidates of the hull's facets. Returns the volume of the hull, or -1 if the points span
- * no volume. */
+/* Makes candidates of the facets of the points' hull. Points outside the hull so far by less than
+ * `tolerance` are omitted. Returns the volume of the hull, or -1 if the points span no volume. */
 static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 {
-    int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, tolerance, s->facet,
-                                  EBPO_HULL_FACETS);
+    int facets = ebpo_hull_facets((const double(*)[3])s->hull_points, s->hull_point_count,
+                                  tolerance, s->facet, EBPO_HULL_FACETS);
     if (facets == 0)
         return -1;
     if (facets > EBPO_PLANES_CANDIDATES)
@@ -350,9 +360,10 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 
 /* --- the node --- */
 
-/* Returns the factor of epsilon for levels down to TOP_LEVELS. It is small, because their planes
- * take hardly any bytes, and even a solid that fills a thousandth of its cell needs planes. */
-static double top_share(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
+/* Returns the factor of epsilon for a node down to TOP_LEVELS, whose envelope has this volume (in
+ * cells) so far. The factor is small, because planes of these levels take hardly any bytes, and
+ * even a solid that fills a thousandth of its cell needs planes. */
+static double top_factor(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
 /* Makes the candidates of a node with many points. */
 static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
@@ -360,19 +371,20 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
                               const ebpo_polytope *envelope, double volume, double epsilon)
 {
     bool top = level <= TOP_LEVELS;
-    ebpo_candidate faces[FACES_BELOW];
-    int count = build_candidates(b, &s->of_faces, branch, detail, FACES_BELOW, faces);
-    s->core_count = 0;
+    ebpo_candidate faces[FACES_TRIED];
+    int count = build_candidates(b, &s->of_faces, branch, detail, FACES_TRIED, faces);
+    s->hull_point_count = 0;
     add_points_around(s);
     for (int i = 0; i < count; i++) {
         double where[3];
         try_normal(s, faces[i].normal, envelope, volume, epsilon, where);
-        add_core(s, where);
+        add_hull_point(s, where);
     }
-    try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
+    try_hull(s, envelope, volume, epsilon, top ? ROUND_TRIED_TOP : ROUND_TRIED);
 }
 
-/* Chooses the planes of a gray node from the root down. Returns their number, or -1. */
+/* Chooses the planes of a gray node from the root down. Returns their number, or -1 when out of
+ * memory. */
 static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch,
                       const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope, uint32_t *codes)
@@ -380,19 +392,20 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
         return -1;
     double volume = ebpo_polytope_volume(envelope),
-           epsilon = b->options->epsilon * (cell.level <= TOP_LEVELS ? top_share(volume) : 1);
+           epsilon = b->options->epsilon * (cell.level <= TOP_LEVELS ? top_factor(volume) : 1);
     ebpo_choice choice = { .candidates = s->candidates,
-                           .most =
+                           .codes_max =
                                cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX,
                            .epsilon = epsilon,
-                           .reach = ebpo_needle };
-    s->count = s->tried_count = s->core_count = 0;
+                           .needle_length = ebpo_needle };
+    s->count = s->tried_count = s->hull_point_count = 0;
     if (!(volume > 0))
         return 0;
     if (!use_all_points(s) ||
-        (choice.core = hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
+        (choice.hull_volume =
+             hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
         choose_directions(b, s, branch, detail, cell.level, envelope, volume, epsilon);
-        choice.core = 0;
+        choice.hull_volume = 0;
     }
     choice.count = s->count;
     return ebpo_select_greedy(envelope, &choice, codes);
@@ -415,10 +428,11 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
 
 /* A gray node of the top, whose envelope is to be computed. */
 typedef struct pending {
-    uint32_t node; /* gray node in the top */
+    uint32_t node; /* index in the top's nodes */
     ebpo_cell cell;
-    int32_t winding;
-    ebpo_polytope *envelope; /* first the parent's envelope cut to the cell, then the node's own */
+    int32_t winding; /* winding number at the lowest corner */
+    /* first the parent's envelope cut to the cell, then the envelope of the node */
+    ebpo_polytope *envelope;
 } pending;
 
 /* The gray nodes of one level of the top, which are processed together. */
@@ -433,6 +447,7 @@ static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
     return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
 }
 
+/* Chooses the planes and computes the envelopes of nodes of the front. */
 static ebpo_status front_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                    ebpo_error *error)
 {
@@ -456,8 +471,8 @@ static ebpo_status front_envelopes(void *context, uint64_t begin, uint64_t end, 
     return status;
 }
 
-/* Cuts a node's envelope to its children. Gray children join the next front; pieces get the
- * envelope and their winding number. */
+/* Cuts a node's envelope to the cells of its children. Gray children are added to the next front;
+ * pieces get the envelope and their winding number. Returns false when out of memory. */
 static bool pass_down(ebpo_builder *b, const pending *p, front *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
@@ -494,6 +509,7 @@ static void front_free(front *w)
     *w = (front){ .b = w->b };
 }
 
+/* Makes the first front, which is the root; if the root is a piece, the front is empty. */
 static ebpo_status front_begin(ebpo_builder *b, front *w, ebpo_error *error)
 {
     ebpo_polytope *cube = ebpo_array_alloc(b->workspace, 1, sizeof *cube);
@@ -517,23 +533,23 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
     b->top_envelope = ebpo_alloc_zero(b->top.detail_count + 1, sizeof *b->top_envelope);
     if (!b->top_envelope)
         return no_memory(b, error);
-    front now = { .b = b }, next = { .b = b };
-    ebpo_status status = front_begin(b, &now, error);
+    front current = { .b = b }, next = { .b = b };
+    ebpo_status status = front_begin(b, &current, error);
     ebpo_pass pass = { &b->options->progress, 0, 0, b->top.detail_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    while (status == EBPO_OK && now.count) {
+    while (status == EBPO_OK && current.count) {
         pass.begin = pass.end;
-        pass.end += now.count;
-        status = ebpo_parallel_for(b->threads, NULL, now.count, 1, front_envelopes, &now, &progress,
-                                   "top envelopes", error);
-        for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
-            if (!pass_down(b, &now.nodes[i], &next))
+        pass.end += current.count;
+        status = ebpo_parallel_for(b->threads, NULL, current.count, 1, front_envelopes, &current,
+                                   &progress, "top envelopes", error);
+        for (uint64_t i = 0; i < current.count && status == EBPO_OK; i++)
+            if (!pass_down(b, &current.nodes[i], &next))
                 status = no_memory(b, error);
-        front_free(&now);
-        now = next;
+        front_free(&current);
+        current = next;
         next = (front){ .b = b };
     }
-    front_free(&now);
+    front_free(&current);
     front_free(&next);
     return status;
 }

@@ -3,9 +3,9 @@
  * Leaves are visited depth first. A face gets the next index in the first leaf that lists it, and a
  * vertex gets the next index in the first face that uses it. So the new faces of a leaf (no earlier
  * leaf lists them) are one range in the file, and only the leaf's other faces need references. A
- * piece numbers its *fresh* faces, which no earlier piece lists, so pieces do not depend on each
- * other. Attributes move with their vertices and faces. format-spec/README.md describes the order.
- */
+ * piece (a subtree that one thread builds) assigns indices to its *fresh* faces, which no earlier
+ * piece lists; so the pieces can be processed in any order. Attributes move with their vertices and
+ * faces. format-spec/README.md describes the order. */
 #include "core/strict_fp.h"
 
 #include "construct/construct_stages.h"
@@ -18,18 +18,19 @@
 #include "core/error.h"
 #include "core/parallel.h"
 
-/* Numbers the new faces of a leaf. `next`: next index. */
+/* Assigns final indices to the new faces of a leaf. *next: the next index. */
 static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail *d, uint32_t *next)
 {
     d->first = *next;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
-        uint32_t place = s->entries[i], f = s->list[place];
-        if (s->fresh[place / 8] >> place % 8 & 1 && b->number[f] == EBPO_NO_NUMBER)
-            b->number[f] = (*next)++;
+        uint32_t entry = s->entries[i], f = s->list[entry];
+        if (s->fresh[entry / 8] >> entry % 8 & 1 && b->final_index[f] == EBPO_NO_INDEX)
+            b->final_index[f] = (*next)++;
     }
     d->new_count = *next - d->first;
 }
 
+/* Assigns final indices to the new faces of all leaves of a subtree. */
 static void number_node(ebpo_builder *b, ebpo_branch *s, uint32_t index, uint32_t *next)
 {
     const ebpo_build_node *node = &s->nodes[index];
@@ -49,13 +50,14 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
     uint64_t numbered = next - s->first;
     if (numbered != s->fresh_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "internal: %llu faces of a piece are in none of its leaves",
+                         "internal: %llu faces of a piece of the tree are in none of its leaves",
                          (unsigned long long)(s->fresh_count - numbered));
     return EBPO_OK;
 }
 
-/* Sets order[i] to the mesh's vertex that gets the final index i, and final[v] to the final index
- * of vertex v. */
+/* Sets order[i] to the vertex that gets the final index i, and final[v] to the final index of
+ * vertex v. face_at[i]: the face that has the final index i. All vertices and faces are indices
+ * along the curve. */
 static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
                            uint32_t *order, uint32_t *final)
 {
@@ -64,13 +66,13 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
     EBPO_FOR_ITEMS_SCATTERED(b->workspace, i, 0, mesh->face_count) {
         const uint32_t *f = mesh->faces + 3 * (uint64_t)face_at[i];
         for (int k = 0; k < 3; k++)
-            if (final[f[k]] == EBPO_NO_NUMBER) {
+            if (final[f[k]] == EBPO_NO_INDEX) {
                 order[next] = f[k];
                 final[f[k]] = next++;
             }
     }
     EBPO_FOR_ITEMS_SCATTERED(b->workspace, v, 0, mesh->vertex_count) {
-        if (final[v] == EBPO_NO_NUMBER) {
+        if (final[v] == EBPO_NO_INDEX) {
             order[next] = (uint32_t)v;
             final[v] = next++;
         }
@@ -80,21 +82,24 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
 /* Input and output of the parallel tasks that move the data into the final order. */
 typedef struct moving {
     const ebpo_builder *b;
-    const ebpo_mesh *mesh;
+    const ebpo_mesh *mesh; /* in the order along the curve */
     const uint32_t *final; /* [vertex] final index */
     uint32_t *face_at;     /* [final index] face of `mesh` */
+    /* result; vertex_source first contains vertices of `mesh`, which move_vertices replaces by
+     * source indices */
     ebpo_tree *out;
 } moving;
 
-enum { MOVE_GRAIN = 1 << 14 };
+enum { MOVE_GRAIN = 1 << 14 }; /* number of vertices or faces of a task */
 
-static ebpo_status invert_numbers(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                  ebpo_error *error)
+/* Sets face_at for the final indices of faces. */
+static ebpo_status invert_final_indices(void *context, uint64_t begin, uint64_t end,
+                                        unsigned worker, ebpo_error *error)
 {
     moving *m = context;
     (void)worker, (void)error;
     EBPO_FOR_ITEMS_SCATTERED(m->b->workspace, f, begin, end)
-        m->face_at[m->b->number[f]] = (uint32_t)f;
+        m->face_at[m->b->final_index[f]] = (uint32_t)f;
     return EBPO_OK;
 }
 
@@ -130,26 +135,27 @@ static ebpo_status move_faces(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
+/* Moves faces and vertices into the final order. `final`: space for moving.final. */
 static ebpo_status move_all(moving *m, uint32_t *final, ebpo_error *error)
 {
     const ebpo_builder *b = m->b;
     static const char stage[] = "numbering vertices";
     uint64_t faces = m->mesh->face_count, vertices = m->mesh->vertex_count,
              all = 3 * faces + vertices;
-    ebpo_pass turn = { &b->options->progress, 0, faces, all },
-              place = { turn.to, 2 * faces, 2 * faces + vertices, all },
-              move = { turn.to, 2 * faces + vertices, all, all };
-    ebpo_progress progress = ebpo_pass_progress(&turn);
-    ebpo_status status = ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN, invert_numbers, m,
-                                           &progress, stage, error);
+    ebpo_pass invert_pass = { &b->options->progress, 0, faces, all },
+              vertex_pass = { invert_pass.to, 2 * faces, 2 * faces + vertices, all },
+              face_pass = { invert_pass.to, 2 * faces + vertices, all, all };
+    ebpo_progress progress = ebpo_pass_progress(&invert_pass);
+    ebpo_status status = ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN,
+                                           invert_final_indices, m, &progress, stage, error);
     if (status != EBPO_OK)
         return status;
     order_vertices(b, m->mesh, m->face_at, m->out->vertex_source, final);
     m->final = final;
-    progress = ebpo_pass_progress(&place);
+    progress = ebpo_pass_progress(&vertex_pass);
     status = ebpo_parallel_for(b->threads, NULL, vertices, MOVE_GRAIN, move_vertices, m, &progress,
                                stage, error);
-    progress = ebpo_pass_progress(&move);
+    progress = ebpo_pass_progress(&face_pass);
     return status == EBPO_OK ? ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN, move_faces, m,
                                                  &progress, stage, error)
                              : status;

@@ -1,12 +1,13 @@
-/* Computes the colours of gray nodes: the mean of the colours of the faces below, weighted by area
- * (format-spec/colours.md).
+/* Computes the colours of gray nodes: the mean of the colours of the faces below a node, weighted
+ * by area (format-spec/colours.md).
  *
  * The levels are processed from the deepest upwards: the sums of a gray node are the sums over its
- * group of eight children. No data is kept for each face: the weight of a face is computed again
- * for each leaf that lists the face, as most faces are in one leaf only. Weights and sums are
- * integers, so the result is exact and does not depend on the number of threads. The colours are
- * those of vertices. If vertices have no colours or all have the same colour, face colours are
- * used, if there are any. lib/verify computes the same colours with separate code. */
+ * group of eight children. No data is stored for each face: the weight of a face is computed again
+ * for each leaf that lists the face, because most faces are in one leaf only. Weights and sums are
+ * integers, so the result is exact and does not depend on the number of threads. The colour of a
+ * face is the mean of its vertices' colours; if vertices have no colours, or all have the same
+ * colour, it is the face's own colour, if faces have colours. lib/verify computes the same colours
+ * with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,8 +22,8 @@
 #include "geometry/vec3.h"
 #include "mesh/attributes.h"
 
-/* GROUP_GRAIN: groups of a task. GROUPS_A_TIME: groups after which pages of the workspace are
- * released. */
+/* GROUP_GRAIN: number of groups of a task. GROUPS_A_TIME: number of groups after which pages of the
+ * workspace are released. */
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 
 /* Sums over the faces below a node. A face counts once for each leaf that lists the face. */
@@ -31,8 +32,8 @@ typedef struct colour_sums {
     ebpo_wide weight;    /* sum of 3 * weight */
 } colour_sums;
 
-/* Numbers of leaves, gray nodes and references of a level before the groups of a task. (A reference
- * is an entry of leaf_refs: a face that an earlier leaf also lists.) */
+/* Numbers of a level's leaves, gray nodes and references that come before the groups of a task. (A
+ * reference is an element of leaf_refs: a face that an earlier leaf also lists.) */
 typedef struct task_start {
     uint64_t leaf, gray, ref;
 } task_start;
@@ -44,12 +45,14 @@ typedef struct colouring {
     ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
     const ebpo_level *level;  /* level whose groups are added up */
     const task_start *start;  /* [task] */
-    const colour_sums *below; /* sums of the level's gray nodes */
-    colour_sums *above;       /* sums of the level's groups */
-    uint32_t *colours;        /* colours of the level's groups */
+    const colour_sums *below; /* [gray node of the level] sums */
+    /* sums and colours of the level's groups, which are those of the gray nodes of the level above:
+     * [group] */
+    colour_sums *above;
+    uint32_t *colours; /* bytes 0 to 2: red, green, blue */
 } colouring;
 
-/* Returns the weight of a face: 1 + 2^32 times its doubled area, relative to the squared size. */
+/* Returns the weight of a face: 1 + floor(2^32 times its doubled area, divided by size^2). */
 static uint64_t weight_of(const colouring *c, uint64_t face)
 {
     const uint32_t *corner = c->tree->mesh.faces + 3 * face;
@@ -69,6 +72,7 @@ static void add_face(const colouring *c, uint64_t face, colour_sums *sums)
     uint64_t weight = weight_of(c, face);
     const uint32_t *corner = c->tree->mesh.faces + 3 * face;
     for (int k = 0; k < 3; k++) {
+        /* 3 times the face's colour */
         unsigned triple = c->by_face ? 3u * ebpo_colour_byte(&c->column[k], face) : 0;
         for (int i = 0; i < 3 && !c->by_face; i++)
             triple += ebpo_colour_byte(&c->column[k], corner[i]);
@@ -84,6 +88,7 @@ static void add_sums(colour_sums *to, const colour_sums *more)
     to->weight = ebpo_wide_plus(to->weight, more->weight);
 }
 
+/* Adds the faces of a leaf. `ref`: index of the leaf's first reference. */
 static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sums *sums)
 {
     const ebpo_level *l = c->level;
@@ -105,6 +110,7 @@ static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
     return byte;
 }
 
+/* Returns the mean colour, with red in byte 0. */
 static uint32_t mean_of(const colour_sums *sums)
 {
     uint32_t colour = 0;
@@ -113,6 +119,7 @@ static uint32_t mean_of(const colour_sums *sums)
     return colour;
 }
 
+/* Computes the sums and colours of groups of a level. */
 static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -136,6 +143,7 @@ static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
+/* Returns the starts of all tasks for c->level, which the caller frees; NULL when out of memory. */
 static task_start *find_starts(const colouring *c)
 {
     const ebpo_level *l = c->level;
@@ -187,6 +195,7 @@ static bool have_equal_colours(const colouring *c)
     return true;
 }
 
+/* Chooses the colours of vertices or those of faces. */
 static void choose_columns(colouring *c)
 {
     const ebpo_attributes *attributes = c->tree->mesh.attributes;

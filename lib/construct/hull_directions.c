@@ -1,15 +1,17 @@
 /* Computes a small convex hull. Envelopes use only the directions of its facets. So a rounding
- * error here may enlarge an envelope, but the envelope still contains the faces.
+ * error in this file may enlarge an envelope, but the envelope still contains the model's faces.
  *
- * The hull grows point by point: a point outside the hull is above some facets and replaces them by
- * new facets (a beneath-beyond algorithm in doubles). Points that are extreme along the axes and
- * diagonals come first, so that most other points are inside the hull when they are tested. The
- * planes of the facets are stored as a structure of arrays (nx, ny, nz, d), for the kernel that
- * tests a point against all planes (sweep.h).
+ * The hull grows point by point: a point outside the hull is above the planes of some facets
+ * ("visible" facets), which are replaced by new facets with this point as a corner (a
+ * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
+ * first, so that most other points are inside the hull when they are tested. The planes of the
+ * facets are stored as a structure of arrays (nx, ny, nz, d), for the kernel that tests a point
+ * against all planes (sweep.h).
  *
- * Limits: with more than EBPO_HULL_POINTS points there is no hull (0 facets). When the capacity for
- * facets is reached (at most EBPO_HULL_FACETS), the remaining points are omitted. Ties are ordered
- * by indices of points, so that all machines return the same facets in the same order. */
+ * Limits: if there are more than EBPO_HULL_POINTS points, no hull is computed (0 facets). When the
+ * capacity for facets is reached (at most EBPO_HULL_FACETS), the remaining points are omitted. Ties
+ * are ordered by indices of points, so that all machines return the same facets in the same order.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,7 +22,7 @@
 #include "construct/sweep.h"
 #include "geometry/vec3.h"
 
-/* a point whose distance from a plane is less than this counts as on the plane */
+/* A point that is nearer to a plane than this distance counts as a point on the plane. */
 static const double flat = 1e-9;
 
 _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
@@ -33,15 +35,15 @@ enum {
 
 /* The hull so far. */
 typedef struct hull {
-    const ebpo_sweep *sweep;
-    const double (*p)[3];
+    const ebpo_sweep *sweep; /* kernels for this processor */
+    const double (*p)[3];    /* points */
     /* planes n . x = d of the facets, padded to a multiple of four with planes that no point is
      * above */
     double nx[FACETS_MAX + 4], ny[FACETS_MAX + 4], nz[FACETS_MAX + 4], d[FACETS_MAX + 4];
-    double length[FACETS_MAX]; /* length of the facet's cross product: twice its area */
-    double tolerance;          /* points at most this far outside the hull are omitted */
-    uint16_t corner[FACETS_MAX][3];
-    int count, capacity; /* number of facets, and its limit */
+    double length[FACETS_MAX];      /* length of the facet's cross product: twice its area */
+    double tolerance;               /* points at most this far outside the hull are omitted */
+    uint16_t corner[FACETS_MAX][3]; /* indices of points, counter-clockwise seen from outside */
+    int count, capacity;            /* number of facets, and its limit */
 } hull;
 
 /* Computes the normal of the triangle a, b, c. Its length is twice the triangle's area. */
@@ -66,8 +68,9 @@ static bool make_facet(hull *h, int i, int a, int b, int c)
 {
     double n[3];
     cross_of(h->p, a, b, c, n);
+    static const double least_length = 1e-18; /* of a normal that gives a direction */
     double length = ebpo_vec3_length(n);
-    if (!(length > 1e-18))
+    if (!(length > least_length))
         return false;
     const double *p = h->p[a];
     for (int k = 0; k < 3; k++)
@@ -98,8 +101,8 @@ static void set_count(hull *h, int count)
 
 /* --- the first four facets --- */
 
-/* Finds the extreme point in each direction. Directions 2 w and 2 w + 1 are opposite; 0 to 5 are
- * along the axes, the others along the diagonals. */
+/* Finds the extreme point in each direction: at[w] is its index. Directions 2 w and 2 w + 1 are
+ * opposite; 0 to 5 are along the axes, the others along the diagonals. */
 static void find_extremes(const double (*p)[3], int count, int at[EXTREMES])
 {
     double best[EXTREMES];
@@ -132,8 +135,8 @@ static double height_above(const double n[3], const double from[3], const double
     return ebpo_vec3_dot(n, difference);
 }
 
-/* Finds four points far from each other. The fourth is below the facet of the first three. Returns
- * false if the points span no volume. */
+/* Finds four points far from each other: the corners of a tetrahedron. The fourth is below the
+ * facet of the first three. Returns false if the points span no volume. */
 static bool first_four(const double (*p)[3], int count, const int extremes[EXTREMES], int corner[4])
 {
     double best = -1, n[3];
@@ -165,7 +168,7 @@ static bool first_four(const double (*p)[3], int count, const int extremes[EXTRE
     return fabs(side) > flat * length;
 }
 
-/* Makes the four facets of a tetrahedron. */
+/* Makes the four facets of a tetrahedron. Returns false if one of them has no area. */
 static bool first_facets(hull *h, const int c[4])
 {
     static const int sides[4][3] = { { 0, 1, 2 }, { 0, 3, 1 }, { 1, 3, 2 }, { 2, 3, 0 } };
@@ -178,8 +181,9 @@ static bool first_facets(hull *h, const int c[4])
 
 /* --- adding a point --- */
 
-/* Lists the edges of the visible facets as from << 16 | to in `edges`, and as to << 16 | from in
- * `reversed`. Returns their number. Pads `edges` to a multiple of four with invalid edges. */
+/* Lists the edges of the visible facets, as from << 16 | to in `edges` and as to << 16 | from in
+ * `reversed` (from, to: indices of points). Returns their number. Pads `edges` to a multiple of
+ * four with invalid edges. */
 static int edges_of(const hull *h, const uint16_t *visible, int visible_count, uint32_t *edges,
                     uint32_t *reversed)
 {
@@ -197,8 +201,8 @@ static int edges_of(const hull *h, const uint16_t *visible, int visible_count, u
     return listed;
 }
 
-/* Returns true if the edge is in the list. The loop has no early exit, so that compilers vectorise
- * it. */
+/* Returns true if the edge is in a list of 4 * fours edges. The loop has no early exit, so that
+ * compilers vectorise it. */
 static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
 {
     uint32_t found = 0;
@@ -207,10 +211,10 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Removes the visible facets that no new facet has replaced: the facets with the numbers
- * index[from] .. index[to - 1], in ascending order. `count`: number of facets before. For each
- * removed facet, the greatest index first, the last facet of the hull takes its index. So the facet
- * that moves is never one that must still be removed. */
+/* Removes the visible facets that no new facet has replaced: index[from] .. index[to - 1], in
+ * ascending order. `count`: number of facets before. The facet with the greatest index is removed
+ * first; each time, the last facet of the hull takes the removed facet's index. So the facet that
+ * moves is never one that must still be removed. */
 static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--)
@@ -219,9 +223,9 @@ static void close_gaps(hull *h, const uint16_t *index, int from, int to, int cou
     set_count(h, count);
 }
 
-/* Adds a point to the hull. Returns false if the point would replace more than VISIBLE_MAX facets
- * or if the capacity is reached. The hull may then have overlapping facets, so no more points can
- * be added, but its facets still give directions. */
+/* Adds a point to the hull; a point inside the hull changes nothing. Returns false if the point
+ * would replace more than VISIBLE_MAX facets or if the capacity is reached. Then the hull may have
+ * overlapping facets, so no more points can be added, but its facets still give directions. */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE_MAX];

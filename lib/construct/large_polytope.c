@@ -1,8 +1,8 @@
 /* Cuts convex polytopes with any number of faces, by the method of geometry/polytope.c (BP 2008,
  * section 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first shape
- * if the cut succeeds. Vertices within a tolerance of the cutting plane count as on the plane. If
- * rounding errors would make the new shape inconsistent, the cut is refused; so the polytope is
- * never too small. */
+ * if the cut succeeds. A vertex that is nearer to the cutting plane than a tolerance counts as a
+ * vertex on the plane. If rounding errors would make the new shape inconsistent, the cut is
+ * refused; so the polytope is never too small. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -14,12 +14,16 @@
 #include "geometry/vec3.h"
 
 static const double tolerance = 1e-10; /* in cells */
+/* A cut is refused if it would leave only points nearer to the plane than this distance, in cells.
+ */
+static const double least_depth = 1e-7;
 
 static const uint32_t no_vertex = UINT32_MAX;
 
+/* An edge that the plane cuts. */
 struct ebpo_large_edge {
-    uint64_t key; /* 1 + (inner end << 32 | outer end); 0: empty slot */
-    uint32_t vertex;
+    uint64_t key;    /* 1 + (kept end << 32 | end that is cut off); 0: empty slot */
+    uint32_t vertex; /* the new vertex, in `next` */
 };
 
 /* --- shapes --- */
@@ -33,6 +37,7 @@ static bool shape_begin(ebpo_large_shape *s)
     return true;
 }
 
+/* Adds a vertex, and returns its index. Sets p->no_memory when out of memory. */
 static uint32_t shape_vertex(ebpo_large_polytope *p, ebpo_large_shape *s, const double x[3])
 {
     if (!ebpo_grow(&s->vertex, &s->vertex_capacity, s->vertex_count + 1, sizeof *s->vertex)) {
@@ -106,7 +111,7 @@ void ebpo_large_free(ebpo_large_polytope *p)
     shape_free(&p->now);
     shape_free(&p->next);
     free(p->distance);
-    free(p->number);
+    free(p->next_index);
     free(p->cap);
     free(p->on);
     free(p->edge);
@@ -133,14 +138,16 @@ double ebpo_large_volume(const ebpo_large_polytope *p)
 
 /* --- clipping --- */
 
+/* Returns true if the plane cuts off a vertex of `now`. */
 static bool is_out(const ebpo_large_polytope *p, uint32_t v) { return p->distance[v] > tolerance; }
 
-/* Returns the vertex where the plane cuts an edge; it is the same for both faces at the edge. */
+/* Returns the vertex of `next` where the plane cuts the edge from the kept vertex `in` to the
+ * vertex `out`; it is the same for both faces at the edge. */
 static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
 {
     uint64_t key = ((uint64_t)in << 32 | out) + 1, at, mask = p->edge_slots - 1;
     if (p->distance[in] >= -tolerance)
-        return p->number[in];
+        return p->next_index[in];
     EBPO_HASH_FIND(at, ebpo_hash_number(key), mask, !p->edge[at].key || p->edge[at].key == key);
     if (!p->edge[at].key) {
         double x[3], t = p->distance[in] / (p->distance[in] - p->distance[out]);
@@ -152,7 +159,7 @@ static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
     return p->edge[at].vertex;
 }
 
-/* Records an edge of a kept face, if both ends are on the plane. */
+/* Adds an edge of a kept face to the rim if both ends are on the plane. */
 static void record_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
 {
     if (from == to || !p->on[from] || !p->on[to])
@@ -163,7 +170,8 @@ static void record_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
         p->rim[p->rims++] = (struct ebpo_large_rim){ from, to };
 }
 
-/* Copies the part of a face within the half-space, and records its edges on the plane. */
+/* Copies the part of face f within the half-space to `next`, and adds its edges on the plane to the
+ * rim. */
 static void clip_loop(ebpo_large_polytope *p, uint64_t f)
 {
     const ebpo_large_shape *s = &p->now;
@@ -176,7 +184,7 @@ static void clip_loop(ebpo_large_polytope *p, uint64_t f)
     for (uint64_t i = 0; i < count && inside && !p->no_memory; i++) {
         uint32_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
         if (!is_out(p, a))
-            shape_corner(p, to, p->number[a]);
+            shape_corner(p, to, p->next_index[a]);
         if (is_out(p, a) != is_out(p, b))
             shape_corner(p, to, is_out(p, a) ? edge_vertex(p, b, a) : edge_vertex(p, a, b));
     }
@@ -187,7 +195,7 @@ static void clip_loop(ebpo_large_polytope *p, uint64_t f)
         record_rim(p, to->corner[i], to->corner[i + 1 < to->corner_count ? i + 1 : start]);
 }
 
-/* Returns true if edge i of the rim also occurs reversed: it is between two kept faces. */
+/* Returns true if edge i of the rim also occurs reversed: then it is between two kept faces. */
 static bool is_paired(const ebpo_large_polytope *p, uint64_t i)
 {
     for (uint64_t j = 0; p->touched && j < p->rims; j++)
@@ -235,7 +243,8 @@ static bool begin_cut(ebpo_large_polytope *p)
     p->touched = false;
     p->edge_slots = ebpo_hash_slots(2 * edges);
     if (!shape_begin(&p->next) ||
-        !ebpo_grow(&p->number, &p->number_capacity, p->now.vertex_count, sizeof *p->number) ||
+        !ebpo_grow(&p->next_index, &p->next_index_capacity, p->now.vertex_count,
+                   sizeof *p->next_index) ||
         !ebpo_grow(&p->on, &p->on_capacity, p->now.vertex_count + edges, sizeof *p->on) ||
         !ebpo_grow(&p->edge, &p->edge_capacity, p->edge_slots, sizeof *p->edge))
         return !(p->no_memory = true);
@@ -245,8 +254,8 @@ static bool begin_cut(ebpo_large_polytope *p)
         if (is_out(p, (uint32_t)i))
             continue;
         bool on = p->distance[i] >= -tolerance;
-        p->number[i] = shape_vertex(p, &p->next, p->now.vertex[i]);
-        p->on[p->number[i]] = on;
+        p->next_index[i] = shape_vertex(p, &p->next, p->now.vertex[i]);
+        p->on[p->next_index[i]] = on;
         p->touched |= on;
     }
     return !p->no_memory;
@@ -267,7 +276,7 @@ ebpo_clip ebpo_large_clip(ebpo_large_polytope *p, const double n[3], double d, i
     }
     if (greatest <= tolerance)
         return EBPO_CLIP_NONE;
-    if (least >= -1e-7 || !begin_cut(p))
+    if (least >= -least_depth || !begin_cut(p))
         return EBPO_CLIP_REFUSED;
     for (uint64_t f = 0; f < p->now.face_count && !p->no_memory; f++)
         clip_loop(p, f);

@@ -1,5 +1,6 @@
-/* Computes the envelope of a leaf from its faces (EBP 2017, 3.3.4). Readers derive the same planes
- * from the same faces, bit for bit, so most files do not store them.
+/* Computes the planes of a leaf's envelope from the leaf's faces (EBP 2017, 3.3.4). Readers derive
+ * the same planes from the same faces, bit for bit, so most files do not store the planes of
+ * leaves.
  *
  * The directions of candidates are the normals of the convex hull of the leaf's points: the corners
  * of the faces' parts in the cell, and the cell's corners that are inside the solid. If there are
@@ -17,18 +18,22 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
-/* Maximum numbers of candidates and of points; size of the hash table of points. */
+/* Maximum number of candidates (planes that may be chosen); maximum number of points; size of the
+ * hash table of points. */
 enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
 
-/* The points whose hull contains the solid in the cell, and bounds of the rounding errors of their
- * coordinates. */
+/* The points whose hull contains the solid in the cell. */
 typedef struct leaf_points {
-    double at[LEAF_POINTS][3], slack[LEAF_POINTS];
+    double at[LEAF_POINTS][3];
+    double slack[LEAF_POINTS]; /* upper bounds of the rounding errors of a point's coordinates */
     int count;
-    /* hash table: 1 + index of the point; most corners of faces occur several times */
-    uint8_t number[LEAF_TABLE];
+    /* hash table, since most corners of faces occur several times: 1 + index of the point; 0: empty
+     * slot */
+    uint8_t table[LEAF_TABLE];
 } leaf_points;
 
+/* Adds a candidate with this normal, unless there is one. Returns false if no further candidate can
+ * be added. */
 static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
 {
     for (int i = 0; i < *count; i++)
@@ -46,33 +51,34 @@ static bool equal_points(const double a[3], const double b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
+/* Adds a point, or raises the slack of an equal point. Returns false if there are too many. */
 static bool add_point(leaf_points *points, const double p[3], double slack)
 {
-    uint64_t bits[3], place;
+    uint64_t bits[3], slot;
     memcpy(bits, p, sizeof bits);
-    EBPO_HASH_FIND(place, ebpo_hash_three(bits), LEAF_TABLE - 1,
-                   !points->number[place] ||
-                       equal_points(points->at[points->number[place] - 1], p));
-    if (points->number[place]) {
-        int i = points->number[place] - 1;
+    EBPO_HASH_FIND(slot, ebpo_hash_three(bits), LEAF_TABLE - 1,
+                   !points->table[slot] || equal_points(points->at[points->table[slot] - 1], p));
+    if (points->table[slot]) {
+        int i = points->table[slot] - 1;
         points->slack[i] = fmax(points->slack[i], slack);
         return true;
     }
     if (points->count == LEAF_POINTS)
         return false;
-    points->number[place] = (uint8_t)(points->count + 1);
+    points->table[slot] = (uint8_t)(points->count + 1);
     for (int k = 0; k < 3; k++)
         points->at[points->count][k] = p[k];
     points->slack[points->count++] = slack;
     return true;
 }
 
-/* Collects the points. Returns false if there are more than LEAF_POINTS. */
+/* Collects the points. `inside`: bit i is set if corner i of the cell is in the solid. Returns
+ * false if there are more than LEAF_POINTS points. */
 static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                           uint64_t count, unsigned inside, leaf_points *points)
 {
     points->count = 0;
-    memset(points->number, 0, sizeof points->number);
+    memset(points->table, 0, sizeof points->table);
     for (int i = 0; i < 8; i++)
         if (inside >> i & 1)
             (void)add_point(points, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
@@ -129,7 +135,8 @@ static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_
 
 /* --- offsets --- */
 
-/* Raises the supports of all candidates to the value of a point. `n`: decoded normals. */
+/* Raises the support of each candidate to n . p plus the bound of the rounding error, if this is
+ * greater. `n`: decoded normals of the candidates. */
 static void raise_supports(ebpo_candidate *c, double (*n)[3], int count, const double p[3],
                            double slack)
 {
@@ -150,6 +157,7 @@ static void decode_normals(const ebpo_candidate *c, int count, double (*n)[3])
     }
 }
 
+/* Computes the supports from the faces, if they have too many points for leaf_points. */
 static void supports_of_faces(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                               uint64_t count, unsigned inside, ebpo_candidate *c, double (*n)[3],
                               int kept)
@@ -165,6 +173,7 @@ static void supports_of_faces(const ebpo_box *box, ebpo_cell cell, const ebpo_tr
             raise_supports(c, n, kept, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
 }
 
+/* Makes the candidates of a leaf, with supports. Returns their number. */
 static int leaf_candidates(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                            uint64_t count, unsigned inside_corners,
                            ebpo_candidate out[LEAF_CANDIDATES])
@@ -193,9 +202,9 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
         return ebpo_select_greedy(envelope,
                                   &(ebpo_choice){ .candidates = candidates,
                                                   .count = kept,
-                                                  .most = EBPO_PLANES_MAX,
+                                                  .codes_max = EBPO_PLANES_MAX,
                                                   .epsilon = epsilon,
-                                                  .reach = ebpo_needle },
+                                                  .needle_length = ebpo_needle },
                                   codes);
     return ebpo_select_all(envelope, candidates, kept, EBPO_PLANES_MAX, codes);
 }

@@ -1,13 +1,14 @@
-/* Assigns faces to cells. First the root is divided into nodes until these are small enough to be
- * processed in parallel: they are the roots of the pieces, and the nodes above them are the top.
- * Then the nodes of each piece are made, depth first.
+/* Assigns faces to cells. First the root is divided until the nodes have few enough faces to be
+ * processed in parallel: these nodes are the roots of the pieces, and the nodes above them are the
+ * top. Then the nodes of each piece are made, depth first.
  *
  * A node depends on its cell and its faces alone, and the pieces depend on the model alone, so the
  * result does not depend on the number of threads or the machine. Sources: EBP 2017, 3.3
  * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
  *
  * While the top is divided, two inputs of each piece are computed that depend on other pieces: its
- * *fresh* faces, which no earlier piece lists, and the winding numbers at its corners. */
+ * *fresh* faces, which no earlier piece lists, and the winding numbers at the corners of its root.
+ */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -29,18 +30,19 @@
 /* Number of faces after which pages of the workspace are released. */
 enum { RELEASE_FACES = 1 << 13 };
 
-/* Limits of the numbers of leaves and of entries in their lists: with huge faces and a deep maximum
- * level, every face would be listed in millions of cells. */
+/* Limits of the numbers of leaves and of entries in their lists, for meshes with huge faces and a
+ * deep maximum level: without limits, every face could be listed in millions of cells. A limit is
+ * ..._always + ..._per_face times the number of faces. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
                       entries_always = 1 << 26;
 
-/* A set of faces (hash table). A slot is occupied if its round is the current round, so a new round
+/* A set of faces (hash table). A slot is occupied if its round is the set's round, so a new round
  * empties the set without clearing the slots. */
 typedef struct face_set {
     struct {
         uint32_t face, round;
     } * slots;
-    uint64_t mask, count;
+    uint64_t mask, count; /* number of slots - 1; number of faces */
     uint32_t round;
 } face_set;
 
@@ -48,9 +50,11 @@ typedef struct face_set {
 typedef struct grower {
     ebpo_builder *b;
     ebpo_branch *s;
-    uint32_t *stack; /* face lists of the nodes on the way down and of their children */
+    /* face lists of the nodes on the path from the root and of their children: indices in s->list
+     */
+    uint32_t *stack;
     uint64_t stack_used, stack_capacity;
-    uint8_t *mask; /* octants of each face of the node that is divided */
+    uint8_t *mask; /* [face of the node that is being divided] octants that it touches */
     uint64_t mask_capacity;
     ebpo_triangle *faces; /* faces of a leaf */
     uint64_t faces_capacity;
@@ -58,13 +62,14 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
-/* Returns true if gray nodes become leaves by a criterion of the theses, after their children have
- * been made. */
+/* Returns true if a criterion of the theses decides which nodes become leaves: then each node is
+ * divided first, and may become a leaf after its children have been made. */
 static bool coalesces_late(const ebpo_builder *b)
 {
     return b->thesis && b->thesis->coalesce != EBPO_COALESCE_DISTINCT;
 }
 
+/* Returns true if a node with `count` faces in its list is not divided. */
 static bool is_leaf(const ebpo_builder *b, int level, uint64_t count)
 {
     return level == b->max_level || (count <= b->options->leaf_faces && !coalesces_late(b));
@@ -78,8 +83,8 @@ ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_
     if (leaves <= max_leaves && entries <= max_entries)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the faces touch too many cells (more than %llu leaves or %llu listed faces): "
-                     "lower --max-level or raise --leaf-faces",
+                     "the faces touch too many cells (more than %llu leaves, or more than %llu "
+                     "faces in the lists of leaves): lower --max-level or raise --leaf-faces",
                      (unsigned long long)max_leaves, (unsigned long long)max_entries);
 }
 
@@ -88,8 +93,9 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-/* Adds to s->crossing the faces that cross a cell face or touch an upper cell face: such a face has
- * a vertex that is not in the cell's range of vertices. */
+/* Adds to s->crossing the faces of the list that cross a cell face or touch an upper cell face:
+ * such a face has a vertex that is not in the cell's range of vertices. Returns false when out of
+ * memory. */
 static bool record_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
                             const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
@@ -109,7 +115,7 @@ static bool record_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cel
     return true;
 }
 
-/* Makes a leaf of the list at stack[at]. */
+/* Makes a leaf with the list stack[at] to stack[at + count - 1]. */
 static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, uint64_t at,
                              uint64_t count)
 {
@@ -138,8 +144,8 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     return EBPO_OK;
 }
 
-/* Splits the list at stack[at] into eight lists from stack[top] on. List o is stack[begin[o]] to
- * stack[begin[o + 1] - 1]. */
+/* Splits the list stack[at] to stack[at + count - 1] of a cell into eight lists, one for each
+ * octant, from stack[top] on. List o is stack[begin[o]] to stack[begin[o + 1] - 1]. */
 static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top,
                               uint64_t begin[9])
 {
@@ -171,6 +177,7 @@ static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t c
 
 /* --- coalescing nodes with few faces --- */
 
+/* Returns the index of the face's slot, or of the slot where it can be inserted. */
 static uint64_t set_slot(const face_set *set, uint32_t face)
 {
     uint64_t at;
@@ -184,11 +191,11 @@ static bool set_has(const face_set *set, uint32_t face)
     return set->slots[set_slot(set, face)].round == set->round;
 }
 
-/* Empties the set, and makes space for most + 1 faces. Returns false when out of memory. */
-static bool set_start(face_set *set, uint64_t most)
+/* Empties the set, and makes space for faces_max + 1 faces. Returns false when out of memory. */
+static bool set_start(face_set *set, uint64_t faces_max)
 {
-    if (!set->slots || set->mask < 2 * (most + 2) - 1) {
-        uint64_t size = ebpo_hash_slots(2 * (most + 2));
+    if (!set->slots || set->mask < 2 * (faces_max + 2) - 1) {
+        uint64_t size = ebpo_hash_slots(2 * (faces_max + 2));
         free(set->slots);
         set->slots = ebpo_alloc_zero(size, sizeof *set->slots);
         set->mask = size - 1;
@@ -199,25 +206,25 @@ static bool set_start(face_set *set, uint64_t most)
 }
 
 /* Makes a gray node a leaf, or an empty node, if the leaves below it list at most as many different
- * faces as a leaf may list. (A node's list may have faces that miss the cell by a rounding error;
- * smaller cells may not list them. So there may be fewer faces below a node than in its list.) */
+ * faces as a leaf may list. (A node's list may have faces that miss the cell by a rounding error
+ * and that no smaller cell lists. So there may be fewer faces below a node than in its list.) */
 static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
                                    uint64_t count)
 {
     ebpo_branch *s = g->s;
     ebpo_build_node gray = s->nodes[index];
     ebpo_build_detail d = s->details[gray.detail];
-    uint64_t most =
+    uint64_t faces_max =
         g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
-    if (coalesces_late(g->b) && !ebpo_thesis_coalesces(g->b, s, index, &most))
+    if (coalesces_late(g->b) && !ebpo_thesis_coalesces(g->b, s, index, &faces_max))
         return EBPO_OK;
-    if (!set_start(&g->set, most))
+    if (!set_start(&g->set, faces_max))
         return no_memory_for_cells(g->error);
     for (uint64_t i = d.entry_begin; i < d.entry_end; i++) {
         uint64_t slot = set_slot(&g->set, s->entries[i]);
         if (g->set.slots[slot].round == g->set.round)
             continue;
-        if (g->set.count++ == most)
+        if (g->set.count++ == faces_max)
             return EBPO_OK; /* the node stays gray */
         g->set.slots[slot].face = s->entries[i];
         g->set.slots[slot].round = g->set.round;
@@ -277,6 +284,7 @@ static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t
     return collapse_if_few(g, index, cell, at, count);
 }
 
+/* Makes the nodes of a piece from the faces in its list. */
 static ebpo_status grow_from_list(grower *g)
 {
     ebpo_branch *s = g->s;
@@ -306,8 +314,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
 
 /* --- the top of the tree --- */
 
-/* A piece has at most PIECE_FACES faces, unless that would make more than about PIECES_MAX pieces.
- */
+/* A piece has at most PIECE_FACES faces, unless this limit would make more than about PIECES_MAX
+ * pieces. SPLIT_GRAIN: number of faces of a task. */
 enum { PIECE_FACES = 4096, PIECES_MAX = 2048, SPLIT_GRAIN = 1 << 13 };
 
 static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error)
@@ -322,11 +330,14 @@ typedef struct top_split {
     ebpo_cell cell;
     const uint32_t *list;
     uint64_t count;
-    uint64_t first_vertex, end_vertex; /* in the cell */
-    uint16_t *mask; /* bits 0 to 7: octants; bit 8: the face crosses the cell's faces */
-    /* for each block and bit: the number of faces, later the position in the list */
+    uint64_t first_vertex, end_vertex; /* range of the vertices in the cell */
+    /* [face of the list] bits 0 to 7: octants that the face touches; bit 8: the face crosses the
+     * cell's faces */
+    uint16_t *mask;
+    /* [block][bit of `mask`] the number of faces with this bit; after add_up, the index in to[bit]
+     * of the block's next face */
     uint64_t (*begin)[9];
-    uint32_t *to[9]; /* for each bit: the list that gets the faces */
+    uint32_t *to[9]; /* [bit of `mask`] the list that gets the faces */
 } top_split;
 
 /* Returns a mask of the octants that the face touches. If several octants are possible, an exact
@@ -351,6 +362,7 @@ static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebp
     return mask;
 }
 
+/* Sets the masks of a block's faces, and counts the faces of each bit. */
 static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -373,6 +385,7 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
+/* Copies a block's faces to the lists of their bits. */
 static ebpo_status distribute_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                     ebpo_error *error)
 {
@@ -394,8 +407,8 @@ static uint64_t faces_done(const ebpo_builder *b)
     return last ? last->first + last->fresh_count : 0;
 }
 
-/* Replaces the number of each block's faces by the block's position in the list, and sets `sizes`
- * to the lengths of the lists. */
+/* Replaces the number of each block's faces by the index of its first face in the list, and sets
+ * `sizes` to the lengths of the lists. */
 static void add_up(top_split *t, uint64_t sizes[9])
 {
     memset(sizes, 0, 9 * sizeof *sizes);
@@ -456,7 +469,8 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
     return status;
 }
 
-/* Marks the fresh faces of a piece: the faces that no earlier piece lists. */
+/* Marks the fresh faces of a piece: the faces that no earlier piece lists. `listed`: bit f is set
+ * if a piece so far lists face f. Returns false when out of memory. */
 static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
 {
     s->fresh = ebpo_alloc_zero(s->list_count / 8 + 1, 1);
@@ -477,14 +491,14 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
 /* State of dividing the tree into pieces. */
 typedef struct cutting {
     ebpo_builder *b;
-    uint64_t piece;   /* a node with at most this number of faces becomes a piece */
-    uint8_t *listed;  /* bit f: a piece lists face f */
-    uint64_t entries; /* number of entries in the lists of all pieces so far */
+    uint64_t piece_faces; /* a node with at most this number of faces becomes a piece */
+    uint8_t *listed;      /* bit f: a piece lists face f */
+    uint64_t entries;     /* number of entries in the lists of all pieces so far */
     ebpo_error *error;
 } cutting;
 
 /* Adds a piece; takes over `list`. A piece has at least one leaf, and its leaves list all of its
- * faces, so the limits of leaves are checked here, before the piece is made. */
+ * faces, so the limits of leaves can be checked before the piece's nodes are made. */
 static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, uint32_t *list,
                              uint64_t count)
 {
@@ -506,13 +520,13 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
     return EBPO_OK;
 }
 
-/* Makes a node of the top a piece, or divides it; takes over `list`. */
+/* Makes a piece of a node of the top, or divides it; takes over `list`. */
 static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t *list,
                             uint64_t count)
 {
     ebpo_builder *b = c->b;
     ebpo_branch *s = &b->top;
-    if (count <= c->piece || is_leaf(b, cell.level, count)) {
+    if (count <= c->piece_faces || is_leaf(b, cell.level, count)) {
         ebpo_build_node node = { 0 };
         ebpo_status status = add_piece(c, &node, cell, list, count);
         s->nodes[index] = node;
@@ -544,6 +558,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
     return status;
 }
 
+/* Divides the root into pieces. */
 static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
 {
     uint32_t *all = ebpo_array_alloc(b->workspace, b->face_count, sizeof *all);
@@ -551,10 +566,9 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
                   b->face_count / PIECES_MAX > PIECE_FACES ? b->face_count / PIECES_MAX
                                                            : PIECE_FACES,
                   ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
-    if (c.piece <
-        /* so that collapse_if_few cannot make a leaf of a node of the top */
-        2 * (uint64_t)b->options->leaf_faces)
-        c.piece = 2 * (uint64_t)b->options->leaf_faces;
+    /* so that collapse_if_few would not make a leaf of a node of the top */
+    if (c.piece_faces < 2 * (uint64_t)b->options->leaf_faces)
+        c.piece_faces = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;
     if (!all || !c.listed ||
         !ebpo_array_grow_late(b->workspace, &b->top.nodes, &b->top.node_capacity, 1,
@@ -574,6 +588,7 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
 
 /* --- winding numbers at the corners of pieces --- */
 
+/* Computes the corner differences of the roots of pieces. */
 static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                      ebpo_error *error)
 {
@@ -591,7 +606,7 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
 }
 
 /* Limits the number of threads so that half of the memory budget is sufficient if each thread
- * processes a piece of the greatest size. (A piece is processed in memory, and a cell of the
+ * processes a piece as large as the largest one. (A piece is processed in memory, and a cell of the
  * deepest level is not divided, however many faces it lists.) */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
@@ -623,11 +638,12 @@ ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
     ebpo_status status = cut_top(b, error);
     if (status == EBPO_OK)
         status = fit_largest_piece(b, error);
-    b->number = ebpo_array_alloc(b->workspace, b->face_count, sizeof *b->number);
-    if (status == EBPO_OK && !b->number)
+    b->final_index = ebpo_array_alloc(b->workspace, b->face_count, sizeof *b->final_index);
+    if (status == EBPO_OK && !b->final_index)
         status = no_memory_for_pieces(b, error);
     if (status == EBPO_OK)
-        ebpo_array_fill(b->workspace, b->number, 0xff, b->face_count * sizeof *b->number);
+        ebpo_array_fill(b->workspace, b->final_index, 0xff, /* EBPO_NO_INDEX */
+                        b->face_count * sizeof *b->final_index);
     if (status == EBPO_OK && b->solid)
         status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, corners_of_pieces, b,
                                    &b->options->progress, "winding numbers", error);

@@ -1,5 +1,5 @@
 /* Manages the data of the pieces of the tree during the build: nodes, details, lists, proposed
- * planes, the piece's part (stretch) of each level's arrays, and the store.
+ * planes, the piece's part ("stretch") of each level's arrays, and the store of results.
  *
  * A piece is a subtree that one thread builds. Its arrays grow in memory or in the builder's
  * workspace. When a piece is done, its results move to the store. The store consists of blocks of
@@ -119,7 +119,7 @@ bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsi
         for (int k = 0; k < 3; k++)
             given->corner[given->corner_count][k] = (child->corner[i][k] + (octant >> k & 1)) / 2;
     for (uint64_t i = 0; i < child->offer_count; i++) {
-        int32_t n[3], d, shift = 0;
+        int32_t n[3], d, shift = 0; /* shift: n . the octant's lowest corner, in child cells */
         ebpo_plane_code_decode(child->offers[i].normal, n, &d);
         for (int k = 0; k < 3; k++)
             shift += octant >> k & 1 ? n[k] : 0;
@@ -142,28 +142,29 @@ bool ebpo_proposals_make(ebpo_branch *s)
 
 /* --- the store --- */
 
-enum { STORE_BYTES = 16 << 20 /* of a block */, ALIGNMENT = 8 };
+enum { BLOCK_BYTES = 16 << 20 /* least size of a block */, ALIGNMENT = 8 };
 
 /* Blocks of the workspace, filled one after the other. */
 struct ebpo_store {
     ebpo_workspace *workspace;
-    pthread_mutex_t lock;
+    pthread_mutex_t lock; /* for the fields below */
     char **blocks;
     uint64_t block_count, block_capacity;
     size_t left;       /* free bytes at the end of the last block */
     size_t last_bytes; /* bytes of the last block */
 };
 
+/* Returns the bytes of `count` elements, rounded up to a multiple of ALIGNMENT. */
 static size_t aligned_bytes(uint64_t count, size_t size)
 {
     return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
-/* Reserves bytes in the last block, or in a new block. */
+/* Reserves bytes in the last block, or in a new block. Returns NULL when out of memory. */
 static char *store_take(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
     if (!s->block_count || bytes > s->left) {
-        size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
+        size_t block = bytes > BLOCK_BYTES ? bytes : BLOCK_BYTES;
         char *made =
             ebpo_grow(&s->blocks, &s->block_capacity, s->block_count + 1, sizeof *s->blocks)
                 ? ebpo_array_alloc(b->workspace, block, 1)
@@ -178,6 +179,7 @@ static char *store_take(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
     return at;
 }
 
+/* Makes the builder's store if there is none. Any thread. Returns false when out of memory. */
 static bool make_store(ebpo_builder *b)
 {
     static pthread_mutex_t making = PTHREAD_MUTEX_INITIALIZER;
@@ -190,6 +192,7 @@ static bool make_store(ebpo_builder *b)
     return b->store != NULL;
 }
 
+/* Does the work of ebpo_store_reserve for a builder that has a store. */
 static char *store_reserve(ebpo_builder *b, size_t bytes)
 {
     pthread_mutex_lock(&b->store->lock);
@@ -203,6 +206,7 @@ void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
     return make_store(b) ? store_reserve(b, aligned_bytes(bytes, 1)) : NULL;
 }
 
+/* Returns the bytes of an array in the store; 0 if the level does not have it. */
 static size_t packed_bytes(const ebpo_level *level, int id)
 {
     return ebpo_schema_is_held(id) && ebpo_level_array(level, id)
@@ -210,6 +214,7 @@ static size_t packed_bytes(const ebpo_level *level, int id)
                : 0;
 }
 
+/* Moves an array of a level to `to`. */
 static void pack_array(const ebpo_builder *b, ebpo_level *level, int id, char *to)
 {
     void *array = ebpo_level_array(level, id);

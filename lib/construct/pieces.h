@@ -1,5 +1,5 @@
 /* Defines the data of pieces: subtrees that are built separately, each by one thread. The nodes
- * above all pieces are the top. */
+ * above all pieces are the top; a branch `s` is the top or a piece (builder.h). */
 #ifndef EBPO_CONSTRUCT_PIECES_H
 #define EBPO_CONSTRUCT_PIECES_H
 
@@ -10,12 +10,11 @@
 
 /* --- a piece's part of the levels' arrays --- */
 
-/* A piece's part of the arrays of one level: a stretch, which is a contiguous range, of each array.
- */
+/* A piece's part of the arrays of one level: a contiguous range ("stretch") of each array. */
 typedef struct ebpo_piece_level {
     ebpo_level level;
     bool packed;                          /* its arrays are in the builder's store */
-    uint64_t capacity[EBPO_LEVEL_ARRAYS]; /* indexed by ebpo_array_id */
+    uint64_t capacity[EBPO_LEVEL_ARRAYS]; /* [ebpo_array_id] */
 } ebpo_piece_level;
 
 /* Add a group of eight nodes; a gray node; a white or black node. Return false when out of memory.
@@ -29,11 +28,14 @@ void ebpo_piece_levels_free(ebpo_piece_level *out);
 
 /* --- planes chosen from the leaves up, and the data that nodes pass to their parents --- */
 
-/* A plane that a node has chosen and offers to its parent. */
+/* A plane that a node offers to its parent: a plane that the node has chosen, or the plane of a
+ * face of a leaf. */
 typedef struct ebpo_offer {
     uint32_t normal; /* normal of the plane: bits 0 to 19 of a plane code */
-    uint32_t place;  /* position among the offers of the node's children */
-    double origin;   /* n . xi at the centroid of the face whose plane this was at first */
+    uint32_t rank;   /* position among the offers of the node's children (or faces) */
+    /* offset of the plane before any node moved it: n . xi at the centroid of its face, in the
+     * coordinates of the node's cell */
+    double origin;
 } ebpo_offer;
 
 /* Data that a node passes to its parent, in the coordinates of the node's cell: its chosen planes,
@@ -56,24 +58,24 @@ typedef struct ebpo_proposals {
     ebpo_handover root;        /* data that the piece's root passes to its parent in the top */
 } ebpo_proposals;
 
-/* Makes proposals without planes. Returns false when out of memory. */
+/* Sets s->proposals to proposals without planes, for the branch's details. Returns false when out
+ * of memory. */
 bool ebpo_proposals_make(ebpo_branch *s);
-/* Returns the planes that were chosen for a node; NULL if the selection works from the root down.
- */
+/* Returns the codes of the planes that were chosen for a node, and sets *count to their number.
+ * Returns NULL if the selection works from the root down. */
 const uint32_t *ebpo_proposed(const ebpo_branch *s, uint32_t detail, int *count);
 void ebpo_proposals_free(ebpo_proposals *p);
 
 void ebpo_handover_free(ebpo_handover *h);
-/* Adds a plane. Returns false when out of memory. */
+/* Adds an offer with these fields. Returns false when out of memory. */
 bool ebpo_handover_add(ebpo_handover *h, uint32_t normal, double origin);
-/* Adds the data of the child in this octant to `given`, in the parent's coordinates. Returns false
- * when out of memory. */
+/* Adds the data of the child in this octant to `given`, in the coordinates of the parent's cell.
+ * Returns false when out of memory. */
 bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsigned octant);
 
 /* --- the store: holds the results of pieces until the levels are joined --- */
 
-/* Moves a piece's results to the store, until the levels are joined. Does nothing without a
- * workspace. */
+/* Moves a piece's results to the store. Does nothing if the builder has no workspace. */
 ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *error);
 /* Reserves memory in the store, aligned to 8 bytes and valid until the store is freed. The builder
  * must have a workspace. Returns NULL on failure; then call ebpo_workspace_fail. */
@@ -82,17 +84,19 @@ void ebpo_store_free(struct ebpo_store *store);
 
 /* --- the nodes of a piece --- */
 
-/* Add an empty detail, or eight empty nodes, and set the index of the (first) new one. Return false
- * when out of memory. */
+/* Add a detail of zeros, or eight empty nodes, and set *index or *first to the index of the (first)
+ * new one. Return false when out of memory. */
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);
 bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first);
-/* Returns EBPO_E_LIMIT when 32 bits cannot number more nodes of the piece. */
+/* Returns EBPO_E_LIMIT if the indices of eight more nodes, or of a detail, exceed 32 bits. */
 ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error);
 
-/* Frees the piece's nodes, details and entries, which ebpo_build_partition can make again. */
+/* Frees the piece's nodes, details, entries and crossing faces, which ebpo_build_partition can make
+ * again. */
 void ebpo_branch_forget(ebpo_branch *s);
-/* Frees all data of the piece except `out`, and the type and corner differences of its root. */
+/* Frees all data of the piece except `out` and the fields that are not pointers. */
 void ebpo_branch_release(ebpo_branch *s);
+/* Frees all data of the branch, and sets its bytes to zero. */
 void ebpo_branch_free(ebpo_branch *s);
 
 #endif

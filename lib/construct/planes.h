@@ -17,21 +17,22 @@ enum {
      * planes of its parent */
     EBPO_PLANES_MAX = 32,
     EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of such a node */
-    /* maximum number of planes that the selections of the theses choose for a node; files store the
-       number in a byte */
+    /* maximum number of planes of a node in a file, which stores the number in a byte; also the
+     * maximum that the selections of the theses choose */
     EBPO_PLANES_STORED = 255
 };
 
 /* A needle is a long, thin portion of an envelope. A plane is stored, however small the volume is
- * that it cuts off, if the envelope extends more than this far beyond the plane. */
+ * that it cuts off, if the envelope extends more than this distance (in cells) beyond the plane. */
 static const double ebpo_needle = 0.1;
 
 /* A candidate for a plane of the envelope. */
 typedef struct ebpo_candidate {
-    uint32_t normal; /* bits 0-19 of a plane code */
-    /* upper bound of n . xi over the solid in the cell, in cell coordinates */
+    uint32_t normal; /* bits 0-19 of a plane code, which give the normal n */
+    /* upper bound of n . xi over the points xi of the solid in the cell, in cell coordinates */
     double support;
-    /* selections of the theses: distance of the plane from its face, in the model's unit */
+    /* selections of the theses: distance by which the plane was moved away from its face, in the
+     * model's unit */
     double moved;
 } ebpo_candidate;
 
@@ -42,29 +43,30 @@ typedef struct ebpo_choice {
     /* for the random selection: [count] indices of the candidates, in the order of the node's faces
      * or children; NULL: in the order of the array */
     const int *order;
-    int most; /* maximum number of codes */
-    /* greedy selection: volume that no candidate can remove (0: not known) */
-    double core;
+    int codes_max; /* maximum number of codes */
+    /* greedy selection: volume of the solid's hull, which no candidate can remove (0: not known) */
+    double hull_volume;
     /* greedy selection: a plane must remove at least the volume `epsilon`, or the envelope must
-     * extend more than `reach` beyond the plane (0: only volume counts) */
-    double epsilon, reach;
-    int wanted;              /* selections of the theses: number of candidates to choose */
-    const double *cell_size; /* [3] size of the cell, in the model's unit */
+     * extend more than `needle_length` beyond the plane (0: only volume counts) */
+    double epsilon, needle_length;
+    int wanted; /* selections of the theses: number of candidates to choose */
+    /* k-medoids selection: [3] size of the cell, in the model's unit; the distance of normals */
+    const double *cell_size;
     ebpo_normal_distance normals;
-    uint64_t seed; /* seed of this node */
+    uint64_t seed; /* selections with random choices: seed of this node */
 } ebpo_choice;
 
 /* A selection: takes planes from the candidates, clips `envelope` by these planes and writes their
- * codes, in any order. Returns the number of codes, or -1 when out of memory. If the nodes come
- * from the root down, there are at most EBPO_PLANES_CANDIDATES candidates; if they come from the
- * leaves up, any number. CONTRIBUTING.md, "A new plane selection", describes how to add a
- * selection. */
+ * codes, in any order. Returns the number of codes, or -1 when out of memory. If nodes are
+ * processed from the root down, there are at most EBPO_PLANES_CANDIDATES candidates; if they are
+ * processed from the leaves up, any number. CONTRIBUTING.md, "A new plane selection", describes how
+ * to add a selection. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* Returns the function of a selection, or NULL if it is invalid. If
- * ebpo_selection_traits.from_leaves is true, a node comes after its children, and `envelope` is
- * first the node's cell (EBP 2017, 3.4.1). If it is false, a node comes after its parent, and
- * `envelope` is first the parent's envelope, cut to the cell. */
+/* Returns the function of a selection, or NULL if `selection` is not a value of ebpo_selection. If
+ * ebpo_selection_traits.from_leaves is true, a node is processed after its children, and `envelope`
+ * is first the node's cell (EBP 2017, 3.4.1). If it is false, a node is processed after its parent,
+ * and `envelope` is first the parent's envelope, cut to the cell. */
 ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
 /* Sets chosen[i] for the candidates that a selection of the theses takes, whether or not their
@@ -72,7 +74,7 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice, bool *chosen);
 
 /* Selects, again and again, the plane that removes the most volume, until this volume is below
- * `epsilon`; then planes that cut off needles. */
+ * `epsilon`; then planes that cut off needles. Returns the number of codes. */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
 /* Returns the number of candidates, of `count`, that the theses choose: `percent` of them, rounded
@@ -87,10 +89,11 @@ int ebpo_selection_requested(int count, int level, double percent, double k_root
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, the greatest volume first,
- * then planes that cut off needles. The result is nearly the tightest envelope. With few
- * candidates, this selection takes the least time. */
-int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
-                    uint32_t *codes);
+ * then planes that cut off needles; at most `codes_max` planes. The result is nearly the tightest
+ * envelope. With few candidates, this selection takes the least time. Returns the number of codes.
+ */
+int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count,
+                    int codes_max, uint32_t *codes);
 
 /* A face as its three corners, in the model's coordinates. */
 typedef struct ebpo_triangle {

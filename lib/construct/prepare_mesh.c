@@ -6,9 +6,9 @@
  * is checked all the same; ebpo_build rejects it.
  *
  * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
- * first, until one leaves a solid without doubts. Doubts are reasons why a solid may differ from
- * the author's intention: much of the surface was made by filling holes, or the volume is negative,
- * or the volume is very small for the area (a sheet). */
+ * first, until the result of one is a solid without doubts. Doubts are reasons why a solid may
+ * differ from the author's intention: much of the surface was made by filling holes, or the volume
+ * is negative, or the volume is very small for the area (a sheet). */
 #include "core/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -30,9 +30,9 @@ typedef struct preparation {
     ebpo_prepared *out;
 } preparation;
 
-/* Replaces EBPO_E_LIMIT, the error for coordinates beyond 2^1000, by EBPO_OK, because the mesh can
- * still be checked. (ebpo_build returns the error again.) Copies any other error from *local to
- * *error. */
+/* Returns EBPO_OK instead of EBPO_E_LIMIT, the error for coordinates beyond 2^1000, because the
+ * mesh can still be checked. (ebpo_build returns the error again.) Copies any other error from
+ * *local to *error, and returns its status. */
 static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
@@ -42,6 +42,7 @@ static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local,
     return status;
 }
 
+/* Applies the repairs of the options; `weld`: also welds vertices. */
 static ebpo_status repair_as_requested(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
@@ -53,8 +54,8 @@ static ebpo_status repair_as_requested(const preparation *p, bool weld, ebpo_err
     return ebpo_mesh_repair(p->mesh, steps, o->weld_distance, &p->out->record, error);
 }
 
-/* Sorts along the curve, checks and repairs. Sorting comes first, because the next steps are slow
- * in a workspace with little memory if they do not access memory in order. */
+/* Sorts along the curve, checks and repairs. Sorting comes first, because checking and repairing
+ * are slow in a workspace with little memory if they do not access memory in order. */
 static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
@@ -140,6 +141,7 @@ static bool mostly_open(const ebpo_mesh_report *report, const ebpo_repair_record
     return 2 * boundary > before;
 }
 
+/* Returns the doubts caused by filled holes. `area`: area before the repair; 0: unknown. */
 static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
                                   const ebpo_repair_record *record)
 {
@@ -150,17 +152,19 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
         doubts |= EBPO_DOUBT_UNWELDED;
     if (mostly_open(report, record))
         doubts |= EBPO_DOUBT_MOSTLY_OPEN;
+    /* the filled holes are as large as the given surface, up to rounding errors */
     if (area > 0 && report->area - area >= area * 0.999999)
         doubts |= EBPO_DOUBT_MOSTLY_FILLED;
     return doubts;
 }
 
-/* Finds sheets, and solids that are inside out. If coordinates are extremely large or small, volume
- * and area overflow or underflow, but the volume keeps its sign. Then only a mesh without extent
- * along an axis counts as a sheet. */
+/* Returns the doubt about a sheet, or the one about a solid that is inside out. If coordinates are
+ * extremely large or small, volume and area overflow or underflow, but the volume keeps its sign.
+ * Then only a mesh without extent along an axis counts as a sheet. */
 static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
 {
-    enum { EXTREME = 1000 }; /* sum of the three exponents of the extent */
+    /* limit of the sum of the binary exponents of the extents along the three axes */
+    enum { EXTREME = 1000 };
     int exponent[3], sum = 0;
     bool flat = false;
     for (int k = 0; k < 3; k++) {
@@ -191,28 +195,28 @@ uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
 static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
 {
     static const ebpo_progress silent;
-    ebpo_repair_try *one = &t->out->tries[t->out->count];
+    ebpo_repair_try *result = &t->out->tries[t->out->count];
     ebpo_mesh copy;
     if (!ebpo_progress_stage(t->progress, "trying repairs", error))
         return EBPO_E_CANCELLED;
     ebpo_status status = ebpo_mesh_copy(t->mesh, &copy, error);
     if (status != EBPO_OK)
         return status;
-    one->steps = steps;
-    status = ebpo_mesh_repair(&copy, steps, 0, &one->record, error);
+    result->steps = steps;
+    status = ebpo_mesh_repair(&copy, steps, 0, &result->record, error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_check(&copy, t->threads, silent, &one->report, error);
+        status = ebpo_mesh_check(&copy, t->threads, silent, &result->report, error);
     ebpo_mesh_free(&copy);
     if (status != EBPO_OK)
         return status;
-    one->doubts = ebpo_mesh_doubts(t->given->area, &one->report, &one->record);
-    if (one->doubts == 0)
+    result->doubts = ebpo_mesh_doubts(t->given->area, &result->report, &result->record);
+    if (result->doubts == 0)
         t->out->chosen = (int64_t)t->out->count;
     t->out->count++;
     return EBPO_OK;
 }
 
-/* Returns true if `steps` may make a solid of a mesh with the report `base`. */
+/* Returns true if the further repairs `steps` may make a solid of a mesh with the report `base`. */
 static bool may_help(const ebpo_mesh_report *base, unsigned steps)
 {
     bool open = base->boundary_edges.count > 0;
@@ -229,7 +233,8 @@ typedef struct start {
     const ebpo_mesh_report *report; /* NULL: the steps were not tried */
 } start;
 
-/* Tries from.steps and `more`, unless a repair is already chosen or this cannot make a solid. */
+/* Tries from.steps followed by `more`, unless a sequence is already chosen or `more` cannot make a
+ * solid. */
 static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *error)
 {
     if (t->out->chosen >= 0 || !from.report || !may_help(from.report, more))
@@ -237,7 +242,7 @@ static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *er
     return try_steps(t, from.steps | more, error);
 }
 
-/* Tries from.steps and `step`, and sets *then to the start for further steps. */
+/* Tries from.steps followed by `step`, and sets *then to the start for further steps. */
 static ebpo_status begin_with(trying *t, start from, unsigned step, start *then, ebpo_error *error)
 {
     if (t->out->chosen >= 0)
@@ -246,7 +251,7 @@ static ebpo_status begin_with(trying *t, start from, unsigned step, start *then,
     return try_steps(t, then->steps, error);
 }
 
-/* Tries to drop repeated faces, if there are any. */
+/* Tries to drop repeated faces, if there are any, and sets *then to the start for further steps. */
 static ebpo_status drop_repeated(trying *t, start from, start *then, ebpo_error *error)
 {
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
@@ -287,8 +292,8 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
 }
 
-/* Tries to drop the repeated faces of a solid without doubts, for information: no repair is chosen.
- */
+/* Tries to drop the repeated faces of a solid without doubts, only to report the result: no repair
+ * is chosen. */
 static ebpo_status try_dropping(trying *t, ebpo_error *error)
 {
     ebpo_status status = try_steps(t, DROP, error);

@@ -1,10 +1,12 @@
 /* Chooses planes from the leaves up, for the selections of the theses (EBP 2017, 3.4.1). The walk
- * from the root down writes the chosen planes later.
+ * from the root down, which computes the envelopes (emit_levels.c, envelopes.c), uses the chosen
+ * planes later.
  *
- * The candidates of a leaf are the planes of its faces; the candidates of a gray node are the
- * planes that its children have chosen. The chosen planes clip the node's cell. The offset of a
- * plane is its support (greatest n . xi), computed from the corners of the children's envelopes and
- * from the solid itself. So the envelope contains the solid even if the corners are rounded.
+ * A candidate is a plane that may be chosen. The candidates of a leaf are the planes of its faces;
+ * the candidates of a gray node are the planes that its children have chosen ("offers"). The chosen
+ * planes clip the node's cell. The offset of a plane is its support (greatest n . xi), computed
+ * from the corners of the children's envelopes and from the solid itself. So the envelope contains
+ * the solid even if the corners are rounded.
  *
  * For each piece, the nodes are made, planes are chosen, and the nodes are freed again. Then planes
  * are chosen for the nodes of the top (the nodes above all pieces), the deepest level first; nodes
@@ -29,19 +31,21 @@
 /* Upper bound, in cells, of the rounding error of a corner of a child's envelope. */
 static const double corner_error = 1e-9;
 
+/* State of one thread. */
 typedef struct proposer {
     const ebpo_builder *b;
     ebpo_branch *s;
     ebpo_select_fn select;
-    ebpo_supports supports;
-    ebpo_candidate *candidates;
-    int *order; /* as in ebpo_choice */
+    ebpo_supports supports;     /* work space for the supports of gray nodes */
+    ebpo_candidate *candidates; /* candidates of the node that is being processed */
+    int *order;                 /* as in ebpo_choice */
     uint64_t candidate_capacity, order_capacity;
-    ebpo_large_polytope own; /* work space of ebpo_thesis_choose */
+    ebpo_large_polytope thesis_envelope; /* work space of ebpo_thesis_choose */
 } proposer;
 
 /* --- choosing, for leaves and gray nodes alike --- */
 
+/* Compares two offers by normal, then by origin. */
 static int by_normal(const void *a, const void *b)
 {
     const ebpo_offer *x = a, *y = b;
@@ -57,37 +61,38 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* If a node has more candidates, only every n-th is kept, as k-medoids compares all pairs. Only
- * leaves of the deepest level have so many. */
+/* If a node has more candidates than about this number, only every n-th is kept, because k-medoids
+ * compares all pairs. Only leaves of the deepest level have so many. */
 enum { CANDIDATES_MAX = 4096 };
 
-static int by_place(const void *a, const void *b)
+static int by_rank(const void *a, const void *b)
 {
     const uint64_t *x = a, *y = b;
     return (*x > *y) - (*x < *y);
 }
 
-/* Sets p->order: the candidates' indices in the order of the node's faces or children. */
+/* Sets p->order: the candidates' indices in the order of the node's faces or children. Returns
+ * false when out of memory. */
 static bool sort_order(proposer *p, const ebpo_handover *given)
 {
     uint64_t *pair = ebpo_alloc(given->offer_count, sizeof *pair);
     for (uint64_t i = 0; pair && i < given->offer_count; i++)
-        pair[i] = (uint64_t)given->offers[i].place << 32 | i;
+        pair[i] = (uint64_t)given->offers[i].rank << 32 | i;
     if (pair)
-        qsort(pair, given->offer_count, sizeof *pair, by_place);
+        qsort(pair, given->offer_count, sizeof *pair, by_rank);
     for (uint64_t i = 0; pair && i < given->offer_count; i++)
         p->order[i] = (int)(pair[i] & UINT32_MAX);
     free(pair);
     return pair != NULL;
 }
 
-/* Sorts the offers by normal, keeps one of equal normals, and at most about CANDIDATES_MAX in all.
- */
+/* Sorts the offers by normal, keeps one offer of each normal, and at most about CANDIDATES_MAX in
+ * all. Sets the ranks. */
 static void thin_offers(ebpo_handover *given)
 {
     uint64_t kept = 0;
     for (uint64_t i = 0; i < given->offer_count; i++)
-        given->offers[i].place = (uint32_t)i;
+        given->offers[i].rank = (uint32_t)i;
     qsort(given->offers, given->offer_count, sizeof *given->offers, by_normal);
     for (uint64_t i = 0; i < given->offer_count; i++)
         if (i == 0 || given->offers[i].normal != given->offers[i - 1].normal)
@@ -98,7 +103,8 @@ static void thin_offers(ebpo_handover *given)
         given->offers[given->offer_count++] = given->offers[i];
 }
 
-/* Makes candidates of the offers. Supports are computed later. */
+/* Makes p->candidates from the offers. Supports are computed later. Returns false when out of
+ * memory. */
 static bool make_candidates(proposer *p, ebpo_handover *given)
 {
     if (given->offer_count == 0)
@@ -116,7 +122,8 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     return p->b->thesis || sort_order(p, given);
 }
 
-/* Raises the candidate's support to the value of a point with the error `slack`. */
+/* Raises the candidate's support to n . point plus the bound of the rounding error, if this is
+ * greater. `slack`: upper bound of the error of the point's coordinates. */
 static void raise_support(ebpo_candidate *c, const double point[3], double slack)
 {
     int32_t n[3], d;
@@ -125,7 +132,7 @@ static void raise_support(ebpo_candidate *c, const double point[3], double slack
     c->support = s > c->support ? s : c->support;
 }
 
-/* Returns ebpo_candidate.moved. `size`: size of the cell. */
+/* Returns ebpo_candidate.moved for an offer. `size`: [3] size of the cell, in the model's unit. */
 static double moved_by(const ebpo_offer *offer, double support, const double size[3])
 {
     int32_t n[3], d;
@@ -136,8 +143,9 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
     return (support - offer->origin) * least / sqrt(square);
 }
 
-/* Chooses planes from p->candidates, which were made from the offers `given`; stores them, and
- * writes the data for the parent to `out`. Returns false when out of memory. */
+/* Chooses planes of a node from p->candidates, which were made from the offers `given`. Adds the
+ * planes to the proposals, and the data for the parent to `out`. `leaf_faces`: number of faces in
+ * the list of a leaf; 0 for a gray node. Returns false when out of memory. */
 static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t leaf_faces,
                           const ebpo_handover *given, ebpo_handover *out)
 {
@@ -145,15 +153,15 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
     ebpo_proposals *all = p->s->proposals;
     uint32_t codes[EBPO_PLANES_STORED];
     double size[3];
-    ebpo_polytope own;
-    ebpo_polytope_cube(&own);
+    ebpo_polytope envelope;
+    ebpo_polytope_cube(&envelope);
     for (int k = 0; k < 3; k++)
         size[k] = p->b->box.size[k] / (double)(1u << cell.level);
     for (uint64_t i = 0; i < given->offer_count; i++)
         p->candidates[i].moved = moved_by(&given->offers[i], p->candidates[i].support, size);
     ebpo_choice choice = { .candidates = p->candidates,
                            .count = (int)given->offer_count,
-                           .most = EBPO_PLANES_STORED,
+                           .codes_max = EBPO_PLANES_STORED,
                            .order = p->order,
                            .cell_size = size,
                            .normals = o->normals,
@@ -161,9 +169,9 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
                                                            o->percent, o->k_root),
                            .seed = o->seed ^ ebpo_octcode_of_cell(cell) * 0x9e3779b97f4a7c15u };
     if (p->b->thesis)
-        return ebpo_thesis_choose(p->b, &p->own, all->thesis, cell, leaf_faces, &choice, given,
-                                  out);
-    int count = p->select(&own, &choice, codes);
+        return ebpo_thesis_choose(p->b, &p->thesis_envelope, all->thesis, cell, leaf_faces, &choice,
+                                  given, out);
+    int count = p->select(&envelope, &choice, codes);
     if (count < 0 || !ebpo_grow(&all->codes, &all->code_capacity, all->code_count + (uint64_t)count,
                                 sizeof *all->codes))
         return false;
@@ -176,15 +184,16 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
         if (offer && !ebpo_handover_add(out, offer->normal, offer->origin))
             return false;
     }
-    if (!ebpo_grow(&out->corner, &out->corner_capacity, (uint64_t)own.vertex_count,
+    if (!ebpo_grow(&out->corner, &out->corner_capacity, (uint64_t)envelope.vertex_count,
                    sizeof *out->corner))
         return false;
+    /* the corners of the faces that planes made; the cell's own faces have negative tags */
     bool used[EBPO_POLYTOPE_VERTICES] = { false };
-    for (int f = 0; f < own.face_count; f++)
-        for (int i = own.first[f]; i < own.first[f + 1] && own.tag[f] >= 0; i++)
-            if (!used[own.corner[i]]) {
-                used[own.corner[i]] = true;
-                memcpy(out->corner[out->corner_count++], own.vertex[own.corner[i]],
+    for (int f = 0; f < envelope.face_count; f++)
+        for (int i = envelope.first[f]; i < envelope.first[f + 1] && envelope.tag[f] >= 0; i++)
+            if (!used[envelope.corner[i]]) {
+                used[envelope.corner[i]] = true;
+                memcpy(out->corner[out->corner_count++], envelope.vertex[envelope.corner[i]],
                        sizeof *out->corner);
             }
     return true;
@@ -192,7 +201,7 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
 
 /* --- leaves: planes of faces, around the solid --- */
 
-/* Adds the plane of each face of a leaf to the offers. */
+/* Adds the plane of each face of a leaf to the offers. Returns false when out of memory. */
 static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
                         ebpo_handover *given)
 {
@@ -239,6 +248,8 @@ static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
             raise_support(&p->candidates[j], (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
 }
 
+/* Chooses planes for a leaf, and adds the data for its parent to `out`. Returns false when out of
+ * memory. */
 static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding,
                          ebpo_handover *out)
 {
@@ -256,7 +267,7 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
 /* --- gray nodes: the children's planes, around the children's envelopes --- */
 
 /* Computes the supports of a gray node's candidates: the maximum over the solid in the cell and
- * over the corners of the children's envelopes. */
+ * over the corners of the children's envelopes. Returns false when out of memory. */
 static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
                           const ebpo_handover *given)
 {
@@ -274,6 +285,8 @@ static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
     return true;
 }
 
+/* Chooses planes for a gray node, and adds the data for its parent to `out`. `given`: the data of
+ * its children. Returns false when out of memory. */
 static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding,
                          ebpo_handover *given, ebpo_handover *out)
 {
@@ -282,8 +295,8 @@ static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
            choose_planes(p, detail, cell, 0, given, out);
 }
 
-/* Chooses planes for a node and all nodes below, and writes the data for its parent to `out`.
- * Returns false when out of memory. */
+/* Chooses planes for a node and all nodes below, and adds the data for its parent to `out`.
+ * `winding`: winding number at the node's lowest corner. Returns false when out of memory. */
 static bool propose_node(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
                          ebpo_handover *out)
 {
@@ -315,7 +328,7 @@ static void proposer_free(proposer *p)
     ebpo_supports_free(&p->supports);
     free(p->candidates);
     free(p->order);
-    ebpo_large_free(&p->own);
+    ebpo_large_free(&p->thesis_envelope);
 }
 
 /* Chooses the planes of one gray node of the top from the data of its children. Returns false when
@@ -336,6 +349,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
 }
 
+/* Sets s->proposals to proposals without planes. Returns false when out of memory. */
 static bool make_proposals(const ebpo_builder *b, ebpo_branch *s)
 {
     return ebpo_proposals_make(s) &&
@@ -399,23 +413,24 @@ static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, 
 typedef struct top_node {
     uint32_t node; /* index in the top's nodes */
     ebpo_cell cell;
-    int32_t winding;
+    int32_t winding;          /* winding number at the lowest corner */
     ebpo_handover given, out; /* data from the children; data for the parent */
-    uint64_t parent;          /* index in the list; UINT64_MAX: root */
-    unsigned octant;          /* of this node in its parent */
+    uint64_t parent;          /* index of the parent in top_list.nodes; UINT64_MAX: the root */
+    unsigned octant;          /* octant of this node in its parent */
     uint32_t codes[EBPO_PLANES_STORED];
-    int count;
+    int count;                 /* number of codes */
     ebpo_thesis_level *thesis; /* as in ebpo_proposals */
 } top_node;
 
 typedef struct top_list {
     ebpo_builder *b;
-    top_node *nodes;
-    uint64_t count, capacity, base; /* base: first node of the current level */
+    top_node *nodes; /* breadth first */
+    uint64_t count, capacity;
+    uint64_t base; /* index of the first node of the level that is being processed */
 } top_list;
 
 /* Lists the gray nodes breadth first, so that the nodes of a level are consecutive. Also computes
- * their winding numbers. */
+ * the winding numbers of these nodes and of the pieces. Returns false when out of memory. */
 static bool list_top(top_list *t)
 {
     ebpo_builder *b = t->b;
@@ -447,6 +462,8 @@ static bool list_top(top_list *t)
     return true;
 }
 
+/* Chooses planes for nodes of one level of the top. The data of gray children were gathered before;
+ * the data of children that are pieces are gathered first. */
 static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t last, unsigned worker,
                                      ebpo_error *error)
 {
@@ -510,6 +527,7 @@ static bool store_top(top_list *t)
     return true;
 }
 
+/* Chooses planes for the nodes of the top, the deepest level first. */
 static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
 {
     ebpo_builder *b = t->b;
@@ -536,8 +554,8 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
     return status;
 }
 
-/* Adds the sums of all pieces and nodes in a fixed order, so that they do not depend on the number
- * of threads. */
+/* Adds up the sums of ebpo_build_as_theses of all pieces and nodes of the top, in a fixed order, so
+ * that the results do not depend on the number of threads. */
 static void add_up_levels(const top_list *t)
 {
     ebpo_builder *b = t->b;

@@ -2,13 +2,14 @@
  * the table at the end lists them. Names and settings of selections are in format/head_facts.c;
  * CONTRIBUTING.md describes how to add a selection.
  *
- * - greedy (EBPO_SELECT_INHERIT): the plane that removes most volume (its gain) comes first. When
- * planes make the envelope smaller, the gains of the other candidates become smaller, too. So an
- * earlier gain is an upper bound, and most candidates are evaluated only once (lazy evaluation). A
- * choice by volume alone would leave needles: long, thin portions of the envelope with little
- * volume. So planes that cut off needles are added at the end.
+ * - greedy (EBPO_SELECT_INHERIT): the plane that removes the most volume is chosen first. The
+ * volume that a plane removes is its gain. When planes make the envelope smaller, the gains of the
+ * other candidates become smaller, too. So a gain that was computed earlier is an upper bound, and
+ * most candidates are evaluated only once (lazy evaluation). A choice by volume alone would leave
+ * needles: long, thin portions of the envelope with little volume. So planes that cut off needles
+ * are added at the end.
  * - random, offset, k-medoids: the selections of the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2).
- * They choose a fixed number of candidates, whatever volume these cut off.
+ * They choose a given number of candidates, whatever volume these cut off.
  *
  * A selection clips the given envelope and returns the codes of its planes. Results depend on the
  * arguments alone; random choices use the seed of the node. */
@@ -28,18 +29,17 @@
 
 /* A candidate's plane n . xi <= d. */
 typedef struct ranked {
-    /* upper bound of the volume that the plane removes; exact when `round` planes were taken */
-    double gain;
+    double gain; /* upper bound of the volume that the plane removes */
     double n[3], d;
     uint32_t code;
-    int round; /* -1: the gain was never evaluated */
+    int round; /* number of planes that were taken when the gain was computed exactly; -1: never */
 } ranked;
 
 /* Candidates that may still be chosen. */
 typedef struct ranking {
     ranked by_gain[EBPO_PLANES_CANDIDATES]; /* heap, the greatest gain first */
-    ranked needle[EBPO_PLANES_CANDIDATES];  /* the envelope extends far beyond these planes */
-    int gains, needles;                     /* lengths of both lists */
+    ranked needle[EBPO_PLANES_CANDIDATES];  /* planes beyond which the envelope extends far */
+    int gains, needles;                     /* numbers of elements of both lists */
 } ranking;
 
 /* Makes the plane of a candidate, for ebpo_polytope_clip. Returns false if no plane code has an
@@ -59,8 +59,9 @@ static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, dou
     return true;
 }
 
-/* Computes the extent of the envelope along n. */
-static void envelope_extent(const ebpo_polytope *p, const double n[3], double *least, double *most)
+/* Computes the least and the greatest n . xi of the envelope. */
+static void envelope_extent(const ebpo_polytope *p, const double n[3], double *least,
+                            double *greatest)
 {
     double low = 1e300, high = -1e300;
     for (int i = 0; i < p->vertex_count; i++) {
@@ -69,30 +70,32 @@ static void envelope_extent(const ebpo_polytope *p, const double n[3], double *l
         low = e < low ? e : low;
     }
     *least = low;
-    *most = high;
+    *greatest = high;
 }
 
-/* Makes both lists of `c`. `volume`: volume of the envelope. */
+/* Makes both lists of `c`. `volume`: volume of the envelope. `epsilon`, `needle_length`: as in
+ * ebpo_choice. */
 static void rank_candidates(const ebpo_polytope *envelope, double volume,
                             const ebpo_candidate *candidates, int count, double epsilon,
-                            double reach, ranking *c)
+                            double needle_length, ranking *c)
 {
     c->gains = c->needles = 0;
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
         ranked r = { .round = -1 };
-        double least, most;
+        double least, greatest;
         if (!candidate_plane(&candidates[i], &r.code, r.n, &r.d))
             continue;
-        envelope_extent(envelope, r.n, &least, &most);
-        r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
+        envelope_extent(envelope, r.n, &least, &greatest);
+        r.gain = ebpo_polytope_cap_bound(volume, greatest - least, greatest - r.d);
         if (r.gain >= epsilon && r.gain > 0)
             c->by_gain[c->gains++] = r;
         /* other cuts only reduce this extent, so no further candidate can be added later */
-        if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n))
+        if (needle_length > 0 && greatest - r.d > needle_length * ebpo_vec3_length(r.n))
             c->needle[c->needles++] = r;
     }
 }
 
+/* Returns true if `a` is nearer to the top of the heap than `b`. */
 static bool ranks_before(const ranked *a, const ranked *b)
 {
     return a->gain > b->gain || (a->gain == b->gain && a->code < b->code);
@@ -126,18 +129,19 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Cuts off needles, the longest first. `taken`: number of codes so far; returns the new number. */
-static int cut_needles(ebpo_polytope *envelope, ranking *c, double reach, int most, int taken,
-                       uint32_t *codes)
+/* Cuts off needles, the longest first. `taken`: number of codes so far. Returns the new number of
+ * codes. */
+static int cut_needles(ebpo_polytope *envelope, ranking *c, double needle_length, int codes_max,
+                       int taken, uint32_t *codes)
 {
-    while (taken < most && c->needles > 0) {
-        double deepest = reach;
+    while (taken < codes_max && c->needles > 0) {
+        double deepest = needle_length;
         int which = -1, kept = 0;
         for (int i = 0; i < c->needles; i++) {
             double low, high;
             envelope_extent(envelope, c->needle[i].n, &low, &high);
             double depth = (high - c->needle[i].d) / ebpo_vec3_length(c->needle[i].n);
-            if (!(depth > reach))
+            if (!(depth > needle_length))
                 continue;
             c->needle[kept] = c->needle[i];
             if (depth > deepest)
@@ -160,11 +164,11 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 {
     ranking c;
     double epsilon = choice->epsilon, volume = ebpo_polytope_volume(envelope);
-    int taken = 0, most = choice->most;
-    rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon, choice->reach,
-                    &c);
+    int taken = 0;
+    rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon,
+                    choice->needle_length, &c);
     make_heap(c.by_gain, c.gains);
-    while (c.gains > 0 && taken < most && volume - choice->core >= epsilon) {
+    while (c.gains > 0 && taken < choice->codes_max && volume - choice->hull_volume >= epsilon) {
         ranked *r = &c.by_gain[0];
         if (r->round != taken) {
             r->gain = ebpo_polytope_removed(envelope, r->n, r->d, volume, epsilon);
@@ -181,37 +185,38 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
         }
         drop_first(c.by_gain, &c.gains);
     }
-    return cut_needles(envelope, &c, choice->reach, most, taken, codes);
+    return cut_needles(envelope, &c, choice->needle_length, choice->codes_max, taken, codes);
 }
 
-/* A derived plane that removes less than this share of the cell is not worth the time of a clip. */
+/* A plane that a reader derives is not worth the time of a clip if it removes less than this share
+ * of the cell. */
 static const double least_gain = 3e-4;
 
-int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
-                    uint32_t *codes)
+int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count,
+                    int codes_max, uint32_t *codes)
 {
     ranking c;
     int taken = 0;
     rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, least_gain,
                     ebpo_needle, &c);
     make_heap(c.by_gain, c.gains);
-    for (; c.gains > 0 && taken < most; drop_first(c.by_gain, &c.gains))
+    for (; c.gains > 0 && taken < codes_max; drop_first(c.by_gain, &c.gains))
         if (ebpo_polytope_clip(envelope, c.by_gain[0].n, c.by_gain[0].d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = c.by_gain[0].code;
-    return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
+    return cut_needles(envelope, &c, ebpo_needle, codes_max, taken, codes);
 }
 
 /* --- the selections of the theses --- */
 
 /* Clips by the chosen candidates in ascending order of their indices; omits candidates that then
- * cut off nothing. ebpo_selection_wanted ensures that at most choice->most are chosen. So this loop
- * never omits the last ones for lack of space; as candidates are sorted by direction, these would
- * all have similar directions. */
+ * cut off nothing. Returns the number of codes. ebpo_selection_wanted ensures that at most
+ * choice->codes_max candidates are chosen, so the loop never omits the last ones for lack of space.
+ * (Candidates are sorted by direction, so the omitted ones would all have similar directions.) */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                           uint32_t *codes)
 {
     int taken = 0;
-    for (int i = 0; i < choice->count && taken < choice->most; i++) {
+    for (int i = 0; i < choice->count && taken < choice->codes_max; i++) {
         double n[3], offset;
         uint32_t code;
         if (!chosen[i] || !candidate_plane(&choice->candidates[i], &code, n, &offset))
@@ -225,8 +230,8 @@ static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, co
 /* --- random --- */
 
 /* Chooses consecutive candidates in the order of the node's faces or children, from a random one on
- * (EBP 2017, 3.3.4.3). (In the order of candidates, which is by direction, they would all face to
- * one side.) */
+ * (EBP 2017, 3.3.4.3). (The array of candidates is sorted by direction; consecutive elements of the
+ * array would all face to one side.) */
 static bool choose_random(const ebpo_choice *choice, bool *chosen)
 {
     uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
@@ -266,23 +271,26 @@ static bool choose_offset(const ebpo_choice *choice, bool *chosen)
     return true;
 }
 
-/* --- k-medoids: the algorithm PAM, which the theses cite from Ng and Han 1994. One pass over the
- * points finds the best swap for all k medoids (Schubert and Rousseeuw 2019); the result is the
- * same, in a k-th of the time. --- */
+/* --- k-medoids: the algorithm PAM, which the theses cite from Ng and Han 1994. It chooses k
+ * candidates (medoids) so that the cost is small: the sum of the squared distances of all
+ * candidates from their nearest medoids. In each step, a candidate replaces a medoid (a swap). One
+ * pass over the candidates finds the best swap for all k medoids (Schubert and Rousseeuw 2019); the
+ * result is the same as with k passes. --- */
 
 typedef struct clustering {
     int count, wanted;
-    double (*at)[3];       /* [count] normals as points (place_normal) */
-    float *distance;       /* [count][count] squared distances; NULL: `row` is used */
-    float *row;            /* [count] squared distances of one candidate */
-    int *medoid;           /* [wanted] index of the candidate */
-    bool *chosen;          /* [count] the candidate is a medoid; the caller's array */
-    int *nearest;          /* [count] index in `medoid` */
-    float *first, *second; /* [count] distances from the nearest and the second nearest medoid */
-    double *lost;          /* [wanted] change of the cost if the medoid is removed */
-    /* [wanted] change of the cost if a certain candidate replaces the medoid, without the part that
-     * is the same for all medoids */
-    double *gain;
+    double (*at)[3]; /* [count] normals as points (place_normal) */
+    float *distance; /* [count][count] squared distances; NULL: `row` is used */
+    float *row;      /* [count] squared distances of one candidate */
+    int *medoid;     /* [wanted] index of the candidate */
+    bool *chosen;    /* [count] the candidate is a medoid; the caller's array */
+    int *nearest;    /* [count] index in `medoid` */
+    /* [count] squared distances from the nearest and the second nearest medoid */
+    float *first, *second;
+    double *removal; /* [wanted] change of the cost if the medoid is removed */
+    /* [wanted] change of the cost if the candidate of best_swap_for replaces the medoid, without
+     * the part that is the same for all medoids */
+    double *change;
 } clustering;
 
 /* Returns the angle of (x, y) from the x axis, -pi .. pi, with an error of about 1e-15. Does not
@@ -307,33 +315,35 @@ static double angle_of(double y, double x)
     return y < 0 ? -angle : angle;
 }
 
-/* Computes the normal in the model's coordinates, as a unit vector (EBPO_NORMALS_ANGLE) or as the
- * two angles of the theses. */
+/* Converts a normal in cell coordinates to a point whose distances from other points are the
+ * distances of normals: the normal in the model's coordinates as a unit vector
+ * (EBPO_NORMALS_ANGLE), or the two angles of the theses. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
 {
     int32_t n[3], d;
-    double length = 0, most = 0;
+    double square = 0, greatest = 0;
     ebpo_plane_code_decode(ebpo_plane_code_make(normal, 0), n, &d);
     for (int k = 0; k < 3; k++) {
         out[k] = n[k] / choice->cell_size[k];
-        most = fmax(most, fabs(out[k]));
+        greatest = fmax(greatest, fabs(out[k]));
     }
     for (int k = 0; k < 3; k++) {
-        out[k] /= most;
-        length += out[k] * out[k];
+        out[k] /= greatest;
+        square += out[k] * out[k];
     }
     for (int k = 0; k < 3; k++)
-        out[k] /= sqrt(length);
+        out[k] /= sqrt(square);
     if (choice->normals == EBPO_NORMALS_ANGLE)
         return;
-    double around = angle_of(out[1], out[0]),
-           down = angle_of(sqrt(out[0] * out[0] + out[1] * out[1]), out[2]);
-    out[0] = around, out[1] = down, out[2] = 0;
+    double azimuth = angle_of(out[1], out[0]),
+           polar = angle_of(sqrt(out[0] * out[0] + out[1] * out[1]), out[2]);
+    out[0] = azimuth, out[1] = polar, out[2] = 0;
 }
 
-/* For at most this number of candidates, all distances are kept. */
+/* Maximum number of candidates for which all distances are stored. */
 enum { DISTANCES_KEPT = 4096 };
 
+/* Sets row[j] to the squared distance of the candidates i and j. */
 static void compute_row(const clustering *c, int i, float *row)
 {
     for (int j = 0; j < c->count; j++) {
@@ -343,7 +353,7 @@ static void compute_row(const clustering *c, int i, float *row)
     }
 }
 
-/* Returns the distances of candidate i, valid until the next call. */
+/* Returns the squared distances of candidate i from all candidates, valid until the next call. */
 static const float *distances_of(clustering *c, int i)
 {
     if (c->distance)
@@ -352,6 +362,7 @@ static const float *distances_of(clustering *c, int i)
     return c->row;
 }
 
+/* Allocates the arrays, and computes points and distances. Returns false when out of memory. */
 static bool clustering_make(clustering *c, const ebpo_choice *choice, bool *chosen)
 {
     uint64_t n = (uint64_t)choice->count, k = (uint64_t)choice->wanted;
@@ -366,10 +377,10 @@ static bool clustering_make(clustering *c, const ebpo_choice *choice, bool *chos
                        .nearest = ebpo_alloc(n, sizeof *c->nearest),
                        .first = ebpo_alloc(n, sizeof *c->first),
                        .second = ebpo_alloc(n, sizeof *c->second),
-                       .lost = ebpo_alloc(k, sizeof *c->lost),
-                       .gain = ebpo_alloc(k, sizeof *c->gain) };
+                       .removal = ebpo_alloc(k, sizeof *c->removal),
+                       .change = ebpo_alloc(k, sizeof *c->change) };
     bool good = c->at && (c->distance || !kept) && c->row && c->medoid && c->nearest && c->first &&
-                c->second && c->lost && c->gain;
+                c->second && c->removal && c->change;
     for (uint64_t i = 0; i < n && good; i++)
         place_normal(choice, choice->candidates[i].normal, c->at[i]);
     for (uint64_t i = 0; i < n && good && kept; i++)
@@ -386,10 +397,11 @@ static void clustering_free(clustering *c)
     free(c->nearest);
     free(c->first);
     free(c->second);
-    free(c->lost);
-    free(c->gain);
+    free(c->removal);
+    free(c->change);
 }
 
+/* Chooses the first medoids. */
 static void choose_at_random(clustering *c, uint64_t seed)
 {
     for (int i = 0; i < c->wanted; i++) {
@@ -420,36 +432,36 @@ static void assign_medoids(clustering *c)
     }
 }
 
-/* Returns the least change of the total cost if candidate `h` replaces a medoid; *which: this
- * medoid. */
+/* Returns the least change of the cost if candidate `h` replaces a medoid, and sets *which to the
+ * index of this medoid. */
 static double best_swap_for(clustering *c, int h, int *which)
 {
     const float *row = distances_of(c, h);
     double shared = 0;
-    memcpy(c->gain, c->lost, (size_t)c->wanted * sizeof *c->gain);
+    memcpy(c->change, c->removal, (size_t)c->wanted * sizeof *c->change);
     for (int i = 0; i < c->count; i++) {
         float d = row[i];
         if (d < c->first[i]) {
             shared += (double)d - (double)c->first[i];
-            c->gain[c->nearest[i]] += (double)c->first[i] - (double)c->second[i];
+            c->change[c->nearest[i]] += (double)c->first[i] - (double)c->second[i];
         } else if (d < c->second[i])
-            c->gain[c->nearest[i]] += (double)d - (double)c->second[i];
+            c->change[c->nearest[i]] += (double)d - (double)c->second[i];
     }
     *which = 0;
     for (int m = 1; m < c->wanted; m++)
-        if (c->gain[m] < c->gain[*which])
+        if (c->change[m] < c->change[*which])
             *which = m;
-    return c->gain[*which] + shared;
+    return c->change[*which] + shared;
 }
 
 /* Makes the best swap. Returns false if no swap lowers the cost. */
 static bool swap_once(clustering *c)
 {
-    int leave = -1, enter = -1;
-    double best = -1e-9; /* smaller gains are rounding errors */
-    memset(c->lost, 0, (size_t)c->wanted * sizeof *c->lost);
+    int leave = -1, enter = -1; /* index of the medoid to replace; the candidate that replaces it */
+    double best = -1e-9;        /* a change nearer to 0 is a rounding error */
+    memset(c->removal, 0, (size_t)c->wanted * sizeof *c->removal);
     for (int i = 0; i < c->count; i++)
-        c->lost[c->nearest[i]] += (double)c->second[i] - (double)c->first[i];
+        c->removal[c->nearest[i]] += (double)c->second[i] - (double)c->first[i];
     for (int h = 0; h < c->count; h++) {
         int which;
         if (c->chosen[h])
@@ -483,6 +495,7 @@ static void single_medoid(clustering *c)
     c->chosen[at] = true;
 }
 
+/* Chooses by k-medoids, from random first medoids. Returns false when out of memory. */
 static bool choose_kmedoids(const ebpo_choice *choice, bool *chosen)
 {
     /* each swap lowers the cost; the limit prevents an endless loop caused by rounding errors */
@@ -526,6 +539,7 @@ bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice,
     return !choice->count || choosers[selection](choice, chosen);
 }
 
+/* Does the work of the selections of the theses (ebpo_select_fn). */
 static int select_as_theses(ebpo_selection selection, ebpo_polytope *envelope,
                             const ebpo_choice *choice, uint32_t *codes)
 {

@@ -1,10 +1,12 @@
 /* Simplifies the triangles of a patch by collapsing edges in the order of their quadric error.
  *
- * The quadric of a vertex is the sum of the squared distances from the planes of its triangles,
- * weighted by area. A collapse moves a vertex onto a neighbour; its cost is the sum of the quadrics
- * of both vertices at the neighbour's position. An edge with one triangle also has a plane across
- * the triangle, which keeps open borders in place. The corners of each vertex are a circular list,
- * and a collapse joins two lists. */
+ * The quadric of a vertex is a function of a position: the sum of the squared distances from the
+ * planes of the vertex's triangles, weighted by area. A collapse moves a vertex onto a neighbour
+ * and removes the triangles that have both; its cost is mainly the sum of the quadrics of both
+ * vertices at the neighbour's position. An edge with one triangle adds a plane that contains the
+ * edge and is perpendicular to the triangle, which keeps open borders in place. A corner is one of
+ * the three uses of a vertex by a triangle: corner c is entry c of the array `triangle`. The
+ * corners of each vertex are a circular list, and a collapse joins two lists. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,17 +18,21 @@
 #include "geometry/vec3.h"
 
 #define NONE UINT32_MAX
-/* Vertices with more corners in both lists do not collapse: each attempt walks along the lists. */
+/* Two vertices do not collapse if their lists have more corners than this number together, because
+ * each attempt walks along the lists. */
 enum { MOST_CORNERS = 512 };
 /* Weight of the planes at open edges, weight of the squared length of an edge, and the least cosine
  * between the normals of a triangle before and after a collapse. */
 static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, LEAST_COSINE = 0.25;
 
-/* Symmetric 4 x 4 matrix: squares and products of n, then n d, then d d. */
+/* Sums over planes n . x + d = 0 with weights, which are a symmetric 4 x 4 matrix: products of two
+ * coordinates of n, products of n and d, and d d; and the sum of the triangles' areas. */
 typedef struct quadric {
     double nn[6], nd[3], dd, area;
 } quadric;
 
+/* A collapse that may be done: vertex `from` moves onto vertex `to`. It is valid while both ages
+ * are unchanged. */
 typedef struct candidate {
     double cost;
     uint32_t from, to, from_age, to_age;
@@ -34,16 +40,18 @@ typedef struct candidate {
 
 typedef struct simplifier {
     ebpo_patch_mesh *mesh;
-    quadric *sum;
+    quadric *sum;      /* [vertices] */
     uint32_t *next;    /* [3 * triangles] next corner of the same vertex */
-    uint32_t *head;    /* [vertices] a corner, or NONE */
-    uint32_t *corners; /* [vertices] at least the number of living corners in the list */
-    uint32_t *age;     /* [vertices] number of changes */
-    uint32_t *mark;    /* [vertices] last mark */
-    uint32_t marks;
-    bool *dead; /* [triangles] */
-    candidate *heap;
-    uint64_t heap_count, heap_capacity, alive;
+    uint32_t *head;    /* [vertices] a corner of the vertex's list; NONE: it has no list */
+    uint32_t *corners; /* [vertices] number of corners in the list, or more; corners of removed
+                        * triangles do not count */
+    uint32_t *age;     /* [vertices] number of collapses that changed the vertex */
+    uint32_t *mark;    /* [vertices] last mark that was set */
+    uint32_t marks;    /* number of marks so far; a new number makes all vertices unmarked */
+    bool *dead;        /* [triangles] true: the triangle is removed */
+    candidate *heap;   /* the cheapest candidate first */
+    uint64_t heap_count, heap_capacity;
+    uint64_t alive; /* number of triangles that are not removed */
     bool short_of_memory;
 } simplifier;
 
@@ -56,6 +64,7 @@ void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh)
 
 static const double *position_of(const simplifier *s, uint32_t v) { return s->mesh->vertex[v].at; }
 
+/* Adds the plane n . x + d = 0 with a weight. */
 static void add_plane(quadric *q, const double n[3], double d, double weight)
 {
     static const int row[6] = { 0, 0, 0, 1, 1, 2 }, column[6] = { 0, 1, 2, 1, 2, 2 };
@@ -66,6 +75,7 @@ static void add_plane(quadric *q, const double n[3], double d, double weight)
     q->dd += weight * d * d;
 }
 
+/* Returns the sum of the weighted squared distances of p from the planes. */
 static double quadric_value(const quadric *q, const double p[3])
 {
     return q->nn[0] * p[0] * p[0] + q->nn[3] * p[1] * p[1] + q->nn[5] * p[2] * p[2] +
@@ -73,6 +83,7 @@ static double quadric_value(const quadric *q, const double p[3])
            2 * ebpo_vec3_dot(q->nd, p) + q->dd;
 }
 
+/* Computes the normal of a triangle; its length is twice the triangle's area. */
 static void cross_of(const double a[3], const double b[3], const double c[3], double out[3])
 {
     double u[3], v[3];
@@ -81,7 +92,8 @@ static void cross_of(const double a[3], const double b[3], const double c[3], do
     ebpo_vec3_cross(u, v, out);
 }
 
-/* Returns the number of living triangles that have both vertices, or 2 if there are more. */
+/* Returns the number of triangles that have both vertices and are not removed; 2 if there are more.
+ */
 static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
 {
     unsigned count = 0;
@@ -102,6 +114,7 @@ static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
     return count;
 }
 
+/* Adds a plane to both quadrics for the open edge from a to b of a triangle with this normal. */
 static void add_open_edge(simplifier *s, uint32_t a, uint32_t b, const double normal[3])
 {
     double edge[3], n[3];
@@ -117,20 +130,21 @@ static void add_open_edge(simplifier *s, uint32_t a, uint32_t b, const double no
     add_plane(&s->sum[b], n, d, OPEN_WEIGHT * square);
 }
 
+/* Adds the planes of triangle i to the quadrics of its vertices. */
 static void add_triangle(simplifier *s, uint64_t i)
 {
     const uint32_t *t = s->mesh->triangle + 3 * i;
     double n[3];
     cross_of(position_of(s, t[0]), position_of(s, t[1]), position_of(s, t[2]), n);
-    double twice = ebpo_vec3_length(n);
-    if (!(twice > 0))
+    double twice_area = ebpo_vec3_length(n);
+    if (!(twice_area > 0))
         return;
     for (int k = 0; k < 3; k++)
-        n[k] /= twice;
+        n[k] /= twice_area;
     double d = -ebpo_vec3_dot(n, position_of(s, t[0]));
     for (int k = 0; k < 3; k++) {
-        add_plane(&s->sum[t[k]], n, d, twice / 2);
-        s->sum[t[k]].area += twice / 2;
+        add_plane(&s->sum[t[k]], n, d, twice_area / 2);
+        s->sum[t[k]].area += twice_area / 2;
         uint32_t b = t[(k + 1) % 3];
         if (!(s->mesh->vertex[t[k]].fixed && s->mesh->vertex[b].fixed) &&
             count_shared(s, t[k], b) == 1)
@@ -175,6 +189,7 @@ static candidate pop_candidate(simplifier *s)
     return top;
 }
 
+/* Adds the collapse of `from` onto `to` to the heap, unless `from` is fixed. */
 static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
 {
     if (s->mesh->vertex[from].fixed)
@@ -187,7 +202,8 @@ static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
     push_candidate(s, (candidate){ cost, from, to, s->age[from], s->age[to] });
 }
 
-/* Removes the corners of dead triangles from the list of a vertex; keeps one if all are dead. */
+/* Removes the corners of removed triangles from the list of a vertex; keeps one corner if all
+ * triangles are removed. */
 static void remove_dead_corners(simplifier *s, uint32_t v)
 {
     uint32_t begin = s->head[v], c = begin, first = NONE, last = NONE, count = 0;
@@ -210,9 +226,9 @@ static void remove_dead_corners(simplifier *s, uint32_t v)
     s->corners[v] = count;
 }
 
-/* Calls offer_collapse in both directions for each edge of a vertex; if `lower`, only for edges
- * whose other vertex has a higher number. */
-static void offer_edges(simplifier *s, uint32_t v, bool lower)
+/* Calls offer_collapse in both directions for each edge of a vertex; if `upwards`, only for edges
+ * whose other vertex has a higher index. */
+static void offer_edges(simplifier *s, uint32_t v, bool upwards)
 {
     uint32_t c = s->head[v];
     if (c == NONE)
@@ -221,7 +237,7 @@ static void offer_edges(simplifier *s, uint32_t v, bool lower)
     do {
         for (int k = 0; k < 3 && !s->dead[c / 3]; k++) {
             uint32_t w = s->mesh->triangle[c / 3 * 3 + (uint32_t)k];
-            if (w == v || s->mark[w] == s->marks || (lower && w < v))
+            if (w == v || s->mark[w] == s->marks || (upwards && w < v))
                 continue;
             s->mark[w] = s->marks;
             offer_collapse(s, v, w);
@@ -233,6 +249,7 @@ static void offer_edges(simplifier *s, uint32_t v, bool lower)
 
 /* --- collapses --- */
 
+/* Marks v and its neighbours with a new mark, s->marks. */
 static void mark_neighbours(simplifier *s, uint32_t v)
 {
     uint32_t c = s->head[v];
@@ -244,8 +261,8 @@ static void mark_neighbours(simplifier *s, uint32_t v)
     } while (c != s->head[v]);
 }
 
-/* Returns true if the triangle keeps its side when its vertex `from` moves to `to`. */
-static bool keeps_side(const simplifier *s, const uint32_t t[3], uint32_t from, uint32_t to)
+/* Returns true if the triangle is not flipped when its vertex `from` moves to `to`. */
+static bool stays_unflipped(const simplifier *s, const uint32_t t[3], uint32_t from, uint32_t to)
 {
     const double *p[3], *q[3];
     double before[3], after[3];
@@ -260,31 +277,32 @@ static bool keeps_side(const simplifier *s, const uint32_t t[3], uint32_t from, 
     return !(ebpo_vec3_dot(before, before) > 0) || dot > LEAST_COSINE * sqrt(square);
 }
 
-/* Returns true if a collapse keeps the topology (each vertex next to both ends is a vertex of a
- * triangle that has both ends) and the sides of all triangles. */
+/* Returns true if a collapse does not change the topology (each vertex that is a neighbour of both
+ * ends is a vertex of a triangle that has both ends) and flips no triangle. */
 static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
 {
+    /* number of triangles that have both ends; number of common neighbours of both ends */
     unsigned shared = 0, common = 0;
     bool open = false;
     if ((uint64_t)s->corners[from] + s->corners[to] > MOST_CORNERS)
         return false;
     mark_neighbours(s, to);
-    uint32_t of_to = s->marks, seen = ++s->marks, c = s->head[from];
+    uint32_t to_mark = s->marks, seen_mark = ++s->marks, c = s->head[from];
     do {
         const uint32_t *t = s->mesh->triangle + c / 3 * 3;
         bool has_to = t[0] == to || t[1] == to || t[2] == to;
         if (!s->dead[c / 3]) {
             shared += has_to;
-            if (!has_to && !keeps_side(s, t, from, to))
+            if (!has_to && !stays_unflipped(s, t, from, to))
                 return false;
             for (int k = 0; k < 3; k++) {
                 uint32_t w = t[k];
                 if (w == from || w == to)
                     continue;
-                common += s->mark[w] == of_to;
-                if (s->mark[w] != seen)
+                common += s->mark[w] == to_mark;
+                if (s->mark[w] != seen_mark)
                     open = open || count_shared(s, from, w) == 1;
-                s->mark[w] = s->mark[w] == of_to ? seen : s->mark[w];
+                s->mark[w] = s->mark[w] == to_mark ? seen_mark : s->mark[w];
             }
         }
         c = s->next[c];
@@ -292,6 +310,7 @@ static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
     return shared > 0 && common == shared && (!open || shared == 1);
 }
 
+/* Moves vertex `from` onto `to`. */
 static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
 {
     ebpo_patch_vertex *u = &s->mesh->vertex[from], *v = &s->mesh->vertex[to];
@@ -324,32 +343,34 @@ static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
     s->age[to]++;
 }
 
-/* Removes dead triangles, and unused vertices that are not fixed. `number`: [vertices]. */
-static void compact_mesh(simplifier *s, uint32_t *number)
+/* Takes removed triangles, and unused vertices that are not fixed, out of the mesh's arrays.
+ * `new_index`: [vertices] space for new indices. */
+static void compact_mesh(simplifier *s, uint32_t *new_index)
 {
     ebpo_patch_mesh *m = s->mesh;
     uint64_t triangles = 0, vertices = 0;
     for (uint64_t v = 0; v < m->vertex_count; v++)
-        number[v] = m->vertex[v].fixed ? 0 : NONE;
+        new_index[v] = m->vertex[v].fixed ? 0 : NONE;
     for (uint64_t t = 0; t < m->triangle_count; t++)
         for (int k = 0; k < 3 && !s->dead[t]; k++)
-            number[m->triangle[3 * t + (uint64_t)k]] = 0;
+            new_index[m->triangle[3 * t + (uint64_t)k]] = 0;
     for (uint64_t v = 0; v < m->vertex_count; v++)
-        if (number[v] != NONE) {
-            number[v] = (uint32_t)vertices;
+        if (new_index[v] != NONE) {
+            new_index[v] = (uint32_t)vertices;
             m->vertex[vertices++] = m->vertex[v];
         }
     for (uint64_t t = 0; t < m->triangle_count; t++) {
         if (s->dead[t])
             continue;
         for (uint64_t k = 0; k < 3; k++)
-            m->triangle[3 * triangles + k] = number[m->triangle[3 * t + k]];
+            m->triangle[3 * triangles + k] = new_index[m->triangle[3 * t + k]];
         triangles++;
     }
     m->triangle_count = triangles;
     m->vertex_count = vertices;
 }
 
+/* Makes the lists, quadrics and candidates, and collapses edges until `target` triangles remain. */
 static void collapse_edges(simplifier *s, uint64_t target)
 {
     ebpo_patch_mesh *m = s->mesh;

@@ -1,5 +1,6 @@
-/* Simplifies the triangles of a patch (format-spec/surface.md) while the patch is built, and bounds
- * the distance between two surfaces. */
+/* Simplifies the triangles of a patch while the patch is built, and bounds the distance between two
+ * surfaces. A patch is a coarse surface for the part of the model in a cell
+ * (format-spec/surface.md). */
 #ifndef EBPO_CONSTRUCT_SIMPLIFY_H
 #define EBPO_CONSTRUCT_SIMPLIFY_H
 
@@ -11,15 +12,17 @@
 #include "core/error.h"
 
 typedef struct ebpo_patch_vertex {
-    double at[3];
+    double at[3];             /* position */
     double normal[3];         /* sum of the normals of faces, each as long as twice the area */
-    double colour[3], weight; /* sum of colours, and of their weights */
-    uint64_t lowest, highest; /* faces of the model that use the replaced vertices */
-    uint64_t key;             /* key of its cell, or of the model's vertex */
-    bool fixed;               /* it is on the border of the patch and does not move */
+    double colour[3], weight; /* sums of colours and of their weights */
+    /* least and greatest index of the model's faces that use the vertices that this vertex replaces
+     */
+    uint64_t lowest, highest;
+    uint64_t key; /* key of its cell, or of the model's vertex */
+    bool fixed;   /* it is on the border of the patch and does not move */
 } ebpo_patch_vertex;
 
-/* Triangles that are neighbours in the array should be neighbours in space. */
+/* The triangles of a patch. Neighbours in the array should be neighbours in space. */
 typedef struct ebpo_patch_mesh {
     uint64_t vertex_count, triangle_count, vertex_capacity, triangle_capacity;
     ebpo_patch_vertex *vertex;
@@ -29,15 +32,15 @@ typedef struct ebpo_patch_mesh {
 void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh);
 
 /* Collapses edges until at most `target` triangles remain, or no collapse is possible without
- * flipping a triangle or changing the topology. Fixed vertices stay. Every other vertex stays, or
- * is moved onto a neighbour and removed, so no new positions arise. Removes unused vertices that
- * are not fixed. Returns EBPO_E_MEMORY. Any thread. Source: Garland and Heckbert, Surface
+ * flipping a triangle or changing the topology. Fixed vertices remain. Every other vertex remains,
+ * or is moved onto a neighbour and removed, so there are no new positions. Removes unused vertices
+ * that are not fixed. Returns EBPO_E_MEMORY. Any thread. Source: Garland and Heckbert, Surface
  * simplification using quadric error metrics, 1997. */
 EBPO_MUST_USE ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error);
 
 /* Sets *out to an upper bound of the greatest distance of a point of `a` from `b`, which must have
- * triangles. The bound is at most 5 % or `fine` above the distance, or the bound is at most
- * `known`. The caller adds the rounding error, about 2^-45 of the greatest coordinate. Returns
+ * triangles. The bound is at most `known`, or it exceeds the distance by at most 5 % or by at most
+ * `fine`. The caller adds the rounding error, about 2^-45 of the greatest coordinate. Returns
  * EBPO_E_MEMORY. Any thread. */
 EBPO_MUST_USE ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh *b,
                                               double fine, double known, double *out,

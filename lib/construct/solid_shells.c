@@ -2,11 +2,12 @@
  *
  * Two components are apart if their faces have no common point. Then each is completely inside or
  * outside the other one, and the winding numbers on both sides of its faces follow from the nesting
- * of components. Faces are compared only where the boxes of components do not decide: a first pass
- * finds the faces that intersect the box of another component, unless that box contains the box of
- * the face's own component. A second pass compares these faces. Both passes stop after a number of
- * steps that is proportional to the number of faces; then the components count as not apart. `ebpo
- * check` prints the counts; ebpo_measure uses the multiplicity of components. */
+ * of components (which component is inside which). Faces are compared only if the boxes of
+ * components do not decide: a first pass finds the faces that intersect the box of another
+ * component, unless that box contains the box of the face's own component. A second pass compares
+ * these faces. Both passes stop after a number of steps that is proportional to the number of
+ * faces; then the components count as not apart. `ebpo check` prints the counts; ebpo_measure uses
+ * ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -23,6 +24,8 @@
 #include "geometry/level_nodes.h"
 #include "geometry/triangle_pair.h"
 
+/* RULES: number of winding rules. GRAIN: number of faces of a parallel task. The limit of steps is
+ * STEPS_AT_LEAST + STEPS_PER_FACE times the number of faces. */
 enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22 };
 
 typedef struct comparing {
@@ -141,15 +144,16 @@ static ebpo_status find_contacts(void *context, uint64_t begin, uint64_t end, un
     return compare_faces(c, begin, end, &c->faces, visit_faces);
 }
 
+/* Makes the box tree of the faces of reached shells. */
 static ebpo_status build_face_tree(comparing *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->s->mesh;
     bool added = true;
     c->faces.workspace = mesh->workspace;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
-        uint32_t one = shell_of_face(c, f);
-        if (added && one != EBPO_NO_INDEX && c->reached[one])
-            added = ebpo_face_add(&c->faces, mesh, (uint32_t)f, (int32_t)one);
+        uint32_t shell = shell_of_face(c, f);
+        if (added && shell != EBPO_NO_INDEX && c->reached[shell])
+            added = ebpo_face_add(&c->faces, mesh, (uint32_t)f, (int32_t)shell);
     }
     return added && ebpo_box_tree_build(&c->faces, ebpo_face_box, mesh)
                ? EBPO_OK
@@ -157,6 +161,7 @@ static ebpo_status build_face_tree(comparing *c, ebpo_error *error)
                                      error);
 }
 
+/* Runs both passes: sets c->apart to false if faces of two shells have a common point. */
 static ebpo_status compare_shells(comparing *c, ebpo_error *error)
 {
     const ebpo_nesting *n = &c->s->nesting;
@@ -178,6 +183,7 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
     return status;
 }
 
+/* Sets s->apart if all components are simple (is_simple). */
 static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
 {
     comparing c = { .s = s, .apart = true };
@@ -195,11 +201,11 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
  * face and its reverse.) */
 static bool is_simple(const ebpo_components *c, uint64_t i)
 {
-    const ebpo_found_component *one = &c->list[i];
+    const ebpo_found_component *component = &c->list[i];
     bool flat = c->faces.begin[i + 1] - c->faces.begin[i] <= 2;
     for (int k = 0; k < 3; k++)
-        flat |= one->min[k] == one->max[k];
-    return !one->open && (one->volume != 0 || flat);
+        flat |= component->min[k] == component->max[k];
+    return !component->open && (component->volume != 0 || flat);
 }
 
 ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const ebpo_mesh *mesh, unsigned threads,
@@ -239,18 +245,18 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
 {
     if (shells->shell_of[component] == EBPO_NO_INDEX)
         return 1;
-    const ebpo_shell *one = &shells->nesting.shells[shells->shell_of[component]];
-    int sign = ebpo_shell_faces_inwards(&shells->nesting, one) ? -1 : 1;
+    const ebpo_shell *shell = &shells->nesting.shells[shells->shell_of[component]];
+    int sign = ebpo_shell_faces_inwards(&shells->nesting, shell) ? -1 : 1;
     return sign *
-           (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
+           (ebpo_rule_inside(rule, shell->around + sign) - ebpo_rule_inside(rule, shell->around));
 }
 
 /* --- counting --- */
 
-/* Counts a shell. A shell is a cavity, or turned inwards, relative to the shells around it. */
-static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells *made)
+/* Adds a shell to the counts. Whether it is a cavity depends on the shells around it. */
+static void count_shell(const ebpo_nesting *n, const ebpo_shell *shell, ebpo_shells *made)
 {
-    bool inwards = ebpo_shell_faces_inwards(n, one), cavity = ebpo_shell_is_cavity(one);
+    bool inwards = ebpo_shell_faces_inwards(n, shell), cavity = ebpo_shell_is_cavity(shell);
     made->inside_out += inwards && !cavity;
     made->cavities += inwards && cavity;
     made->nested += !inwards && cavity;
@@ -266,8 +272,8 @@ static void set_volume_differences(const ebpo_solid_shells *s, ebpo_shells *made
         double sum = 0;
         for (uint64_t i = 0; i < n->count; i++) {
             uint32_t component = n->shells[i].component;
-            int more = ebpo_component_times(s, component, (ebpo_rule)rule) - 1;
-            sum += more * n->components->list[component].volume;
+            int extra = ebpo_component_times(s, component, (ebpo_rule)rule) - 1;
+            sum += extra * n->components->list[component].volume;
         }
         made->volume_difference[rule] = ldexp(sum, power);
     }
@@ -278,7 +284,7 @@ void ebpo_solid_shells_count(const ebpo_solid_shells *s, ebpo_shells *out)
     *out = (ebpo_shells){ .struct_size = sizeof *out, .closed = s->nesting.count };
     out->apart = s->apart;
     for (uint64_t i = 0; i < s->nesting.count; i++)
-        count_one(&s->nesting, &s->nesting.shells[i], out);
+        count_shell(&s->nesting, &s->nesting.shells[i], out);
     if (s->apart)
         set_volume_differences(s, out);
 }

@@ -1,5 +1,5 @@
-/* Finds the shells of a mesh (its closed components), and which of them bound the solid of a rule
- * (the winding numbers that count as inside). */
+/* Finds the shells of a mesh (its closed components), and which of them bound the solid of a
+ * winding rule (which says which winding numbers count as inside). */
 #ifndef EBPO_CONSTRUCT_SOLID_SHELLS_H
 #define EBPO_CONSTRUCT_SOLID_SHELLS_H
 
@@ -12,24 +12,25 @@ typedef struct ebpo_solid_shells {
     const ebpo_mesh *mesh; /* borrowed */
     /* result of ebpo_mesh_find_shells; the nesting uses it as `of_face` of its components */
     uint32_t *closed;
-    ebpo_nesting nesting;
-    uint32_t *shell_of; /* [component] index of its shell; EBPO_NO_INDEX: it has no volume */
-    bool apart;         /* every component is closed, and faces of two different components have no
-                         * common point */
+    ebpo_nesting nesting; /* which shells are inside which others */
+    uint32_t *shell_of;   /* [component] index of its shell; EBPO_NO_INDEX: the component has no
+                           * volume */
+    bool apart; /* every component is closed, and faces of two different components have no common
+                 * point */
 } ebpo_solid_shells;
 
 /* Finds the components and their nesting, and sets `apart`. Takes as long as
- * ebpo_mesh_count_shells. The caller frees `out`, on failure as well. */
+ * ebpo_mesh_count_shells. The caller frees `out`, also on failure. */
 EBPO_MUST_USE ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const ebpo_mesh *mesh,
                                                  unsigned threads, const ebpo_progress *progress,
                                                  ebpo_error *error);
-/* Sets all fields of `out`. */
+/* Sets all fields of `out`: counts of shells, and differences of volumes. */
 void ebpo_solid_shells_count(const ebpo_solid_shells *shells, ebpo_shells *out);
 void ebpo_solid_shells_free(ebpo_solid_shells *shells);
 
-/* Returns 1 if the faces of a component bound the solid, -1 if they do so with the opposite
- * orientation, 0 if they do not bound it. `apart` must be true. The integral over the solid is the
- * integral over all faces with these factors. */
+/* Returns 1 if the faces of a component bound the solid, -1 if they bound it with the opposite
+ * orientation, 0 if they do not bound it. `apart` must be true. An integral over the solid's
+ * surface is the integral over all faces, with these factors. */
 int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, ebpo_rule rule);
 
 #endif

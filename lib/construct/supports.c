@@ -2,12 +2,13 @@
  * cell, the points where the mesh crosses cell faces, and the corners of the cell that are inside
  * the solid. The support is the offset of a plane with normal n.
  *
- * If the vertices are few, all points are gathered, each once, and searched in stretches (sweep.h)
- * that share a box. If they are many, only crossings and corners are gathered, and the vertices are
- * searched by a hierarchy of boxes over ranges of vertices along the curve. Rounding is monotone:
- * the bound of a box is computed by the same operations in the same order as the values of points,
- * so it is never less than the value of a point in the box, and no search skips the greatest point.
- * A search stops early when the support is so large that the plane would not be worth storing. */
+ * If there are few vertices, all points are gathered, each once, and searched in stretches (32
+ * consecutive points that share a box, sweep.h). If there are many, only crossings and corners are
+ * gathered, and the vertices are searched by a hierarchy of boxes around ranges of vertices along
+ * the Morton curve. Rounding is monotone: the bound of a box is computed by the same operations in
+ * the same order as the values of points, so it is never less than the value of a point in the box,
+ * and no search skips the greatest point. A search stops early when the support is so large that
+ * the plane would not be worth storing. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -23,6 +24,7 @@
 
 /* --- boxes around ranges of vertices, and boxes around boxes --- */
 
+/* Enlarges a box so that it contains another box. */
 static void join_box(double (*box)[3], const double low[3], const double high[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -69,12 +71,14 @@ void ebpo_bounds_free(ebpo_bounds *bounds)
 /* A search for the vertex of begin .. end - 1 with the greatest n . xi. */
 typedef struct vertex_search {
     const ebpo_builder *b;
-    double corner[3], size[3], n[3]; /* the cell; the direction */
-    uint64_t begin, end, at;         /* at: the best vertex */
-    double best;
+    double corner[3], size[3]; /* lowest corner and size of the cell */
+    double n[3];
+    uint64_t begin, end;
+    double best;          /* greatest value so far */
+    uint64_t best_vertex; /* vertex with this value; EBPO_NO_VERTEX: none */
 } vertex_search;
 
-/* Returns the greatest n . xi in a box. */
+/* Returns the greatest n . xi in a box; xi: the point in cell coordinates. */
 static double bound_value(const vertex_search *q, const double low[3], const double high[3])
 {
     double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]),
@@ -98,7 +102,7 @@ static void visit_block(vertex_search *q, int level, uint64_t block)
         double v = bound_value(q, p, p);
         if (v > q->best) {
             q->best = v;
-            q->at = block;
+            q->best_vertex = block;
         }
         return;
     }
@@ -111,11 +115,14 @@ static void visit_block(vertex_search *q, int level, uint64_t block)
 }
 
 /* Returns the greatest n . xi over the vertices begin .. end - 1, in coordinates of the cell, but
- * at least `least`. Sets *at to the vertex, or to EBPO_NO_VERTEX if no value exceeds `least`. */
+ * at least `least`. Sets *vertex to the vertex with this value, or to EBPO_NO_VERTEX if no value
+ * exceeds `least`. */
 static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
-                             uint64_t begin, uint64_t end, double least, uint64_t *at)
+                             uint64_t begin, uint64_t end, double least, uint64_t *vertex)
 {
-    vertex_search q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
+    vertex_search q = {
+        .b = b, .begin = begin, .end = end, .best_vertex = EBPO_NO_VERTEX, .best = least
+    };
     for (int k = 0; k < 3; k++) {
         q.corner[k] = ebpo_cell_face(&b->box, k, cell.level, cell.at[k]);
         q.size[k] = b->box.size[k] / (double)(1u << cell.level);
@@ -131,17 +138,17 @@ static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double
     if (begin < end)
         for (uint64_t block = begin / width; block * width < end; block++)
             visit_block(&q, level, block);
-    *at = q.at;
+    *vertex = q.best_vertex;
     return q.best;
 }
 
-/* Returns the number of keys below `wanted`. */
-static uint64_t lower_bound(const uint64_t *key, uint64_t count, uint64_t wanted)
+/* Returns the number of keys below `limit`; the keys are ascending. */
+static uint64_t lower_bound(const uint64_t *key, uint64_t count, uint64_t limit)
 {
     uint64_t low = 0;
     while (count) {
         uint64_t half = count / 2;
-        if (key[low + half] < wanted) {
+        if (key[low + half] < limit) {
             low += half + 1;
             count -= half + 1;
         } else
@@ -160,19 +167,22 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
 
 /* --- the points of a node --- */
 
-/* FEW_VERTICES: a node with more vertices searches them by boxes. TABLE_MAX: maximum size of the
- * hash table. MANY_POINTS: a search among more points releases pages of the workspace first. */
+/* FEW_VERTICES: the vertices of a node with more vertices are searched by boxes. TABLE_MAX: maximum
+ * size of the hash table. MANY_POINTS: a search among more points releases pages of the workspace
+ * first. */
 enum { FEW_VERTICES = 4096, TABLE_MAX = 1 << 16, MANY_POINTS = 1 << 15 };
 
+/* Returns true if point i has the coordinates x. */
 static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
 {
     const double(*p)[4] = (const double(*)[4])s->point[i / 4];
     return p[0][i % 4] == x[0] && p[1][i % 4] == x[1] && p[2][i % 4] == x[2];
 }
 
-/* Returns true if the point exists already, and raises its error bound to `slack`. If not, enters
- * the next point in the table. */
-static bool known_point(ebpo_supports *s, const double x[3], double slack)
+/* Returns true if there is a point with the coordinates x, and raises its error bound to `error`.
+ * If not, enters the index of the next point, which the caller must add, in the table. When the
+ * table is half full, always returns false. */
+static bool known_point(ebpo_supports *s, const double x[3], double error)
 {
     uint64_t bits[3], at;
     if (s->count >= s->table_size / 2)
@@ -186,12 +196,15 @@ static bool known_point(ebpo_supports *s, const double x[3], double slack)
     }
     unsigned i = s->table[at] - 1u, lane = i % 4;
     double(*p)[4] = s->point[i / 4];
-    p[3][lane] = slack > p[3][lane] ? slack : p[3][lane];
+    p[3][lane] = error > p[3][lane] ? error : p[3][lane];
+    /* the lanes after the last point are copies of lane 0 */
     for (unsigned copy = lane ? 4 : (unsigned)(s->count - i); copy < 4; copy++)
         p[3][copy] = p[3][0];
     return true;
 }
 
+/* Adds a point. `slack`: upper bound of the rounding errors of its coordinates. Returns false when
+ * out of memory. */
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
 {
     if (!ebpo_array_grow_late(s->workspace, &s->point, &s->capacity, s->count / 4 + 1,
@@ -201,15 +214,16 @@ static bool add_point(ebpo_supports *s, const double x[3], double slack)
         return true;
     double(*p)[4] = s->point[s->count / 4],
     values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
-    unsigned lane_of_point = s->count % 4;
-    /* the other lanes of a four are copies of the first lane until they are set */
+    unsigned point_lane = s->count % 4;
+    /* the other lanes of a four are copies of lane 0 until they are set */
     for (int k = 0; k < 4; k++)
-        for (unsigned lane = lane_of_point; lane < (lane_of_point ? lane_of_point + 1 : 4); lane++)
+        for (unsigned lane = point_lane; lane < (point_lane ? point_lane + 1 : 4); lane++)
             p[k][lane] = values[k];
     s->count++;
     return true;
 }
 
+/* Adds the vertices begin .. end - 1. Returns false when out of memory. */
 static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
 {
     const ebpo_builder *b = s->b;
@@ -233,11 +247,14 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
     return true;
 }
 
+/* Adds the points of the faces that cross cell faces: the corners of their parts in the cell.
+ * Returns false when out of memory. */
 static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebpo_build_detail *d)
 {
-    /* the faces of the top are in different parts of the workspace's files */
-    const uint64_t every = branch->list ? 1024 : 32;
-    EBPO_FOR_ITEMS_EVERY(s->workspace, every, i, d->cross_begin, d->cross_end) {
+    /* number of faces after which pages of the workspace are released; the faces of the top are in
+     * different parts of the workspace's files */
+    const uint64_t release_faces = branch->list ? 1024 : 32;
+    EBPO_FOR_ITEMS_EVERY(s->workspace, release_faces, i, d->cross_begin, d->cross_end) {
         ebpo_triangle face;
         double points[9][3], slack;
         ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
@@ -249,7 +266,8 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     return true;
 }
 
-/* Clears the hash table and sets its size for about `points` points. */
+/* Clears the hash table and sets its size for about `points` points. Returns false when out of
+ * memory. */
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
     uint64_t size = ebpo_hash_slots(2 * points < TABLE_MAX ? 2 * points : TABLE_MAX);
@@ -260,6 +278,7 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
     return true;
 }
 
+/* Does the work of ebpo_supports_gather, except for the boxes of the stretches. */
 static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
                           const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
 {
@@ -314,7 +333,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
         locate_point(s, stretch, n, *support, where);
 }
 
-/* Makes the boxes of the stretches. */
+/* Makes the boxes of the stretches of points. Returns false when out of memory. */
 static bool box_points(ebpo_supports *s)
 {
     uint64_t fours = (s->count + 3) / 4;
@@ -363,12 +382,12 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     if (s->begin >= s->end || support >= enough)
         return support;
     ebpo_release_pages(s->workspace); /* so many vertices are spread over the whole file */
-    uint64_t at;
+    uint64_t vertex;
     double p[3] = { 0, 0, 0 };
-    support = bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);
-    if (at != EBPO_NO_VERTEX)
-        ebpo_mesh_position(s->b->mesh, at, p);
-    if (at != EBPO_NO_VERTEX)
+    support = bounds_support(s->b, s->cell, n, s->begin, s->end, support, &vertex);
+    if (vertex != EBPO_NO_VERTEX)
+        ebpo_mesh_position(s->b->mesh, vertex, p);
+    if (vertex != EBPO_NO_VERTEX)
         for (int k = 0; k < 3; k++)
             where[k] = (p[k] - ebpo_cell_face(&s->b->box, k, s->cell.level, s->cell.at[k])) /
                        (s->b->box.size[k] / (double)(1u << s->cell.level));

@@ -1,10 +1,10 @@
-/* Builds the part `surface`: a patch for the root, and for the children of each node with a patch
- * and many faces (format-spec/surface.md).
+/* Builds the part `surface`: a patch (a coarse surface for the faces below a node) for the root,
+ * and for the children of each node that has a patch and many faces (format-spec/surface.md).
  *
- * The faces that are new below a node are a range of the model's faces. If a node has no patches
- * below it, its patch is made from these faces; otherwise the patch is made from the patches of the
- * node's children. Each patch has about a quarter as many triangles as the faces or patches that it
- * is made from.
+ * The faces that are new below a node (no earlier leaf lists them) are a range of the model's
+ * faces. If there are no patches below a node, the node's patch is made from these faces; otherwise
+ * it is made from the patches of the node's children. Each patch has about a quarter as many
+ * triangles as the faces or patches that it is made from.
  *
  * A vertex is on the border of a patch if faces outside the patch use it too. Each border vertex is
  * replaced by the vertex of the cell that contains it, EBPO_PATCH_CELLS levels below the node. The
@@ -38,36 +38,37 @@
 #include "mesh/attributes.h"
 #include "mesh/mesh_parts.h"
 
-/* A model with fewer faces has no patches; a node with more than MOST_FACES has patches below. */
 enum {
-    LEAST_FACES = 2048,
-    MOST_FACES = 8192,
-    TASK_FACES = 1 << 18,
-    REDUCTION = 4,
-    LEVELS = EBPO_PATCH_LEVEL + 1
+    LEAST_FACES = 2048,           /* a model with fewer faces has no patches */
+    MOST_FACES = 8192,            /* a node with more faces has patches below it */
+    TASK_FACES = 1 << 18,         /* greatest number of faces of a parallel task */
+    REDUCTION = 4,                /* triangles before and after simplification */
+    LEVELS = EBPO_PATCH_LEVEL + 1 /* number of levels with patches */
 };
-static const double LEAST_WEIGHT = 1e-12;
+static const double LEAST_WEIGHT = 1e-12; /* of a face without area */
 
 /* A node with a patch. Nodes are depth first. */
 typedef struct patch_node {
     ebpo_cell cell;
-    uint64_t first, end; /* faces */
-    uint64_t after;      /* the next node that is not below this one */
-    ebpo_patch_mesh mesh;
-    ebpo_patch_rows rows;
-    double error; /* scaled like coordinates; INFINITY: the node has no patch */
-    uint64_t triangles, vertices;
-    bool made, stored;
+    uint64_t first, end;          /* faces first .. end - 1 are new below the node */
+    uint64_t after;               /* the next node that is not below this one */
+    ebpo_patch_mesh mesh;         /* the patch, until the parent's patch is made */
+    ebpo_patch_rows rows;         /* the patch as in the file */
+    double error;                 /* scaled like coordinates; INFINITY: the node has no patch */
+    uint64_t triangles, vertices; /* numbers of them in `rows` */
+    bool made;                    /* the node was processed */
+    bool stored;                  /* the file stores the patch */
 } patch_node;
 
 /* The vertex that replaces the border vertices in a cell, as sums over the corners of faces at
  * these vertices. */
 typedef struct cell_vertex {
-    uint64_t key;
-    double at[3]; /* in the root cell, 0 to 1 */
+    uint64_t key; /* cell_key; UINT64_MAX: an empty slot */
+    double at[3]; /* positions in the root cell, 0 to 1 */
     double normal[3], colour[3], weight;
 } cell_vertex;
 
+/* Hash table of the vertices of cells. */
 typedef struct cell_table {
     cell_vertex *slot;
     uint64_t slots, count;
@@ -85,20 +86,20 @@ typedef struct surface_builder {
     /* coordinates are relative to the origin and divided by 2^exponent: the longest side of the
      * box is 1 to 2 */
     int exponent;
-    double size[3];
+    double size[3]; /* scaled size of the box */
     unsigned threads;
-    patch_node *node;
+    patch_node *node; /* [count] */
     uint64_t count, capacity;
-    face_interval *interval[LEVELS]; /* ascending, all faces */
+    face_interval *interval[LEVELS]; /* ascending; together they contain all faces */
     uint64_t interval_count[LEVELS];
-    cell_table table[LEVELS];
-    uint32_t *highest; /* [vertices] last face that uses the vertex */
-    uint32_t *lowest;  /* [vertices] first face that uses the vertex */
+    cell_table table[LEVELS]; /* vertices of the cells on borders of patches of this level */
+    uint32_t *highest;        /* [vertices] last face that uses the vertex */
+    uint32_t *lowest;         /* [vertices] first face that uses the vertex */
     ebpo_colour_column colour[EBPO_COLOUR_CHANNELS];
-    bool coloured, by_face;
-    uint64_t *task; /* nodes that are built in parallel */
+    bool coloured, by_face; /* by_face: the columns are colours of faces, not of vertices */
+    uint64_t *task;         /* [task_count] nodes that are built in parallel, each with all below */
     uint64_t task_count;
-    /* while nodes are listed: next group and leaf of each level */
+    /* while nodes are listed: [level] index of the next group and leaf */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
     bool short_of_memory;
 } surface_builder;
@@ -117,13 +118,14 @@ static bool add_node(surface_builder *b, ebpo_cell cell, uint64_t first, uint64_
     return true;
 }
 
-/* Lists a gray node with faces; and if it has more than MOST_FACES, the nodes with faces below it.
- * Returns the end of the node's faces. Recursive, one call for each level. */
+/* Lists a gray node if it has faces; and if it has more than MOST_FACES, the nodes with faces below
+ * it. `first`: its first new face. Returns the end of the node's faces. Recursive, one call for
+ * each level. */
 static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
 {
     int below = cell.level + 1;
     const ebpo_level *level = &b->tree->level[below];
-    uint64_t me = b->count, end = first;
+    uint64_t self = b->count, end = first;
     uint16_t types = level->types[b->group[below]++];
     if (!add_node(b, cell, first, first))
         return first;
@@ -138,15 +140,16 @@ static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
         if (type == EBPO_LEAF && end > from)
             add_node(b, child, from, end);
     }
-    b->node[me].end = end;
+    b->node[self].end = end;
     if (end - first <= MOST_FACES || cell.level == EBPO_PATCH_LEVEL)
-        b->count = end > first ? me + 1 : me;
-    b->node[me].after = b->count;
+        b->count = end > first ? self + 1 : self;
+    b->node[self].after = b->count;
     return end;
 }
 
 /* --- borders --- */
 
+/* Lists the intervals of all levels. Returns false if memory is short. */
 static bool list_intervals(surface_builder *b)
 {
     uint64_t faces = b->tree->info.face_count;
@@ -169,6 +172,7 @@ static bool list_intervals(surface_builder *b)
     return true;
 }
 
+/* Returns the key of a cell; 21 bits for each index. */
 static uint64_t cell_key(const uint32_t at[3])
 {
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
@@ -185,7 +189,7 @@ static uint64_t key_of_point(const double unit[3], int node_level)
     return cell_key(at);
 }
 
-/* Returns the cell's slot, which may be empty (weight 0 and key UINT64_MAX). */
+/* Returns the cell's slot, or the empty slot (key UINT64_MAX) where the cell can be inserted. */
 static cell_vertex *find_cell(const cell_table *table, uint64_t key)
 {
     uint64_t i = ebpo_hash_number(key) & (table->slots - 1);
@@ -194,6 +198,7 @@ static cell_vertex *find_cell(const cell_table *table, uint64_t key)
     return &table->slot[i];
 }
 
+/* Moves the vertices to a table with more slots. Returns false if memory is short. */
 static bool resize_table(cell_table *table, uint64_t slots)
 {
     cell_table larger = { .slots = slots, .count = table->count };
@@ -210,6 +215,7 @@ static bool resize_table(cell_table *table, uint64_t slots)
     return true;
 }
 
+/* Returns the vertex of a cell, which is inserted if needed; NULL if memory is short. */
 static cell_vertex *enter_cell(cell_table *table, uint64_t key)
 {
     if (4 * (table->count + 1) > 3 * table->slots &&
@@ -223,10 +229,12 @@ static cell_vertex *enter_cell(cell_table *table, uint64_t key)
     return found;
 }
 
-/* A face: its corners, scaled and in the root cell (0 to 1); its normal, whose length is twice the
- * area; `weight`, this length plus a small number, so that faces without area have a weight. */
+/* A face of the model. */
 typedef struct scaled_face {
-    double corner[3][3], unit[3][3], normal[3], weight;
+    double corner[3][3]; /* scaled coordinates */
+    double unit[3][3];   /* coordinates in the root cell, 0 to 1 */
+    double normal[3];    /* its length is twice the area */
+    double weight;       /* this length plus LEAST_WEIGHT */
 } scaled_face;
 
 static void get_face(const surface_builder *b, uint64_t face, scaled_face *out)
@@ -247,18 +255,20 @@ static void get_face(const surface_builder *b, uint64_t face, scaled_face *out)
     out->weight = ebpo_vec3_length(out->normal) + LEAST_WEIGHT;
 }
 
+/* Sets `out` to the colour of a vertex, or of a face if by_face; to zeros without colours. */
 static void get_colour(const surface_builder *b, uint64_t face, uint32_t vertex, double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = b->coloured ? ebpo_colour_byte(&b->colour[k], b->by_face ? face : vertex) : 0;
 }
 
+/* Returns true if a face that is not in the interval uses the vertex. */
 static bool is_on_border(const surface_builder *b, uint32_t vertex, face_interval inside)
 {
     return b->lowest[vertex] < inside.first || b->highest[vertex] >= inside.end;
 }
 
-/* Adds a corner of a face to the vertex of its cell. */
+/* Adds corner k of a face to the vertex of the corner's cell. Returns false if memory is short. */
 static bool add_corner(surface_builder *b, int level, uint64_t face, const scaled_face *f, int k)
 {
     cell_vertex *cell = enter_cell(&b->table[level], key_of_point(f->unit[k], level));
@@ -275,11 +285,12 @@ static bool add_corner(surface_builder *b, int level, uint64_t face, const scale
     return true;
 }
 
-/* Adds each corner of a face that is on a border to the vertex of its cell, at each level. */
+/* At each level, adds the corners of faces that are on borders of the level to the vertices of
+ * their cells. Returns false if memory is short. */
 static bool add_borders(surface_builder *b)
 {
     const ebpo_mesh *mesh = &b->tree->mesh;
-    uint64_t at[LEVELS] = { 0 };
+    uint64_t current[LEVELS] = { 0 }; /* [level] interval of the face */
     EBPO_FOR_ITEMS(b->tree->workspace, face, 0, mesh->face_count) {
         const uint32_t *corner = mesh->faces + 3 * face;
         scaled_face f;
@@ -287,10 +298,10 @@ static bool add_borders(surface_builder *b)
         for (int level = 0; level < LEVELS; level++) {
             if (b->interval_count[level] == 1)
                 continue;
-            while (b->interval[level][at[level]].end <= face)
-                at[level]++;
+            while (b->interval[level][current[level]].end <= face)
+                current[level]++;
             for (int k = 0; k < 3; k++) {
-                if (!is_on_border(b, corner[k], b->interval[level][at[level]]))
+                if (!is_on_border(b, corner[k], b->interval[level][current[level]]))
                     continue;
                 if (!known)
                     get_face(b, face, &f);
@@ -303,6 +314,7 @@ static bool add_borders(surface_builder *b)
     return true;
 }
 
+/* Finds the first and the last face that use each vertex. Returns false if memory is short. */
 static bool find_uses(surface_builder *b)
 {
     const ebpo_mesh *mesh = &b->tree->mesh;
@@ -324,13 +336,15 @@ static bool find_uses(surface_builder *b)
 
 /* Hash table from keys to vertices of a mesh. */
 typedef struct key_table {
-    uint32_t *slot;
+    uint32_t *slot; /* index of a vertex; UINT32_MAX: empty */
     uint64_t slots;
 } key_table;
 
 /* This bit is 1 in keys of vertices of the model, and 0 in keys of cells. */
 static const uint64_t MODEL_VERTEX = UINT64_C(1) << 63;
 
+/* Makes a table with twice as many slots for the mesh's vertices. Returns false if memory is short.
+ */
 static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
 {
     uint64_t slots = table->slots ? 2 * table->slots : 4096;
@@ -351,8 +365,9 @@ static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
     return true;
 }
 
-/* Returns the vertex with a key. If there is none, or the key is UINT64_MAX, adds a vertex and sets
- * *is_new. Returns NULL if memory is short. */
+/* Returns the vertex with a key. If there is none, or if the key is UINT64_MAX (a vertex that is on
+ * no border), adds a vertex. Sets *is_new to true if a vertex was added. Returns NULL if memory is
+ * short. */
 static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, uint64_t key,
                                        bool *is_new)
 {
@@ -376,6 +391,7 @@ static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, 
     return made;
 }
 
+/* Returns false if memory is short. */
 static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
 {
     if (!ebpo_grow(&mesh->triangle, &mesh->triangle_capacity, mesh->triangle_count + 1,
@@ -385,7 +401,7 @@ static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
     return true;
 }
 
-/* Moves a vertex to the vertex of its cell. */
+/* Gives a vertex the position, normal and colour of the vertex of a cell. */
 static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int node_level,
                             uint64_t key)
 {
@@ -395,9 +411,9 @@ static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int 
     double steps = ldexp(1, node_level + EBPO_PATCH_GRID);
     for (int k = 0; k < 3; k++) {
         /* on the grid of the patch, within the cell */
-        double least = (double)((uint64_t)at[k] << shift), most = least + (1 << shift) - 1,
+        double least = (double)((uint64_t)at[k] << shift), greatest = least + (1 << shift) - 1,
                on_grid = floor(cell->at[k] / cell->weight * steps + 0.5);
-        on_grid = fmin(fmax(on_grid, least), most);
+        on_grid = fmin(fmax(on_grid, least), greatest);
         v->at[k] = on_grid / steps * b->size[k];
         v->normal[k] = cell->normal[k];
         v->colour[k] = cell->colour[k];
@@ -405,14 +421,15 @@ static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int 
     v->weight = cell->weight;
 }
 
+/* Extends the range of faces that use a vertex. */
 static void widen_uses(ebpo_patch_vertex *v, uint64_t lowest, uint64_t highest)
 {
     v->lowest = lowest < v->lowest ? lowest : v->lowest;
     v->highest = highest > v->highest ? highest : v->highest;
 }
 
-/* Adds all faces, also those with repeated corners, because the error bounds their distances too.
- */
+/* Adds the faces first .. end - 1 of the model to a mesh; also those with repeated corners, because
+ * the error bounds their distances, too. Returns false if memory is short. */
 static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t first, uint64_t end)
 {
     const uint32_t *corner = b->tree->mesh.faces + 3 * first;
@@ -445,10 +462,11 @@ static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t 
     return made;
 }
 
+/* Adds the patch of a child to a mesh. Returns false if memory is short. */
 static bool add_patch(ebpo_patch_mesh *mesh, key_table *table, const ebpo_patch_mesh *from)
 {
-    uint32_t *number = ebpo_alloc(from->vertex_count, sizeof *number);
-    bool made = number != NULL, is_new;
+    uint32_t *new_index = ebpo_alloc(from->vertex_count, sizeof *new_index);
+    bool made = new_index != NULL, is_new;
     for (uint64_t v = 0; v < from->vertex_count && made; v++) {
         const ebpo_patch_vertex *old = &from->vertex[v];
         ebpo_patch_vertex *to = enter_vertex(mesh, table, old->key, &is_new);
@@ -459,21 +477,24 @@ static bool add_patch(ebpo_patch_mesh *mesh, key_table *table, const ebpo_patch_
             *to = *old;
         widen_uses(to, old->lowest, old->highest);
         to->fixed = false;
-        number[v] = (uint32_t)(to - mesh->vertex);
+        new_index[v] = (uint32_t)(to - mesh->vertex);
     }
     for (uint64_t i = 0; i < from->triangle_count && made; i++) {
         const uint32_t *t = from->triangle + 3 * i;
-        made = add_triangle(mesh, (uint32_t[3]){ number[t[0]], number[t[1]], number[t[2]] });
+        made =
+            add_triangle(mesh, (uint32_t[3]){ new_index[t[0]], new_index[t[1]], new_index[t[2]] });
     }
-    free(number);
+    free(new_index);
     return made;
 }
 
-/* Returns false if all triangles of a node collapse into the vertices of cells on its border. */
+/* Returns true if a node has a patch; false if all its triangles collapse when border vertices are
+ * replaced by vertices of cells. */
 static bool has_patch(const patch_node *node) { return isfinite(node->error); }
 
-/* Adds the faces of the children that have no patch. They are no part of the node's patch; the
- * error bounds their distance from it. */
+/* Adds the faces of the children that have no patch to the mesh `mesh`, from which the error is
+ * measured. The node's patch is made without them, but its error bounds their distance from it.
+ * Returns false if memory is short. */
 static bool add_collapsed_children(const surface_builder *b, const patch_node *node,
                                    ebpo_patch_mesh *mesh)
 {
@@ -484,8 +505,9 @@ static bool add_collapsed_children(const surface_builder *b, const patch_node *n
     return made;
 }
 
-/* Makes the surface that a node's patch simplifies: the node's faces, or the patches of its
- * children. Frees the children's patches. */
+/* Makes the surface from which a node's patch is made: the node's faces, or the patches of its
+ * children. Frees the children's patches. Sets *error to the greatest error of these patches.
+ * Returns false if memory is short. */
 static bool gather_surface(surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                            double *error)
 {
@@ -508,6 +530,7 @@ static bool gather_surface(surface_builder *b, const patch_node *node, ebpo_patc
 
 /* --- patches --- */
 
+/* Returns the key of the cell that contains a vertex of the model. */
 static uint64_t key_of_vertex(const surface_builder *b, uint32_t vertex, int node_level)
 {
     double p[3];
@@ -517,13 +540,15 @@ static uint64_t key_of_vertex(const surface_builder *b, uint32_t vertex, int nod
     return key_of_point(p, node_level);
 }
 
-/* Moves the vertices on the border of a node's patch to the vertices of their cells. */
+/* Makes the mesh `to` from `from`: replaces the vertices on the border of a node's patch by the
+ * vertices of their cells, and omits triangles that then have repeated corners. Returns false if
+ * memory is short. */
 static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_patch_mesh *from,
                         ebpo_patch_mesh *to)
 {
     key_table table = { NULL, 0 };
-    uint32_t *number = ebpo_alloc(from->vertex_count, sizeof *number);
-    bool made = number != NULL, is_new;
+    uint32_t *new_index = ebpo_alloc(from->vertex_count, sizeof *new_index);
+    bool made = new_index != NULL, is_new;
     for (uint64_t v = 0; v < from->vertex_count && made; v++) {
         const ebpo_patch_vertex *old = &from->vertex[v];
         bool border = old->lowest < node->first || old->highest >= node->end;
@@ -535,33 +560,34 @@ static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_p
                                (uint32_t)(old->key >> 43) };
             key = cell_key(at);
         }
-        ebpo_patch_vertex *v_to = enter_vertex(to, &table, key, &is_new);
-        made = v_to != NULL;
+        ebpo_patch_vertex *made_vertex = enter_vertex(to, &table, key, &is_new);
+        made = made_vertex != NULL;
         if (!made)
             break;
-        number[v] = (uint32_t)(v_to - to->vertex);
+        new_index[v] = (uint32_t)(made_vertex - to->vertex);
         if (!border)
-            *v_to = *old;
+            *made_vertex = *old;
         else if (is_new)
-            set_cell_vertex(b, v_to, node->cell.level, key);
-        v_to->key = key;
-        v_to->fixed = border;
+            set_cell_vertex(b, made_vertex, node->cell.level, key);
+        made_vertex->key = key;
+        made_vertex->fixed = border;
         if (border)
-            widen_uses(v_to, old->lowest, old->highest);
+            widen_uses(made_vertex, old->lowest, old->highest);
     }
     for (uint64_t i = 0; i < from->triangle_count && made; i++) {
         const uint32_t *t = from->triangle + 3 * i;
-        uint32_t a = number[t[0]], second = number[t[1]], c = number[t[2]];
-        if (a != second && second != c && c != a)
-            made = add_triangle(to, (uint32_t[3]){ a, second, c });
+        uint32_t p = new_index[t[0]], q = new_index[t[1]], r = new_index[t[2]];
+        if (p != q && q != r && r != p)
+            made = add_triangle(to, (uint32_t[3]){ p, q, r });
     }
-    free(number);
+    free(new_index);
     free(table.slot);
     return made;
 }
 
-/* Moves the vertices to the grid of the patch, and gets their coordinates in steps of the grid.
- * Returns false if a vertex is too far from the node. */
+/* Moves the vertices to the grid of the patch, and sets `point` to their coordinates in steps of
+ * the grid, relative to the node's lowest corner. Returns false if a vertex is too far from the
+ * node for 16 bits. */
 static bool move_to_grid(const surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                          int16_t *point)
 {
@@ -580,6 +606,7 @@ static bool move_to_grid(const surface_builder *b, const patch_node *node, ebpo_
     return near;
 }
 
+/* Encodes the patch of a node as in the file. */
 static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const int16_t *point,
                                ebpo_error *error)
 {
@@ -608,22 +635,26 @@ static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const
     return status;
 }
 
+/* Sets the error of a node's patch. `from`: the surface that it was made from; `before`: the error
+ * of this surface. */
 static ebpo_status bound_error(const surface_builder *b, patch_node *node,
                                const ebpo_patch_mesh *from, double before, ebpo_error *error)
 {
-    double fine = ldexp(1, -node->cell.level - EBPO_PATCH_GRID - 1), there = 0, back = 0, most = 0;
+    double fine = ldexp(1, -node->cell.level - EBPO_PATCH_GRID - 1), there = 0, back = 0,
+           greatest = 0; /* absolute coordinate */
     ebpo_status status = ebpo_bound_distance(from, &node->mesh, fine, 0, &back, error);
     if (status == EBPO_OK)
         status = ebpo_bound_distance(&node->mesh, from, fine, back, &there, error);
     for (int k = 0; k < 3; k++)
-        most = fmax(most, fabs(b->box.origin[k]) + b->box.size[k]);
+        greatest = fmax(greatest, fabs(b->box.origin[k]) + b->box.size[k]);
     /* more than the rounding errors of positions and distances */
-    node->error = before + fmax(there, back) + ldexp(most, -b->exponent) * 0x1p-44 + 0x1p-40;
+    node->error = before + fmax(there, back) + ldexp(greatest, -b->exponent) * 0x1p-44 + 0x1p-40;
     return status;
 }
 
 /* Adds a vertex without triangles at each border vertex whose edges all have two triangles. Readers
- * take vertices without triangles as border vertices, so they find the vertex of the cell. */
+ * treat vertices without triangles as border vertices; otherwise they would not recognise such a
+ * border vertex. Returns false if memory is short. */
 static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
 {
     uint64_t count = mesh->vertex_count;
@@ -642,6 +673,7 @@ static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
     return made;
 }
 
+/* Makes the patch of a node from its faces or from its children's patches. */
 static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *error)
 {
     ebpo_patch_mesh from = { 0 };
@@ -695,6 +727,7 @@ static ebpo_status run_tasks(void *context, uint64_t begin, uint64_t end, unsign
     return status;
 }
 
+/* Lists the highest nodes with at most TASK_FACES faces. Returns false if memory is short. */
 static bool list_tasks(surface_builder *b)
 {
     b->task = ebpo_alloc(b->count, sizeof *b->task);
@@ -716,6 +749,7 @@ static int by_octcode(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Appends a patch to the arrays of `to`. `step`: unit of errors in the file, scaled. */
 static void copy_patch(ebpo_surface *to, const patch_node *node, double step)
 {
     uint64_t *row = to->patch + EBPO_PATCH_COLUMNS * to->patch_count++, v = to->vertex_count;
@@ -736,7 +770,9 @@ static void copy_patch(ebpo_surface *to, const patch_node *node, double step)
     to->vertex_count += node->vertices;
 }
 
-/* Omits the patches below a node unless all its children have patches. */
+/* Clears `stored` for node i if `wanted` is false or if its error is too large for the file. Clears
+ * it for all nodes below, unless node i is stored and all of its children have patches that can be
+ * stored. */
 static void select_patches(const surface_builder *b, uint64_t i, double step, bool wanted)
 {
     bool all = wanted;
@@ -748,6 +784,7 @@ static void select_patches(const surface_builder *b, uint64_t i, double step, bo
         select_patches(b, k, step, all && node->stored);
 }
 
+/* Makes the arrays of the part from the stored patches, in the order of octcodes. */
 static ebpo_status collect_patches(const surface_builder *b, ebpo_surface *out, ebpo_error *error)
 {
     uint64_t vertices = 0, bytes = 0, count = 0;
@@ -840,6 +877,7 @@ ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads, const ebpo_pro
 
 /* --- files --- */
 
+/* Adds the surface to a tree that can have one and has none. */
 static ebpo_status add_surface(ebpo_tree *tree, unsigned threads, ebpo_error *error)
 {
     const ebpo_info *info = &tree->info;

@@ -1,13 +1,14 @@
 /* Bounds the greatest distance of the points of a surface from another surface.
  *
- * The distance to one triangle is convex, so over a triangle its maximum is at a corner. Over a
- * triangle of the first surface, the distance is therefore at most the greatest distance of the
- * triangle's corners from one triangle of the second surface, and at most the distance of the
- * triangle's centre plus its radius. The triangle is cut until one of the bounds is close enough to
- * the greatest distance of a point so far. It is cut around the prism over a near triangle of the
- * second surface, as halving a triangle until each half is near one triangle takes very many halves
- * in planes that both surfaces divide into slivers. Otherwise it is halved. The second surface is
- * in a complete binary tree of boxes. */
+ * The distance of a point from one triangle is a convex function, so over another triangle its
+ * maximum is at a corner. Over a triangle of the first surface, the distance is therefore at most
+ * the greatest distance of the triangle's corners from one triangle of the second surface. It is
+ * also at most the distance of the triangle's centre plus its radius (the greatest distance of a
+ * corner from the centre). The triangle is cut until one of these bounds is close enough to the
+ * greatest distance of a point that was found so far. It is cut by the sides of the prism over a
+ * near triangle of the second surface: in planes that both surfaces divide into slivers, halving
+ * alone would need very many halves until each is near one triangle. If this is not possible, it is
+ * halved. The second surface is stored in a complete binary tree of boxes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,22 +19,28 @@
 #include "core/alloc.h"
 #include "geometry/vec3.h"
 
-/* DEEPEST: a triangle is cut at most so many times. PRISM_DEEPEST: triangles that were cut so many
- * times are only halved; each cut at a prism moves points by a rounding error. SAMPLED: the
- * distance of a vertex of every SAMPLED-th triangle is computed first. */
+/* LEAF_TRIANGLES: number of triangles of a leaf of the box tree. DEEPEST: maximum number of times
+ * that a triangle is cut. PRISM_DEEPEST: triangles that were cut so many times are only halved,
+ * because each cut at a prism moves points by a rounding error. SAMPLED: the distance of a vertex
+ * of every SAMPLED-th triangle is computed first. */
 enum { LEAF_TRIANGLES = 4, DEEPEST = 64, PRISM_DEEPEST = 20, SAMPLED = 8 };
+/* allowed ratio of the bound and the greatest distance of a point */
 static const double CLOSE_ENOUGH = 1.05;
 
 typedef struct bounds {
     double low[3], high[3];
 } bounds;
 
+/* The box tree of a surface. */
 typedef struct search {
     const ebpo_patch_mesh *mesh;
-    bounds *node; /* node i has the children 2 i and 2 i + 1; the leaves are the last `leaves` */
-    uint64_t leaves;
+    /* [2 * leaves] node 1 is the root; node i has the children 2 i and 2 i + 1; the nodes from
+     * `leaves` on are leaves */
+    bounds *node;
+    uint64_t leaves; /* number of leaves, a power of two */
 } search;
 
+/* A near triangle of the second surface, and the squared distance of a point from it. */
 typedef struct hit {
     double square;
     uint64_t triangle;
@@ -46,7 +53,7 @@ static void get_corner(const ebpo_patch_mesh *mesh, uint64_t triangle, int k, do
 
 static double clamp_share(double t) { return t < 0 ? 0 : t > 1 ? 1 : t; }
 
-/* Returns the squared distance of p from the segment a + t d. */
+/* Returns the squared distance of p from the segment of the points a + t d, 0 <= t <= 1. */
 static double segment_square(const double p[3], const double a[3], const double d[3])
 {
     double v[3], length = ebpo_vec3_dot(d, d);
@@ -57,7 +64,7 @@ static double segment_square(const double p[3], const double a[3], const double 
     return ebpo_vec3_dot(v, v);
 }
 
-/* Returns the squared distance of p from a point of the triangle, which is nearest to p except for
+/* Returns the squared distance of p from a point of the triangle that is nearest to p, except for
  * rounding errors. */
 static double triangle_square(const double p[3], const double t[3][3])
 {
@@ -84,6 +91,7 @@ static double triangle_square(const double p[3], const double t[3][3])
     return best;
 }
 
+/* Returns the squared distance of p from a triangle of the second surface. */
 static double square_to(const search *s, uint64_t triangle, const double p[3])
 {
     double t[3][3];
@@ -92,6 +100,7 @@ static double square_to(const search *s, uint64_t triangle, const double p[3])
     return triangle_square(p, (const double(*)[3])t);
 }
 
+/* Makes the box tree of a surface. Returns false when out of memory. */
 static bool make_search(search *s, const ebpo_patch_mesh *mesh)
 {
     s->mesh = mesh;
@@ -124,6 +133,7 @@ static bool make_search(search *s, const ebpo_patch_mesh *mesh)
     return s->node != NULL;
 }
 
+/* Returns the squared distance of p from a box. */
 static double box_square(const bounds *b, const double p[3])
 {
     double sum = 0;
@@ -134,8 +144,8 @@ static double box_square(const bounds *b, const double p[3])
     return sum;
 }
 
-/* Finds the triangle nearest to p, or a triangle whose squared distance is at most `good`. `guess`
- * is a triangle that is probably near. */
+/* Returns the triangle nearest to p, or a triangle whose squared distance is at most `good`.
+ * `guess`: a triangle that is probably near. */
 static hit find_nearest(const search *s, const double p[3], uint64_t guess, double good)
 {
     hit best = { square_to(s, guess, p), guess };
@@ -178,29 +188,31 @@ static double corners_square(const search *s, uint64_t triangle, double p[3][3])
 }
 
 typedef struct bounding {
-    search to;
-    double most, fine; /* greatest distance of a point so far */
-    double known;      /* a smaller bound is not needed */
-    double bound;
-    uint64_t guess; /* a triangle that was near the last triangle */
+    search to;          /* the second surface */
+    double point_most;  /* greatest distance of a point that was found so far */
+    double fine, known; /* as for ebpo_bound_distance */
+    double bound;       /* bound of the triangles so far */
+    uint64_t guess;     /* a triangle of the second surface that was near the last triangle */
 } bounding;
 
+/* Returns the greatest bound that is close enough to the greatest distance of a point so far. */
 static double enough_of(const bounding *b)
 {
-    return fmax(b->known, fmax(b->most * CLOSE_ENOUGH, b->most + b->fine));
+    return fmax(b->known, fmax(b->point_most * CLOSE_ENOUGH, b->point_most + b->fine));
 }
 
-/* CORNERS: a plane cuts a polygon of n corners into parts of at most 3 n / 2 corners: rounding
- * errors can make the corners of a thin polygon alternate between the sides. Three planes make at
- * most 4, 6 and 9 corners of a triangle. */
+/* Maximum number of a polygon's corners. A plane cuts a polygon of n corners into parts of at most
+ * 3 n / 2 corners, because rounding errors can make the corners of a thin polygon alternate between
+ * the sides. So after the first, second and third plane, a part of a triangle has at most 4, 6 and
+ * 9 corners. */
 enum { CORNERS = 9 };
 typedef struct polygon {
     int count;
     double at[CORNERS][3];
 } polygon;
 
-/* Cuts a polygon by the plane of points x with n . (x - on) = 0. Appends the part in direction n to
- * `front`, and the other part to `back`; both are empty before. */
+/* Cuts a polygon by the plane through the point `on` with normal n. Appends the part in direction n
+ * to `front`, and the other part to `back`; both are empty before. */
 static void cut_polygon(const polygon *p, const double n[3], const double on[3], polygon *front,
                         polygon *back)
 {
@@ -226,6 +238,7 @@ static void cut_polygon(const polygon *p, const double n[3], const double on[3],
 
 static void bound_triangle(bounding *b, double p[3][3], int depth);
 
+/* Cuts a polygon into triangles and bounds the distance over them. */
 static void bound_polygon(bounding *b, const polygon *p, int depth)
 {
     for (int i = 2; i < p->count; i++) {
@@ -276,8 +289,8 @@ static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], 
     return true;
 }
 
-/* Bounds the distance over a triangle. Cuts the triangle until the bound is at most
- * enough_of(b). */
+/* Bounds the distance over triangle p: cuts the triangle until the bound is at most enough_of(b).
+ * `depth`: number of cuts so far. */
 static void bound_triangle(bounding *b, double p[3][3], int depth)
 {
     double centre[3], radius = 0;
@@ -299,7 +312,7 @@ static void bound_triangle(bounding *b, double p[3][3], int depth)
         near = find_nearest(&b->to, centre, near.triangle, good * good);
     b->guess = near.triangle;
     if (near.square > good * good)
-        b->most = fmax(b->most, sqrt(near.square));
+        b->point_most = fmax(b->point_most, sqrt(near.square));
     double over = fmin(sqrt(corners_square(&b->to, near.triangle, p)), sqrt(near.square) + radius);
     if (over <= enough_of(b) || depth == DEEPEST) {
         b->bound = fmax(b->bound, over);
@@ -367,16 +380,16 @@ ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh 
     }
     for (uint64_t v = 0; v < a->vertex_count; v++)
         near[v] = UINT64_MAX;
-    /* distances of some points, so that few triangles are halved in vain */
+    /* distances of some points first, so that few triangles are cut without need */
     for (uint64_t t = 0; t < a->triangle_count; t += SAMPLED) {
         uint32_t v = a->triangle[3 * t];
         hit h = find_nearest(&all.to, a->vertex[v].at, all.guess, 0);
         near[v] = all.guess = h.triangle;
-        all.most = fmax(all.most, sqrt(h.square));
+        all.point_most = fmax(all.point_most, sqrt(h.square));
     }
     for (uint64_t t = 0; t < a->triangle_count; t++)
         bound_from_neighbours(&all, a, t, near);
-    *out = fmax(all.bound, all.most);
+    *out = fmax(all.bound, all.point_most);
     free(near);
     free(all.to.node);
     return EBPO_OK;

@@ -23,6 +23,7 @@ static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int
     return count;
 }
 
+/* Implements ebpo_sweep.find_visible. */
 static int find_visible_planes(const ebpo_sweep_planes *planes, const double p[3], double beyond,
                                double above, uint16_t *list, int capacity)
 {
@@ -43,14 +44,15 @@ static int find_visible_planes(const ebpo_sweep_planes *planes, const double p[3
     return count;
 }
 
-/* Returns an upper bound for the values of a stretch's points. It is computed by the same
- * operations as the values, so rounding does not make it less than a value. */
+/* Returns an upper bound of the values of a stretch's points. It is computed by the same operations
+ * as the values, so rounding does not make it less than a value. */
 static double bound_of_stretch(const double box[7], const double n[3])
 {
     return n[0] * box[n[0] < 0 ? 0 : 3] + n[1] * box[n[1] < 0 ? 1 : 4] +
            n[2] * box[n[2] < 0 ? 2 : 5] + box[6];
 }
 
+/* Returns the values of four points: n . x plus the added value. */
 static v4d values_of(const double p[4][4], v4d nx, v4d ny, v4d nz)
 {
     return nx * load_four(p[0]) + ny * load_four(p[1]) + nz * load_four(p[2]) + load_four(p[3]);
@@ -62,6 +64,7 @@ static v4d greater_of(v4d a, v4d b)
     return (v4d)(((v4l)a & m) | ((v4l)b & ~m));
 }
 
+/* Implements ebpo_sweep.highest. */
 static uint64_t highest_value(const ebpo_sweep_points *points, const double n[3], double enough,
                               double *best)
 {

@@ -1,11 +1,11 @@
-/* Computes envelopes as in the theses, for comparison: volumes and numbers of planes of levels,
- * without a file.
+/* Computes envelopes as in the theses, for comparison: the volume and the number of planes of each
+ * level, without a file.
  *
- * For a file, a node has at most 255 planes, and candidates with equal normals are dropped before a
- * percentage of them is chosen. Neither thesis does this (BP 2008, 3.5.1: 2,955 planes at a root).
- * Here, all candidates of a node count, in the order of its faces or children, and polytopes have
- * any number of faces. Normals are rounded as in files, offsets are not. Leaves are made by one of
- * three criteria (BP 2008, 3.3.1, algorithm 4). */
+ * In a file, a node has at most 255 planes, and candidates with equal normals are dropped before a
+ * percentage of the candidates is chosen. Neither thesis has these limits (BP 2008, 3.5.1: 2,955
+ * planes at a root). In this file, all candidates of a node count, in the order of the node's faces
+ * or children, and polytopes have any number of faces. Normals are rounded as in files, offsets are
+ * not. Leaves are made by one of three criteria (BP 2008, 3.3.1, algorithm 4). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -17,7 +17,7 @@
 #include "core/alloc.h"
 
 bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t node,
-                           uint64_t *most)
+                           uint64_t *faces_max)
 {
     uint64_t sum = 0, leaves = 0, limit = b->options->leaf_faces;
     for (uint32_t o = 0; o < 8; o++) {
@@ -30,13 +30,13 @@ bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t
         sum += d->entry_end - d->entry_begin;
         leaves++;
     }
-    *most = sum;
+    *faces_max = sum;
     return b->thesis->coalesce == EBPO_COALESCE_MEAN ? sum < limit * leaves : sum < limit;
 }
 
-/* Cuts `own` by the chosen candidates. Clears `chosen` for the candidates that cut nothing off.
- * Returns the number of candidates that are still chosen, or -1 when out of memory. */
-static int64_t cut_by_chosen(ebpo_large_polytope *own, const ebpo_choice *choice, bool *chosen)
+/* Cuts the envelope by the chosen candidates. Sets chosen[i] to false for the candidates that cut
+ * nothing off. Returns the number of candidates that are still chosen, or -1 when out of memory. */
+static int64_t cut_by_chosen(ebpo_large_polytope *envelope, const ebpo_choice *choice, bool *chosen)
 {
     int64_t planes = 0;
     for (int i = 0; i < choice->count; i++) {
@@ -47,20 +47,21 @@ static int64_t cut_by_chosen(ebpo_large_polytope *own, const ebpo_choice *choice
         ebpo_plane_code_decode(choice->candidates[i].normal, n, &d);
         for (int k = 0; k < 3; k++)
             normal[k] = n[k] * (1.0 / EBPO_NORMAL_NORM);
-        chosen[i] = ebpo_large_clip(own, normal, choice->candidates[i].support / EBPO_NORMAL_NORM,
-                                    i) == EBPO_CLIP_CUT;
-        if (own->no_memory)
+        chosen[i] =
+            ebpo_large_clip(envelope, normal, choice->candidates[i].support / EBPO_NORMAL_NORM,
+                            i) == EBPO_CLIP_CUT;
+        if (envelope->no_memory)
             return -1;
         planes += chosen[i];
     }
     return planes;
 }
 
-/* Adds to `out` the corners of those faces of the envelope that planes made (tag >= 0), not the
- * cell. */
-static bool give_corners(const ebpo_large_polytope *own, ebpo_handover *out)
+/* Adds to `out` the corners of those faces of the envelope that planes made (tag >= 0), and not
+ * those of the cell's faces. Returns false when out of memory. */
+static bool give_corners(const ebpo_large_polytope *envelope, ebpo_handover *out)
 {
-    const ebpo_large_shape *s = &own->now;
+    const ebpo_large_shape *s = &envelope->now;
     bool *used = ebpo_alloc_zero(s->vertex_count + 1, sizeof *used);
     bool good = used && ebpo_grow(&out->corner, &out->corner_capacity, s->vertex_count,
                                   sizeof *out->corner);
@@ -75,6 +76,7 @@ static bool give_corners(const ebpo_large_polytope *own, ebpo_handover *out)
     return good;
 }
 
+/* Adds the chosen offers to `out`. Returns false when out of memory. */
 static bool give_planes(const bool *chosen, const ebpo_handover *given, ebpo_handover *out)
 {
     for (uint64_t i = 0; i < given->offer_count; i++)
@@ -83,6 +85,8 @@ static bool give_planes(const bool *chosen, const ebpo_handover *given, ebpo_han
     return true;
 }
 
+/* Adds a leaf, or a gray node if `leaf_faces` is 0, to the sums of its level. `share`: volume of
+ * the envelope in cells. */
 static void add_node(const ebpo_builder *b, ebpo_thesis_level *l, int level, uint64_t leaf_faces,
                      uint64_t planes, double share)
 {
@@ -99,20 +103,20 @@ static void add_node(const ebpo_builder *b, ebpo_thesis_level *l, int level, uin
     }
 }
 
-bool ebpo_thesis_choose(const ebpo_builder *b, ebpo_large_polytope *own, ebpo_thesis_level *levels,
-                        ebpo_cell cell, uint64_t leaf_faces, ebpo_choice *choice,
-                        const ebpo_handover *given, ebpo_handover *out)
+bool ebpo_thesis_choose(const ebpo_builder *b, ebpo_large_polytope *envelope,
+                        ebpo_thesis_level *levels, ebpo_cell cell, uint64_t leaf_faces,
+                        ebpo_choice *choice, const ebpo_handover *given, ebpo_handover *out)
 {
     const ebpo_build_options *o = b->options;
     bool *chosen = ebpo_alloc((uint64_t)choice->count + 1, sizeof *chosen);
     int64_t planes = -1;
     choice->wanted = ebpo_selection_requested(choice->count, cell.level, o->percent, o->k_root);
-    if (chosen && ebpo_large_cube(own) && ebpo_choose_candidates(o->select, choice, chosen))
-        planes = cut_by_chosen(own, choice, chosen);
-    bool good = planes >= 0 && give_planes(chosen, given, out) && give_corners(own, out);
+    if (chosen && ebpo_large_cube(envelope) && ebpo_choose_candidates(o->select, choice, chosen))
+        planes = cut_by_chosen(envelope, choice, chosen);
+    bool good = planes >= 0 && give_planes(chosen, given, out) && give_corners(envelope, out);
     if (good)
         add_node(b, &levels[cell.level], cell.level, leaf_faces, (uint64_t)planes,
-                 ebpo_large_volume(own));
+                 ebpo_large_volume(envelope));
     free(chosen);
     return good;
 }

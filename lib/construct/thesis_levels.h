@@ -13,20 +13,21 @@ typedef struct ebpo_thesis_run {
     ebpo_thesis_levels *out;
 } ebpo_thesis_run;
 
-/* Returns true if a gray node becomes a leaf by the criterion of the theses. Sets *most to the
- * greatest number of faces that this leaf may have. */
+/* Returns true if a gray node becomes a leaf by the criterion b->thesis->coalesce. Then sets
+ * *faces_max to the greatest number of faces that this leaf may have. */
 bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t node,
-                           uint64_t *most);
+                           uint64_t *faces_max);
 
 /* Chooses planes among all candidates of a node (`given`: the offers that they were made from),
- * cuts the cell by these planes, adds the counts and the volume to `levels`, and writes the data
- * for the parent to `out`. `own`: work space. `leaf_faces`: number of faces of a leaf; 0 for a gray
- * node. Returns false when out of memory. */
-bool ebpo_thesis_choose(const ebpo_builder *b, ebpo_large_polytope *own, ebpo_thesis_level *levels,
-                        ebpo_cell cell, uint64_t leaf_faces, ebpo_choice *choice,
-                        const ebpo_handover *given, ebpo_handover *out);
+ * cuts the cell by these planes, adds the counts and the volume to `levels`, and adds the data for
+ * the parent to `out`. `envelope`: work space. `leaf_faces`: number of faces of a leaf; 0 for a
+ * gray node. Returns false when out of memory. */
+bool ebpo_thesis_choose(const ebpo_builder *b, ebpo_large_polytope *envelope,
+                        ebpo_thesis_level *levels, ebpo_cell cell, uint64_t leaf_faces,
+                        ebpo_choice *choice, const ebpo_handover *given, ebpo_handover *out);
 
-/* Adds a node without faces to the sums of its level. */
+/* Adds a node without faces to the sums of its level if the node is black. `winding`: winding
+ * number at its lowest corner. */
 void ebpo_thesis_add_empty(const ebpo_builder *b, ebpo_thesis_level *levels, int level,
                            int32_t winding);
 

@@ -1,11 +1,11 @@
-/* Tests a face against a cell: finds the octants of the cell that the face may touch, tests if the
+/* Compares a face with a cell: finds the octants of the cell that the face may touch, tests if the
  * face misses the cell, and clips the face to the cell.
  *
  * All tests use a bound of the rounding error and are conservative, so no exact arithmetic is
- * needed: a listed face that does not touch the cell costs little time, but a missing face would
- * make the file wrong. The tests use the face's bounding box, its plane, and the cross products of
- * its edges with the axes (separating axes). Clipping enlarges the cell by the bound, so that a
- * face that touches the closed cell always leaves points. */
+ * needed. (If a list has a face that does not touch the cell, this costs little time; if a face is
+ * missing, the file is wrong.) The tests use the face's bounding box, its plane, and the cross
+ * products of its edges with the axes (separating axes). Clipping enlarges the cell by the bound,
+ * so that the clipped polygon of a face that touches the closed cell is never empty. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -34,13 +34,14 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return greatest;
 }
 
-/* Returns the slack: the bound of the rounding error of a coordinate. With coordinates up to M and
- * u = 2^-53, the errors are 2.01 u M from to_cell and at most 8 u M for each of six clips; 128 u M
- * covers their sum. The slack is the same for all faces with coordinates up to 2, so that a common
- * point of two faces is computed identically from both. */
+/* Returns the slack: the bound of the rounding error of a coordinate. `greatest`: result of
+ * to_cell, M below. With u = 2^-53, the errors are 2.01 u M from to_cell and at most 8 u M for each
+ * of six clips; 128 u M is more than their sum. The slack is the same for all faces with
+ * coordinates up to 2, so that a common point of two faces is computed identically from both. */
 static double slack_for(double greatest) { return greatest <= 2 ? 0x1p-45 : greatest * 0x1p-46; }
 
-/* Clips a polygon to sign * x[axis] <= limit. Returns the number of remaining corners. */
+/* Clips a polygon by the half-space of the points with sign * x[axis] <= limit. Returns the number
+ * of remaining corners. */
 static int clip_cell_face(double in[9][3], int count, int axis, double sign, double limit,
                           double out[9][3])
 {
@@ -94,6 +95,7 @@ typedef struct separation {
     double greatest; /* greatest absolute coordinate, at least 1 */
 } separation;
 
+/* Computes the edges and the normal from the corners. */
 static void separation_prepare(separation *s)
 {
     for (int i = 0; i < 3; i++)
@@ -102,9 +104,9 @@ static void separation_prepare(separation *s)
 }
 
 /* Returns true if the plane of the face, or a cross product of one of its edges with an axis,
- * separates the face from the cube around `centre` with the sides 2 * half. Rounding errors, with
- * coordinates up to M and u = 2^-53: 4 u M for edges, below 64 u M^2 for cross products, below 512
- * u M^3 for the plane. */
+ * separates the face from the cube around `centre` whose sides have the length 2 * half. The
+ * rounding errors, with coordinates up to M and u = 2^-53, are 4 u M for edges, below 64 u M^2 for
+ * cross products, and below 512 u M^3 for the plane; the tolerances are upper bounds. */
 static bool is_separated(const separation *s, const double centre[3], double half)
 {
     double m = s->greatest, tolerance = 0x1p-44 * m * m * m;
@@ -130,8 +132,8 @@ static bool is_separated(const separation *s, const double centre[3], double hal
     return false;
 }
 
-/* Returns a mask of the octants that the face's bounds touch, by comparing with the exact planes
- * between the octants. */
+/* Returns a mask of the octants that the face's bounding box touches, by comparing coordinates with
+ * the exact planes between the octants. */
 static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
     static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };

@@ -231,7 +231,7 @@ START_TEST(test_lazy_greedy_matches_plain_greedy)
         int na = ebpo_select_greedy(&fast,
                                     &(ebpo_choice){ .candidates = c,
                                                     .count = 40,
-                                                    .most = EBPO_PLANES_MAX,
+                                                    .codes_max = EBPO_PLANES_MAX,
                                                     .epsilon = 0.002 },
                                     a);
         int nb = plain_greedy(&slow, c, 40, 0.002, EBPO_PLANES_MAX, b);

@@ -111,7 +111,7 @@ START_TEST(test_kmedoids_swap_is_not_cheaper)
         int count = 3 + (int)(ebpo_test_random(&seed) % 30);
         ebpo_choice choice = { .candidates = c,
                                .count = make_candidates(c, count, &seed),
-                               .most = EBPO_PLANES_STORED,
+                               .codes_max = EBPO_PLANES_STORED,
                                .cell_size = unit_cell,
                                .seed = ebpo_test_random(&seed),
                                .wanted = 1 + (int)(ebpo_test_random(&seed) % (uint64_t)count),
@@ -138,7 +138,7 @@ START_TEST(test_least_offset_selects_least_moved)
         bool chosen[LIMIT];
         ebpo_choice choice = { .candidates = c,
                                .count = make_candidates(c, 25, &seed),
-                               .most = EBPO_PLANES_STORED,
+                               .codes_max = EBPO_PLANES_STORED,
                                .cell_size = unit_cell,
                                .wanted = 1 + round % 25 };
         ck_assert_int_eq(choose(EBPO_SELECT_OFFSET, &choice, chosen), choice.wanted);
@@ -160,7 +160,7 @@ START_TEST(test_random_selection_starts_at_seed_position)
     ebpo_candidate c[LIMIT];
     ebpo_choice choice = { .candidates = c,
                            .count = make_candidates(c, 20, &seed),
-                           .most = EBPO_PLANES_STORED,
+                           .codes_max = EBPO_PLANES_STORED,
                            .cell_size = unit_cell,
                            .wanted = 7 };
     for (int round = 0; round < 200; round++) {
@@ -189,7 +189,7 @@ START_TEST(test_random_selection_follows_order_of_node)
     int order[20], place[20];
     ebpo_choice choice = { .candidates = c,
                            .count = make_candidates(c, 20, &seed),
-                           .most = EBPO_PLANES_STORED,
+                           .codes_max = EBPO_PLANES_STORED,
                            .order = order,
                            .cell_size = unit_cell,
                            .wanted = 6 };
