@@ -42,10 +42,10 @@ enum {
     LEAST_FACES = 2048,           /* a model with fewer faces has no patches */
     MOST_FACES = 8192,            /* a node with more faces has patches below it */
     TASK_FACES = 1 << 18,         /* greatest number of faces of a parallel task */
-    REDUCTION = 4,                /* triangles before and after simplification */
+    REDUCTION = 4,                /* triangles before, divided by triangles after simplification */
     LEVELS = EBPO_PATCH_LEVEL + 1 /* number of levels with patches */
 };
-static const double LEAST_WEIGHT = 1e-12; /* of a face without area */
+static const double LEAST_WEIGHT = 1e-12; /* weight of a face without area */
 
 /* A node with a patch. Nodes are depth first. */
 typedef struct patch_node {
@@ -55,7 +55,7 @@ typedef struct patch_node {
     ebpo_patch_mesh mesh;         /* the patch, until the parent's patch is made */
     ebpo_patch_rows rows;         /* the patch as in the file */
     double error;                 /* scaled like coordinates; INFINITY: the node has no patch */
-    uint64_t triangles, vertices; /* numbers of them in `rows` */
+    uint64_t triangles, vertices; /* their numbers in `rows` */
     bool made;                    /* the node was processed */
     bool stored;                  /* the file stores the patch */
 } patch_node;
