@@ -144,7 +144,7 @@ static const char *fault_of_entry(const ebpo_catalogue_entry *e)
     if (!e->path || !*e->path)
         return "has no path";
     if (e->surface && (!*e->surface || e->only_caps))
-        return "has no surface, but a path of a surface";
+        return "has a path of a surface that is empty or contradicts `only_caps`";
     if (e->numbers && !*e->numbers)
         return "has an empty path of face indices";
     if ((unsigned)e->rule >= RULES)
