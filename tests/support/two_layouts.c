@@ -64,7 +64,7 @@ static uint64_t faces_sum(uint64_t sum, const ebpo_subtree_faces *f, uint64_t no
 {
     sum = add(sum, f->list_first, (nodes + 1) * 4);
     sum = add(sum, f->list, (uint64_t)f->list_first[nodes] * 4);
-    sum = add(sum, f->numbers, f->face_count * 4);
+    sum = add(sum, f->file_faces, f->face_count * 4);
     sum = add(sum, f->source, f->source ? f->face_count * 4 : 0);
     sum = add(sum, f->corners32, f->corners32 ? f->face_count * 36 : 0);
     sum = add(sum, f->corners64, f->corners64 ? f->face_count * 72 : 0);

@@ -366,7 +366,7 @@ static void write_view(const ebpo_file *file)
         PUT(s[4], node.pixels);
         require(ebpo_view_stream_get_faces(view, &faces) == EBPO_OK, "faces of a view");
         fwrite(faces.corners, sizeof *faces.corners, faces.face_count, s[5].stream);
-        fwrite(faces.numbers, sizeof *faces.numbers, faces.face_count, s[6].stream);
+        fwrite(faces.file_faces, sizeof *faces.file_faces, faces.face_count, s[6].stream);
     }
     end_sections(s, 7);
     ebpo_view_stream_free(view);
@@ -390,7 +390,7 @@ static void write_subtree(const ebpo_file *file)
                                     : 0);
     if (ebpo_subtree_get_faces(subtree, &faces, &error) == EBPO_OK) {
         write_section(faces.faces, faces.face_count * 12);
-        write_section(faces.numbers, faces.face_count * 4);
+        write_section(faces.file_faces, faces.face_count * 4);
         write_section(faces.list, faces.list_first[nodes.node_count] * sizeof *faces.list);
     }
     ebpo_subtree_close(subtree);
