@@ -13,9 +13,9 @@
 #include "pending_source.h"
 #include "query_support.h"
 
-/* Subdivisions of spheres and of the sides of boxes. Numbers of points and rays are divided by FEWER
- * unless all inputs are wanted. ThreadSanitizer makes everything about 20 times slower, and finds
- * races on small models with few points. */
+/* Subdivisions of spheres and of the sides of boxes. Numbers of points and rays are divided by
+ * FEWER unless all inputs are wanted. ThreadSanitizer makes everything about 20 times slower, and
+ * finds races on small models with few points. */
 #ifdef __SANITIZE_THREAD__
 enum { SPHERE = 3, BOX = 16, FEWER = 12 };
 #else

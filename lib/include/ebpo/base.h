@@ -28,7 +28,7 @@
  * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
  * range or not initialized with its macro. A function with a progress callback can return
  * EBPO_E_CANCELLED. "The errors of reading" are EBPO_E_IO and EBPO_E_FORMAT, and EBPO_E_PENDING for
- * files with a source of async.h. "EBPO_E_X: also if ..." adds a case to the meaning
+ * files with a source of async.h. "Also if ..." after a status adds a case to the meaning
  * that ebpo_status gives, or to the cases of the functions that the comment names.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
