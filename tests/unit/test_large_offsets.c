@@ -202,8 +202,8 @@ START_TEST(test_files_beyond_array_limit_are_refused)
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     file.size = (uint64_t)PTRDIFF_MAX + 1;
     ck_assert_int_eq(ebpo_whole_file_load(&file, NULL, 1, NULL, "long.ply", &error), EBPO_E_LIMIT);
-    ck_assert_ptr_nonnull(strstr(error.message, "long.ply: has "));
-    ck_assert_ptr_nonnull(strstr(error.message, "read it with a 64-bit program"));
+    ck_assert_ptr_nonnull(strstr(error.message, "long.ply: the file has "));
+    ck_assert_ptr_nonnull(strstr(error.message, "use a 64-bit program"));
     ck_assert_ptr_null(file.buffer);
 }
 END_TEST

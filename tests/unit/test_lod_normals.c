@@ -254,7 +254,7 @@ START_TEST(test_lod_normals_refuse_other_level)
     l.mesh.xyz64 = NULL;
     ck_assert_int_eq(ebpo_lod_normals(l.info, &l.mesh, &l.nodes, l.normals, &error),
                      EBPO_E_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "single precision"));
+    ck_assert_ptr_nonnull(strstr(error.message, "float coordinates"));
     l.mesh.xyz64 = corners;
     release(&l);
 }
