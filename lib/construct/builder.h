@@ -46,7 +46,7 @@ typedef struct ebpo_build_node {
     uint8_t type;   /* ebpo_node_type; empty nodes are EBPO_WHITE */
     uint32_t child; /* gray: index of the first of eight children */
     /* gray node or leaf: index in ebpo_branch.details; leaf of the top: index of a piece in
-     * ebpo_builder.sub */
+     * ebpo_builder.piece */
     uint32_t detail;
 } ebpo_build_node;
 
@@ -55,7 +55,7 @@ typedef struct ebpo_build_detail {
     int32_t delta[8]; /* corner differences */
     /* leaf: its list is entries[entry_begin .. entry_end - 1] of the branch; gray node of a piece:
      * the same range for the lists of all leaves below; gray node of the top: range of the pieces
-     * below, in ebpo_builder.sub */
+     * below, in ebpo_builder.piece */
     uint64_t entry_begin, entry_end;
     /* gray: range in `crossing` of the branch: the faces that are not entirely inside the cell */
     uint64_t cross_begin, cross_end;
@@ -65,7 +65,7 @@ typedef struct ebpo_build_detail {
 
 /* A piece, or the top of the tree. Its nodes are stored depth first; nodes[0] is the root. */
 typedef struct ebpo_branch {
-    ebpo_cell cell;
+    ebpo_cell cell; /* cell of the root */
     /* [list_count] indices of the faces that touch the cell, ascending; NULL for the top, whose
      * `crossing` has indices of faces */
     uint32_t *list;
@@ -107,19 +107,19 @@ typedef struct ebpo_builder {
     const ebpo_build_options *options;
     ebpo_workspace *workspace;
     unsigned threads;
-    bool solid;
+    bool solid;            /* false: a surface */
     int max_level;         /* deepest level */
     ebpo_box box;          /* root box */
     const ebpo_mesh *mesh; /* arranged along the curve */
     uint64_t vertex_count; /* number of referenced vertices, which come first */
     uint64_t face_count;
-    const uint64_t *key; /* octcode of the vertex's cell at box.grid_level, ascending */
-    const uint32_t (*face)[3];
-    ebpo_bounds bounds;
-    uint32_t *final_index; /* [face] EBPO_NO_INDEX until its piece sets it */
-    ebpo_branch top;       /* each of its leaves is a piece: `detail` is an index in `sub` */
-    ebpo_branch *sub;      /* [sub_count] the pieces */
-    uint64_t sub_count, sub_capacity;
+    const uint64_t *key;       /* octcode of the vertex's cell at box.grid_level, ascending */
+    const uint32_t (*face)[3]; /* [face_count] vertices of each face */
+    ebpo_bounds bounds;        /* boxes around ranges of vertices */
+    uint32_t *final_index;     /* [face] EBPO_NO_INDEX until its piece sets it */
+    ebpo_branch top;           /* each of its leaves is a piece: `detail` is an index in `piece` */
+    ebpo_branch *piece;        /* [piece_count] the pieces */
+    uint64_t piece_count, piece_capacity;
     /* numbers of leaves, and of entries of their lists, in all pieces so far */
     _Atomic uint64_t leaf_count, entry_count;
     struct ebpo_top_envelope *top_envelope; /* envelopes of the top's gray nodes, by detail */

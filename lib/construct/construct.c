@@ -3,7 +3,7 @@
  *
  * This file checks options and chooses the deepest level (EBP 2017, equation 3). The tree is cut
  * into pieces, which are subtrees, and the top, which is the set of the nodes above the pieces. In
- * the code, the top and each piece are an `ebpo_branch`: `b->top` and `b->sub[i]` (builder.h).
+ * the code, the top and each piece are an `ebpo_branch`: `b->top` and `b->piece[i]` (builder.h).
  * Several threads process the pieces, one piece per thread at a time. The envelopes of a piece need
  * the envelope of the parent of its root, so the envelopes of the top are computed first. With a
  * selection from the leaves up, the planes of all nodes are chosen before any envelope is computed.
@@ -217,9 +217,9 @@ static void builder_free(ebpo_builder *b)
     ebpo_bounds_free(&b->bounds);
     ebpo_array_free(b->workspace, b->final_index);
     ebpo_branch_free(&b->top);
-    for (uint64_t i = 0; i < b->sub_count; i++)
-        ebpo_branch_free(&b->sub[i]);
-    free(b->sub);
+    for (uint64_t i = 0; i < b->piece_count; i++)
+        ebpo_branch_free(&b->piece[i]);
+    free(b->piece);
     free(b->top_envelope);
     ebpo_store_free(b->store);
 }
@@ -241,7 +241,7 @@ static ebpo_status process_pieces(void *context, uint64_t begin, uint64_t end, u
     ebpo_builder *b = job->b;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        ebpo_branch *piece = &b->sub[i];
+        ebpo_branch *piece = &b->piece[i];
         uint64_t begun = ebpo_clock();
         status = ebpo_build_partition(b, piece, error);
         if (status == EBPO_OK)
@@ -266,8 +266,8 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
         status = ebpo_emit_scratch_make(&job.scratch[i], b->workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, process_pieces, &job,
-                                   &b->options->progress, "envelopes", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, b->piece_count, 1, process_pieces,
+                                   &job, &b->options->progress, "envelopes", error);
     for (unsigned i = 0; i < b->threads && job.scratch; i++)
         ebpo_emit_scratch_free(job.scratch[i]);
     free(job.scratch);

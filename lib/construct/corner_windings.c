@@ -71,7 +71,7 @@ static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t c
         if (n->type == EBPO_WHITE)
             child_delta[o] = none;
         else if (s == &b->top && n->type == EBPO_LEAF)
-            child_delta[o] = b->sub[n->detail].root_delta;
+            child_delta[o] = b->piece[n->detail].root_delta;
         else
             child_delta[o] = s->details[n->detail].delta;
     }

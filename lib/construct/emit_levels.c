@@ -310,7 +310,7 @@ static ebpo_piece_level *current_stretch(joiner *j)
 /* Returns the type that the file stores for a node of the top. */
 static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
 {
-    ebpo_node_type type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
+    ebpo_node_type type = n->type == EBPO_LEAF ? b->piece[n->detail].root_type : n->type;
     if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
         return EBPO_BLACK;
     return type;
@@ -323,8 +323,8 @@ static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t
     ebpo_builder *b = j->b;
     ebpo_build_node node = b->top.nodes[index];
     if (node.type == EBPO_LEAF) {
-        ebpo_piece_level *out = b->sub[node.detail].out;
-        b->sub[node.detail].out = NULL;
+        ebpo_piece_level *out = b->piece[node.detail].out;
+        b->piece[node.detail].out = NULL;
         if (!push_stretch(j, out)) {
             ebpo_piece_levels_free(out);
             return false;

@@ -85,9 +85,9 @@ static int sample_candidates(const ebpo_builder *b, const ebpo_branch *s,
         return count;
     }
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
-        total += b->sub[i].list_count;
+        total += b->piece[i].list_count;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
-        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip,
+        sample_faces(b, &b->piece[i], NULL, 0, b->piece[i].list_count, &skip,
                      total / CANDIDATES_SAMPLE + 1, sample, &count);
     return count;
 }
@@ -487,8 +487,8 @@ static bool pass_down(ebpo_builder *b, const pending *p, front *next)
             return false;
         ebpo_polytope_child(p->envelope, o, envelope);
         if (child->type == EBPO_LEAF) {
-            b->sub[child->detail].above = envelope;
-            b->sub[child->detail].winding = p->winding + offset[o];
+            b->piece[child->detail].above = envelope;
+            b->piece[child->detail].winding = p->winding + offset[o];
             continue;
         }
         if (!ebpo_grow(&next->nodes, &next->capacity, next->count + 1, sizeof *next->nodes)) {
@@ -517,7 +517,7 @@ static ebpo_status front_begin(ebpo_builder *b, front *w, ebpo_error *error)
         return no_memory(b, error);
     ebpo_polytope_cube(cube);
     if (b->top.nodes[0].type == EBPO_LEAF) { /* a small model is one piece */
-        b->sub[0].above = cube;
+        b->piece[0].above = cube;
         return EBPO_OK;
     }
     if (!ebpo_grow(&w->nodes, &w->capacity, 1, sizeof *w->nodes)) {

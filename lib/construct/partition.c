@@ -403,7 +403,7 @@ static ebpo_status distribute_faces(void *context, uint64_t begin, uint64_t end,
 /* Returns the number of different faces that the pieces list so far. */
 static uint64_t faces_done(const ebpo_builder *b)
 {
-    const ebpo_branch *last = b->sub_count ? &b->sub[b->sub_count - 1] : NULL;
+    const ebpo_branch *last = b->piece_count ? &b->piece[b->piece_count - 1] : NULL;
     return last ? last->first + last->fresh_count : 0;
 }
 
@@ -476,8 +476,9 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
     s->fresh = ebpo_alloc_zero(s->list_count / 8 + 1, 1);
     if (!s->fresh)
         return false;
-    s->first =
-        b->sub_count ? b->sub[b->sub_count - 1].first + b->sub[b->sub_count - 1].fresh_count : 0;
+    s->first = b->piece_count
+                   ? b->piece[b->piece_count - 1].first + b->piece[b->piece_count - 1].fresh_count
+                   : 0;
     EBPO_FOR_ITEMS(b->workspace, i, 0, s->list_count) {
         uint32_t f = s->list[i];
         unsigned before = listed[f / 8] >> f % 8 & 1;
@@ -505,9 +506,9 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
     ebpo_builder *b = c->b;
     ebpo_branch s = { .cell = cell, .list = list, .list_count = count, .workspace = b->workspace };
     ebpo_status status =
-        ebpo_build_check_lists(b->face_count, b->sub_count + 1, c->entries += count, c->error);
+        ebpo_build_check_lists(b->face_count, b->piece_count + 1, c->entries += count, c->error);
     if (status == EBPO_OK &&
-        (!ebpo_grow(&b->sub, &b->sub_capacity, b->sub_count + 1, sizeof *b->sub) ||
+        (!ebpo_grow(&b->piece, &b->piece_capacity, b->piece_count + 1, sizeof *b->piece) ||
          !mark_fresh(b, &s, c->listed)))
         status = no_memory_for_pieces(b, c->error);
     if (status != EBPO_OK) {
@@ -515,8 +516,8 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
         return status;
     }
     node->type = EBPO_LEAF;
-    node->detail = (uint32_t)b->sub_count; /* fewer than the top's nodes */
-    b->sub[b->sub_count++] = s;
+    node->detail = (uint32_t)b->piece_count; /* fewer than the top's nodes */
+    b->piece[b->piece_count++] = s;
     return EBPO_OK;
 }
 
@@ -542,7 +543,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
         status = no_memory_for_pieces(b, c->error);
     if (status == EBPO_OK) {
         s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
-        s->details[detail] = (ebpo_build_detail){ .entry_begin = b->sub_count,
+        s->details[detail] = (ebpo_build_detail){ .entry_begin = b->piece_count,
                                                   .cross_begin = crossing,
                                                   .cross_end = s->cross_count };
     }
@@ -554,7 +555,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
             ebpo_array_free(b->workspace, lists[o]);
     }
     if (status == EBPO_OK)
-        s->details[detail].entry_end = b->sub_count; /* in the top, entries are pieces */
+        s->details[detail].entry_end = b->piece_count; /* in the top, entries are pieces */
     return status;
 }
 
@@ -598,7 +599,7 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     if (!faces)
         return no_memory_for_pieces(b, error);
     for (uint64_t i = begin; i < end; i++) {
-        ebpo_branch *s = &b->sub[i];
+        ebpo_branch *s = &b->piece[i];
         ebpo_branch_corners(b, s, s->cell, NULL, s->list_count, faces, s->root_delta);
     }
     free(faces);
@@ -619,8 +620,8 @@ static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
         ebpo_workspace_get_stats(b->workspace, &stats);
     if (stats.memory < EBPO_WORKSPACE_MIN)
         return EBPO_OK; /* no budget, or a small budget of a test */
-    for (uint64_t i = 0; i < b->sub_count; i++)
-        largest = b->sub[i].list_count > largest ? b->sub[i].list_count : largest;
+    for (uint64_t i = 0; i < b->piece_count; i++)
+        largest = b->piece[i].list_count > largest ? b->piece[i].list_count : largest;
     uint64_t fit = stats.memory / 2 / BYTES_A_FACE / largest;
     if (fit < 1)
         return ebpo_fail(
@@ -645,7 +646,7 @@ ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
         ebpo_array_fill(b->workspace, b->final_index, 0xff, /* EBPO_NO_INDEX */
                         b->face_count * sizeof *b->final_index);
     if (status == EBPO_OK && b->solid)
-        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, corners_of_pieces, b,
-                                   &b->options->progress, "winding numbers", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, b->piece_count, 1, corners_of_pieces,
+                                   b, &b->options->progress, "winding numbers", error);
     return status;
 }

@@ -393,7 +393,7 @@ static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, 
     ebpo_status status = EBPO_OK;
     (void)worker;
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
-        p.s = &b->sub[i];
+        p.s = &b->piece[i];
         status = ebpo_build_partition(b, p.s, error);
         if (status == EBPO_OK &&
             (!make_proposals(b, p.s) ||
@@ -447,7 +447,7 @@ static bool list_top(top_list *t)
             const ebpo_build_node *child = &b->top.nodes[node->child + o];
             int32_t winding = t->nodes[i].winding + offset[o];
             if (child->type == EBPO_LEAF)
-                b->sub[child->detail].winding = winding;
+                b->piece[child->detail].winding = winding;
             if (child->type != EBPO_GRAY)
                 continue;
             if (!ebpo_grow(&t->nodes, &t->capacity, t->count + 1, sizeof *t->nodes))
@@ -487,7 +487,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
                                       n->winding + offset[o]);
             if (child->type != EBPO_LEAF)
                 continue;
-            ebpo_handover *root = &b->sub[child->detail].proposals->root;
+            ebpo_handover *root = &b->piece[child->detail].proposals->root;
             good = ebpo_handover_gather(&n->given, root, o);
             ebpo_handover_free(root);
         }
@@ -559,8 +559,8 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
 static void add_up_levels(const top_list *t)
 {
     ebpo_builder *b = t->b;
-    for (uint64_t i = 0; i < b->sub_count; i++)
-        ebpo_thesis_add_up(b->thesis->out, b->sub[i].proposals->thesis);
+    for (uint64_t i = 0; i < b->piece_count; i++)
+        ebpo_thesis_add_up(b->thesis->out, b->piece[i].proposals->thesis);
     for (uint64_t i = 0; i < t->count; i++)
         ebpo_thesis_add_up(b->thesis->out, t->nodes[i].thesis);
 }
@@ -572,10 +572,10 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
         return EBPO_OK;
     top_list t = { .b = b };
     ebpo_status status = list_top(&t) ? EBPO_OK : no_memory(error);
-    ebpo_pass pass = { &b->options->progress, 0, b->sub_count, b->sub_count + t.count };
+    ebpo_pass pass = { &b->options->progress, 0, b->piece_count, b->piece_count + t.count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, propose_pieces, b,
+        status = ebpo_parallel_for(b->threads, b->workspace, b->piece_count, 1, propose_pieces, b,
                                    &progress, "choosing planes", error);
     atomic_store(&b->leaf_count, 0); /* the leaves will be made and counted again */
     atomic_store(&b->entry_count, 0);
