@@ -14,7 +14,7 @@
 #include "core/parallel.h"
 
 enum {
-    GROUP = 1 << 16,         /* least number of records in a group: fits a core's cache */
+    GROUP = 1 << 16,         /* minimum number of records in a group, which fit a core's cache */
     LARGE_GROUP = 4 * GROUP, /* a group with more records is sorted in the workspace */
     GROUPS_MAX = 1024,       /* limited, because all groups are written to at the same time */
     GRAIN = 1 << 14,         /* number of records that a thread takes at a time */

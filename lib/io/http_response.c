@@ -295,7 +295,6 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
     if (a->encoded)
         return give_verdict(EBPO_HTTP_REFUSED, why,
                             "the server compressed the file, which was not requested "
-                            "(Content-Encoding); switch off "
-                            "this compression on the server");
+                            "(Content-Encoding); switch off this compression on the server");
     return a->code == 206 ? judge_part(a, request, why) : judge_whole(a, request, status, why);
 }

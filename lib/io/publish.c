@@ -28,7 +28,7 @@
 /* --- properties that a new file gets from the replaced file --- */
 
 #ifdef EBPO_HAVE_XATTR
-/* Greatest number of bytes of all names, and of a value; no system allows more. */
+/* Maximum number of bytes of all names, and of a value; no system allows more. */
 enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
 static void copy_attribute(int from, int to, const char *name, void *value)
@@ -53,17 +53,17 @@ static void copy_attributes(int from, int to)
 static void copy_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
-/* Gives the file the owner and group of the replaced file, `was`. Returns the mode to set. If the
+/* Gives the file the owner and group of the replaced file (`old`). Returns the mode to set. If the
  * system does not allow the change, the new file keeps the owner or group of this process, and the
  * mode lacks the bits that let a program act for its owner (set-user-ID). */
-static mode_t copy_owner(int to, const struct stat *was)
+static mode_t copy_owner(int to, const struct stat *old)
 {
-    struct stat is;
-    mode_t mode = was->st_mode & 07777;
-    if (fstat(to, &is) != 0)
+    struct stat new;
+    mode_t mode = old->st_mode & 07777;
+    if (fstat(to, &new) != 0)
         return mode & 0777;
-    bool user = is.st_uid == was->st_uid || fchown(to, was->st_uid, (gid_t)-1) == 0,
-         group = is.st_gid == was->st_gid || fchown(to, (uid_t)-1, was->st_gid) == 0;
+    bool user = new.st_uid == old->st_uid || fchown(to, old->st_uid, (gid_t)-1) == 0,
+         group = new.st_gid == old->st_gid || fchown(to, (uid_t)-1, old->st_gid) == 0;
     if (user && group)
         return mode;
     /* permissions of the group must not apply to another group */
@@ -75,11 +75,11 @@ static mode_t copy_owner(int to, const struct stat *was)
  * `mode`, unless it is -1. Returns false with errno if the mode cannot be set. */
 static bool copy_facts(int fd, const char *path, int mode)
 {
-    struct stat was;
+    struct stat old;
     int from = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
-    bool exists = from >= 0 ? fstat(from, &was) == 0 : lstat(path, &was) == 0;
-    if (exists && S_ISREG(was.st_mode)) {
-        mode = (int)copy_owner(fd, &was);
+    bool exists = from >= 0 ? fstat(from, &old) == 0 : lstat(path, &old) == 0;
+    if (exists && S_ISREG(old.st_mode)) {
+        mode = (int)copy_owner(fd, &old);
         if (from >= 0)
             /* before the mode, because an access control list may change the mode */
             copy_attributes(from, fd);
@@ -204,12 +204,12 @@ void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
     struct stat target_stat, input_stat;
     char *from = realpath(input->shown, NULL);
     int fd = ebpo_input_descriptor(input);
-    bool named = from && strcmp(from, publish->target) == 0,
+    bool has_same_path = from && strcmp(from, publish->target) == 0,
          exists = lstat(publish->target, &target_stat) == 0,
          known = fd >= 0 && fstat(fd, &input_stat) == 0,
-         same = exists && known && target_stat.st_dev == input_stat.st_dev &&
-                target_stat.st_ino == input_stat.st_ino;
-    if ((named || same) && (known || exists)) {
+         is_same_file = exists && known && target_stat.st_dev == input_stat.st_dev &&
+                        target_stat.st_ino == input_stat.st_ino;
+    if ((has_same_path || is_same_file) && (known || exists)) {
         ebpo_file_version version = version_of(known ? &input_stat : &target_stat);
         ebpo_publish_expect(publish, &version, false);
     }
