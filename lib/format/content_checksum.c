@@ -18,8 +18,9 @@
 
 enum {
     PLAIN_FACE_ROWS = 4096, /* faces in a chunk of a file without subtrees */
-    /* chunks with as many faces in a file with subtrees; of as many rows of its array
-     * /mesh/faces_index, a file without subtrees has only the first */
+    /* number of chunks with PLAIN_FACE_ROWS faces in a file with subtrees. /mesh/faces_index has a
+     * row for each of these chunks; in a file without subtrees it has only the first of these rows
+     */
     SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK
 };
 

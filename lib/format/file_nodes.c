@@ -201,7 +201,7 @@ static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_
 
 const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };
 
-/* Returns the item before which the preceding index row has the sums. */
+/* Returns the first item of an item's block. An index row has the sums before this item. */
 static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
 
 /* Reads the types and ranks of a group, and counts its nodes by type. */

@@ -120,8 +120,7 @@ static ebpo_status fail_by_state(int state, const char *shown, ebpo_error *error
             "libhdf5 exceeded its limits of time or memory; the file is damaged or malicious");
     return ebpo_fail_file(error, EBPO_E_FORMAT, shown,
                           "libhdf5 crashed on the file, in a separate process, by signal %d (%s); "
-                          "the file is damaged "
-                          "or malicious, so do not trust it",
+                          "the file is damaged or malicious, so do not trust it",
                           WTERMSIG(state), strsignal(WTERMSIG(state)));
 }
 
