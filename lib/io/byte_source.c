@@ -34,21 +34,21 @@ static ebpo_status path_read(void *user, uint64_t offset, uint64_t size, void *d
     const path_source *s = user;
     uint8_t *to = data;
     while (size) {
-        ssize_t got = pread(s->fd, to, (size_t)(size < CALL_BYTES_MAX ? size : CALL_BYTES_MAX),
-                            (off_t)offset);
-        if (got < 0 && errno == EINTR)
+        ssize_t received = pread(s->fd, to, (size_t)(size < CALL_BYTES_MAX ? size : CALL_BYTES_MAX),
+                                 (off_t)offset);
+        if (received < 0 && errno == EINTR)
             continue;
-        if (got < 0)
+        if (received < 0)
             return ebpo_fail_errno(error, s->path, "cannot be read");
-        if (got == 0)
+        if (received == 0)
             return ebpo_fail_at(
                 error, EBPO_E_IO, s->path, "", (int64_t)offset,
                 "byte %" PRIu64
                 " cannot be read: the file became shorter while it was open; open it again",
                 offset);
-        to += got;
-        offset += (uint64_t)got;
-        size -= (uint64_t)got;
+        to += received;
+        offset += (uint64_t)received;
+        size -= (uint64_t)received;
     }
     return EBPO_OK;
 }
