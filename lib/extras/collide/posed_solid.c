@@ -9,7 +9,8 @@
  * fractions, three segments parallel to axes lead to the query point from the point whose
  * coordinates are the nearest doubles.
  *
- * Functions do not change a posed solid: several threads may use one, each with a separate context.
+ * Functions do not change a posed solid: several threads may use the same
+ * posed solid, each thread with a separate context.
  * Proofs: docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 

@@ -49,7 +49,7 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
 }
 
 /* Maximum number of iterations. For sets that are nearly in contact, the gap after this number of
- * iterations is a valid bound, but not an accurate one. */
+ * iterations is a valid bound, but is not accurate. */
 enum { ITERATIONS = 32 };
 
 /* The distance of both hulls is equal to the distance of the origin from the set of all differences

@@ -44,14 +44,14 @@ typedef struct search {
     const ebpo_mesh *mesh;
     const double *distances; /* [mesh->vertex_count] signed or unsigned distance of each vertex */
     ebpo_map_hausdorff_options options; /* the caller's options, or the defaults */
-    double slack;             /* upper bound of the rounding errors of positions and lengths */
-    ebpo_map_hausdorff range; /* bounds of the result so far */
-    uint64_t allowed;         /* no division begins in the current batch after range.queries has
-                               * this value */
-    triangles current, next;  /* triangles of this round and of the next round */
-    uint64_t divided;         /* number of triangles that this round divides: the first ones of
-                               * `current` */
-    double (*middle)[3][3];   /* [divided] middles of the edges from each corner to the next one */
+    double slack;                 /* upper bound of the rounding errors of positions and lengths */
+    ebpo_map_hausdorff range;     /* bounds of the result so far */
+    uint64_t allowed;             /* no division begins in the current batch after range.queries has
+                                   * this value */
+    triangles current, next;      /* triangles of this round and of the next round */
+    uint64_t divided;             /* number of triangles that this round divides: the first ones of
+                                   * `current` */
+    double (*middle)[3][3];       /* [divided] middles of the edges from each corner to the next */
     double (*middle_distance)[3]; /* [divided] distances of these middles from the model */
     uint64_t middle_capacity, distance_capacity; /* of middle and middle_distance, in triangles */
 } search;
