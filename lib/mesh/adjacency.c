@@ -23,6 +23,7 @@ typedef struct build {
     ebpo_stars *stars;
 } build;
 
+/* Fails because a face has a vertex index that is out of range. */
 static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vertex,
                              ebpo_error *error)
 {
@@ -33,6 +34,8 @@ static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vert
                           (unsigned long)vertex, (unsigned long long)mesh->vertex_count);
 }
 
+/* Counts, for faces begin .. end - 1, the faces in the star of each vertex, and checks their vertex
+ * indices. A face with equal corners is counted once for a vertex. */
 static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -59,6 +62,7 @@ static inline void put_face(ebpo_stars *stars, uint32_t v, uint64_t f)
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
 }
 
+/* Stores faces begin .. end - 1 in the stars of their vertices. */
 static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {

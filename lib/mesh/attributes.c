@@ -243,6 +243,7 @@ typedef struct picking {
     ebpo_attribute made; /* the new array */
 } picking;
 
+/* Copies the values of the selected rows, for an array without lists. */
 static void pick_columns(picking *p)
 {
     size_t bytes = ebpo_attribute_row_bytes(p->from);
@@ -260,6 +261,7 @@ static uint64_t list_begin(const ebpo_attribute *a, uint64_t row)
     return row ? a->ends[row - 1] : 0;
 }
 
+/* Computes the ends of the lists of the selected rows. */
 static void pick_ends(picking *p)
 {
     uint64_t sum = 0;
@@ -270,6 +272,7 @@ static void pick_ends(picking *p)
     }
 }
 
+/* Copies the items of the lists of the selected rows. */
 static void pick_items(picking *p)
 {
     size_t bytes = ebpo_attribute_bytes(p->from->type);
@@ -345,6 +348,7 @@ static void keep_columns(ebpo_workspace *workspace, ebpo_attribute *a, const uin
     }
 }
 
+/* Moves the lists of the selected rows to the beginning of the array; rows are ascending. */
 static void keep_lists(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
                        uint64_t count)
 {

@@ -87,7 +87,7 @@ typedef struct chaining {
     ebpo_loops *out;
 } chaining;
 
-/* --- sorting --- */
+/* --- sorting: functions of ebpo_sort for the boundary edges and for the arrivals --- */
 
 static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void *records,
                               ebpo_error *error)
@@ -301,6 +301,8 @@ static void emit_loop(chaining *c, uint64_t position)
     c->path_length = position;
 }
 
+/* Adds a vertex to the path. If the path has this vertex already, first removes the loop that ends
+ * here from the path. */
 static void visit_vertex(chaining *c, uint32_t vertex)
 {
     if (c->path_position[vertex] != EBPO_NO_INDEX)

@@ -196,6 +196,7 @@ typedef struct placing {
     uint64_t host_count;
 } placing;
 
+/* Compares cavities by y, then by component. */
 static int compare_cavities(const void *x, const void *y)
 {
     const cavity *a = x, *b = y;
@@ -204,6 +205,7 @@ static int compare_cavities(const void *x, const void *y)
     return a->component < b->component ? -1 : 1;
 }
 
+/* Compares hosts by volume, then by component. */
 static int compare_hosts(const void *x, const void *y, void *list)
 {
     uint32_t a = *(const uint32_t *)x, b = *(const uint32_t *)y;
@@ -213,6 +215,8 @@ static int compare_hosts(const void *x, const void *y, void *list)
     return a < b ? -1 : 1;
 }
 
+/* Lists and sorts the closed components of negative volume (cavities) and of positive volume
+ * (hosts). */
 static void list_cavities_and_hosts(placing *p)
 {
     const ebpo_components *c = p->components;

@@ -105,6 +105,7 @@ typedef struct sorting {
     ebpo_found *to;         /* receives the sorted locations */
 } sorting;
 
+/* Functions of ebpo_sort for the sort of locations. */
 static ebpo_status make_keyed(void *context, uint64_t begin, uint64_t end, void *records,
                               ebpo_error *error)
 {

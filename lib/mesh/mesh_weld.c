@@ -177,6 +177,7 @@ static bool begins_group(const ebpo_mesh *mesh, uint64_t v)
     return p[0] != q[0] || p[1] != q[1] || p[2] != q[2];
 }
 
+/* Sets w->heads of a block of vertices to the number of groups that begin in the block. */
 static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -189,6 +190,8 @@ static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
+/* Sets w->map of a block of vertices to the indices of their groups. w->heads: number of groups
+ * that begin before the block. */
 static ebpo_status number_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -254,6 +257,7 @@ static ebpo_status choose_remaining(welding *w, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Sets the bits of the remaining vertices' source indices in w->remaining. */
 static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {

@@ -265,6 +265,7 @@ static void flag_unbalanced(orienting *o, ebpo_edge_faces *e, uint8_t flags)
     }
 }
 
+/* Marks the patches with the flag OPEN that are unbalanced around an edge. */
 static ebpo_status find_open(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                              unsigned worker, ebpo_error *error)
 {
@@ -276,6 +277,7 @@ static ebpo_status find_open(orienting *o, const ebpo_link *links, uint64_t uses
     return EBPO_OK;
 }
 
+/* Marks the patches with the flag UNBALANCED that are unbalanced around an edge. */
 static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                    unsigned worker, ebpo_error *error)
 {
@@ -430,6 +432,7 @@ static void count_faces(orienting *o)
         o->patches[i].seed_turned = o->above[o->patches[i].seed] & 1;
 }
 
+/* Adds a thread's part of a patch's volume. */
 static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
 {
     pthread_mutex_lock(&o->lock);

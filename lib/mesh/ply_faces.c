@@ -190,6 +190,7 @@ static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
     return finite;
 }
 
+/* Sets l->found if a vertex of a range is not finite. */
 static ebpo_status find_non_finite(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                    ebpo_error *error)
 {
@@ -203,6 +204,8 @@ static ebpo_status find_non_finite(void *context, uint64_t begin, uint64_t end, 
     return EBPO_OK;
 }
 
+/* Chooses the vertices to be kept: those that are finite or used by a face. Sets l->refused if a
+ * face uses a vertex that is not finite. */
 static ebpo_status choose_kept(vertex_removal *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
@@ -228,6 +231,7 @@ static ebpo_status choose_kept(vertex_removal *l)
     return EBPO_OK;
 }
 
+/* Moves the kept vertices to the beginning, and renames the corners of faces. */
 static void move_vertices(const vertex_removal *l)
 {
     ebpo_mesh *mesh = l->p->mesh;

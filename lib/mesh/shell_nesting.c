@@ -35,11 +35,13 @@ typedef struct probing {
     seeker *seeker; /* one for each worker */
 } probing;
 
+/* Returns true if the host may hold shells of a node of the tree of shells. */
 static bool near_host(void *user, const ebpo_box_node *node)
 {
     return ebpo_shell_may_hold(((const seeker *)user)->host, node);
 }
 
+/* Adds the samples of a shell to the probes. Returns false when memory is short. */
 static bool add_probes(seeker *w, uint32_t number)
 {
     const ebpo_shell *shell = &w->all->n->shells[number];
@@ -113,6 +115,7 @@ static bool face_may_intersect_rays(const double t[3][3], const ebpo_point_box *
     return true;
 }
 
+/* Returns true if the current face may intersect the segments from probes of a node. */
 static bool near_face(void *user, const ebpo_box_node *node)
 {
     return face_may_intersect_rays(((const seeker *)user)->face, node->points);
@@ -241,6 +244,7 @@ typedef struct caster {
     ebpo_point_box at; /* the current sample, as a box of zero extent */
 } caster;
 
+/* Returns true if the ray from the current sample may intersect faces of a node. */
 static bool on_ray(void *user, const ebpo_box_node *node)
 {
     const caster *w = user;
@@ -477,6 +481,7 @@ static bool count_node(void *user, const ebpo_box_node *node)
     return !within;
 }
 
+/* Counts the shells of a leaf whose boxes are within the host's box. */
 static bool count_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     crowd *c = user;

@@ -243,6 +243,7 @@ typedef struct stl_colours {
     uint8_t fallback[3]; /* colour of faces whose word has no colour */
 } stl_colours;
 
+/* Returns the attribute word of a face. */
 static uint16_t word_of(const stl_colours *s, uint64_t face)
 {
     return ebpo_load16(s->data + HEAD_BYTES + FACET_BYTES * face + WORD_OFFSET);
