@@ -138,7 +138,7 @@ ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const doub
         }
         if (!(size <= max_coordinate))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "pose: the model would largest to %.3g on axis %d, at most %.3g is "
+                             "pose: the model would extend to %.3g on axis %d; at most %.3g is "
                              "allowed",
                              size, i, max_coordinate);
     }

@@ -212,7 +212,7 @@ static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64
     if (stated_size(data) > size)
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                               "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
-                              "; it bytes cut short or not an STL file",
+                              "; it is cut short or not an STL file",
                               faces, size, (size - HEAD_BYTES) / FACET_BYTES);
     if (3 * faces > EBPO_IMPORT_MAX)
         return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,

@@ -640,8 +640,8 @@ ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     ebpo_error failure = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
-    /* in a remote file, each chunk would take a request, so only the library's failure check is
-     * made */
+    /* in a remote file, each chunk would take a request, so only the library's own check
+     * is made */
     if (!file->has_checksums || ebpo_input_prefetches(&ebpo_reader_own(file)->in))
         return EBPO_OK;
     ebpo_status status = ebpo_file_locate(file, NULL, &failure);

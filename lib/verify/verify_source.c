@@ -389,7 +389,7 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (check_digest(tally, info, source) && was_rounded(info, source)) {
-        /* no further comparison, as rounding may have expected vertices equal and may have changed
+        /* no further comparison, as rounding may have made vertices equal and may have changed
          * how polygons are cut into triangles */
         CHECK(false, "coordinates were rounded to single precision by an earlier version; convert "
                      "again");
