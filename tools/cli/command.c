@@ -106,22 +106,22 @@ int command_is_hdf5(const char *name, const char *path)
     static const char signature[8] = "\211HDF\r\n\032\n";
     char head[8] = "";
     size_t size = 0;
-    ssize_t got = 1;
+    ssize_t read_bytes = 1;
     if (ebpo_is_url(path))
         return 1; /* the caller opens it, and then reports an error */
     int fd = open_regular(name, path);
     if (fd < 0)
         return errno == ENOENT ? 1 : -1; /* 1: as for a URL */
-    while (size < sizeof head && got != 0) {
-        got = read(fd, head + size, sizeof head - size);
-        if (got < 0 && errno != EINTR)
+    while (size < sizeof head && read_bytes != 0) {
+        read_bytes = read(fd, head + size, sizeof head - size);
+        if (read_bytes < 0 && errno != EINTR)
             break;
-        size += got > 0 ? (size_t)got : 0;
+        size += read_bytes > 0 ? (size_t)read_bytes : 0;
     }
-    if (got < 0)
+    if (read_bytes < 0)
         fprintf(stderr, "ebpo %s: %s: cannot be read: %s\n", name, path, strerror(errno));
     close(fd);
-    return got < 0 ? -1 : size == sizeof head && memcmp(head, signature, sizeof head) == 0;
+    return read_bytes < 0 ? -1 : size == sizeof head && memcmp(head, signature, sizeof head) == 0;
 }
 
 bool command_requires_hdf5(const char *name, const char *path)

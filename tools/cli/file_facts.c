@@ -55,13 +55,14 @@ static void print_source(FILE *out, const ebpo_info *info)
 
 static void print_border(FILE *out, const ebpo_info *info)
 {
-    char edges[40], loops[40];
-    fprintf(out,
-            "\n  border    %s in %s, the longest of %llu; caps of area %.4g, %.3g %% of the mesh",
-            words_plural(edges, sizeof edges, info->border_points, "edge", "edges"),
-            words_plural(loops, sizeof loops, info->border_loops, "loop", "loops"),
-            (unsigned long long)info->border_longest, info->border_area,
-            100 * info->border_area / info->report.area);
+    char edges[40], loops[40], longest[40];
+    fprintf(
+        out,
+        "\n  border    %s in %s, the longest of %s; caps of area %.4g, %.3g %% of the mesh's area",
+        words_plural(edges, sizeof edges, info->border_points, "edge", "edges"),
+        words_plural(loops, sizeof loops, info->border_loops, "loop", "loops"),
+        words_plural(longest, sizeof longest, info->border_longest, "edge", "edges"),
+        info->border_area, 100 * info->border_area / info->report.area);
 }
 
 static void print_surface(FILE *out, const ebpo_info *info)
@@ -135,7 +136,7 @@ static uint64_t pruned_nodes(const ebpo_info *info)
 static void print_subset(FILE *out, const ebpo_info *info)
 {
     const double *b = info->kept_box;
-    char hex[65];
+    char hex[65], pruned[40];
     words_hex(info->subset_of, hex);
     fputs("  subset   ", out);
     if (info->cut_levels)
@@ -146,8 +147,9 @@ static void print_subset(FILE *out, const ebpo_info *info)
     if (info->kept_error > 0)
         fprintf(out, "%s pruned where envelopes extend at most %.9g beyond the model",
                 info->cut_levels || info->boxed ? "," : "", info->kept_error);
-    fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n",
-            (unsigned long long)pruned_nodes(info), hex);
+    fprintf(out, "; nothing below %s\n            of the file with content %s\n",
+            words_plural(pruned, sizeof pruned, pruned_nodes(info), "pruned node", "pruned nodes"),
+            hex);
 }
 
 static uint64_t level_bytes(const ebpo_info *info, const ebpo_stored_sizes *stored)

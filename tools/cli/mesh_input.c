@@ -50,18 +50,19 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     a->collapsed_faces += b->collapsed_faces;
 }
 
+/* Applies the repairs that were chosen among those tried. */
 static ebpo_status apply_chosen(mesh_input *p, ebpo_prepare_options *options, ebpo_error *error)
 {
     const ebpo_repair_record *steps = &p->repairs.tries[p->repairs.chosen].record;
-    ebpo_prepared again = EBPO_PREPARED_INIT;
+    ebpo_prepared second = EBPO_PREPARED_INIT;
     options->weld = steps->weld;
     options->weld_distance = 0;
     options->drop_duplicates = steps->drop_duplicates;
     options->orient = steps->orient;
     options->fill_holes = steps->fill_holes;
-    ebpo_status status = ebpo_mesh_prepare(&p->mesh, options, &again, error);
+    ebpo_status status = ebpo_mesh_prepare(&p->mesh, options, &second, error);
     if (status == EBPO_OK)
-        join_preparations(&p->prepared, &again);
+        join_preparations(&p->prepared, &second);
     return status;
 }
 

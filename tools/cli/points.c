@@ -154,23 +154,23 @@ static void take_numbers(points *p, points_block *b)
         ssize_t read_count = points_read_some(p, b, b->bytes + b->count, block_bytes - b->count);
         b->count += read_count > 0 ? (size_t)read_count : 0;
     }
-    size_t left = b->count % row_bytes; /* bytes of an incomplete row */
+    size_t partial_bytes = b->count % row_bytes; /* bytes of an incomplete row */
     if (!p->is_ended)
-        keep_unread(p, b, b->count - left);
-    else if (left && !b->failed)
+        keep_unread(p, b, b->count - partial_bytes);
+    else if (partial_bytes && !b->failed)
         points_fault(b, 0,
                      "%zu bytes remain at the end, but each item takes %zu; the input is "
                      "truncated or in another format",
-                     left, row_bytes);
-    b->count -= p->is_ended ? left : 0;
+                     partial_bytes, row_bytes);
+    b->count -= p->is_ended ? partial_bytes : 0;
     if (p->rows_stated)
         check_rows(p, b, b->count / row_bytes);
 }
 
 static void take_all_rows(points *p, points_block *b)
 {
-    uint64_t left = p->rows_total - p->all_rows_at;
-    b->row_count = left < p->rows_per_block ? left : p->rows_per_block;
+    uint64_t rows_left = p->rows_total - p->all_rows_at;
+    b->row_count = rows_left < p->rows_per_block ? rows_left : p->rows_per_block;
     b->rows = p->all_rows + p->all_rows_at * (uint64_t)points_width(p->kind);
     p->all_rows_at += b->row_count;
 }

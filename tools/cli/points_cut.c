@@ -75,17 +75,17 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
     if (at <= begin)
         return begin;
     for (uint64_t from = at - 1; from < size;) {
-        ssize_t got = pread(p->fd, piece, sizeof piece, (off_t)from);
-        if (got < 0 && errno == EINTR)
+        ssize_t read_bytes = pread(p->fd, piece, sizeof piece, (off_t)from);
+        if (read_bytes < 0 && errno == EINTR)
             continue;
-        if (got < 0)
+        if (read_bytes < 0)
             return fail_cut(p, strerror(errno)), UINT64_MAX;
-        const char *end = memchr(piece, '\n', (size_t)got);
+        const char *end = memchr(piece, '\n', (size_t)read_bytes);
         if (end)
             return from + (uint64_t)(end - piece) + 1;
-        if (got == 0)
+        if (read_bytes == 0)
             break;
-        from += (uint64_t)got;
+        from += (uint64_t)read_bytes;
     }
     return size;
 }
@@ -95,14 +95,14 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
 static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };
-    ssize_t got = b.bytes ? pread(p->fd, b.bytes, POINTS_LINE, (off_t)begin) : -1;
-    bool success = got >= 0 || fail_cut(p, b.bytes ? strerror(errno) : "not enough memory");
-    b.count = got > 0 ? (size_t)got : 0;
+    ssize_t read_bytes = b.bytes ? pread(p->fd, b.bytes, POINTS_LINE, (off_t)begin) : -1;
+    bool success = read_bytes >= 0 || fail_cut(p, b.bytes ? strerror(errno) : "not enough memory");
+    b.count = read_bytes > 0 ? (size_t)read_bytes : 0;
     if (success && b.count > 0) {
         success = points_take_header(p, &b);
         if (!success)
             (void)points_finish_block(p, &b);
-        else if (!p->fields && got == POINTS_LINE)
+        else if (!p->fields && read_bytes == POINTS_LINE)
             success = fail_cut(p, "has no line of column names in its first bytes");
     }
     *out = begin + b.begin;

@@ -47,7 +47,7 @@ static bool wait_for_more(const points *p)
 
 ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
 {
-    ssize_t got;
+    ssize_t read_bytes;
     if (p->limited && p->bytes_left < most)
         most = (size_t)p->bytes_left;
     if (most == 0 || !wait_for_more(p)) {
@@ -55,35 +55,35 @@ ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
         return 0;
     }
     do
-        got = read(p->fd, to, most);
-    while (got < 0 && errno == EINTR);
-    if (got < 0)
+        read_bytes = read(p->fd, to, most);
+    while (read_bytes < 0 && errno == EINTR);
+    if (read_bytes < 0)
         points_fault(b, 0, "cannot be read: %s", strerror(errno));
-    p->is_ended |= got <= 0;
-    p->bytes_taken += got > 0 ? (uint64_t)got : 0;
-    p->bytes_left -= p->limited && got > 0 ? (uint64_t)got : 0;
-    return got;
+    p->is_ended |= read_bytes <= 0;
+    p->bytes_taken += read_bytes > 0 ? (uint64_t)read_bytes : 0;
+    p->bytes_left -= p->limited && read_bytes > 0 ? (uint64_t)read_bytes : 0;
+    return read_bytes;
 }
 
 bool points_fill(points *p, points_block *b)
 {
-    ssize_t got =
+    ssize_t read_bytes =
         points_read_some(p, b, p->unread + p->unread_count, p->unread_capacity - p->unread_count);
-    p->unread_count += got > 0 ? (size_t)got : 0;
-    return got >= 0;
+    p->unread_count += read_bytes > 0 ? (size_t)read_bytes : 0;
+    return read_bytes >= 0;
 }
 
 bool points_fill_all(points *p, points_block *b)
 {
     while (!p->is_ended) {
         if (p->unread_count == p->unread_capacity) {
-            char *wider = p->unread_capacity <= SIZE_MAX / 4
-                              ? realloc(p->unread, 2 * p->unread_capacity + 1)
-                              : NULL;
-            if (!wider)
+            char *larger = p->unread_capacity <= SIZE_MAX / 4
+                               ? realloc(p->unread, 2 * p->unread_capacity + 1)
+                               : NULL;
+            if (!larger)
                 return points_fault(b, 0, "not enough memory for %zu bytes",
                                     2 * p->unread_capacity);
-            p->unread = wider;
+            p->unread = larger;
             p->unread_capacity *= 2;
         }
         points_fill(p, b);

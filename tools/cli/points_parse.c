@@ -80,12 +80,12 @@ static bool all_finite(const double *v, uint64_t count)
 /* Sets b->row_count to the number of rows before the first invalid one. */
 static void check_rows(const points *p, points_block *b, uint64_t count)
 {
-    uint64_t width = (uint64_t)points_width(p->kind), good = 0;
+    uint64_t width = (uint64_t)points_width(p->kind), valid_rows = 0;
     if (p->kind == POINTS && all_finite(b->rows, 3 * count))
-        good = count;
-    while (good < count && check_row(p, b, good + 1, b->rows + good * width))
-        good++;
-    b->row_count = good;
+        valid_rows = count;
+    while (valid_rows < count && check_row(p, b, valid_rows + 1, b->rows + valid_rows * width))
+        valid_rows++;
+    b->row_count = valid_rows;
 }
 
 static void parse_numbers(const points *p, points_block *b)

@@ -58,9 +58,9 @@ char *result_text_grow(result_text *t)
     if (t->full)
         drop_partial_row(t);
     if (t->count + RESULT_MAX > t->capacity) {
-        char *wider = realloc(t->bytes, 2 * t->capacity);
-        if (wider) {
-            t->bytes = wider;
+        char *larger = realloc(t->bytes, 2 * t->capacity);
+        if (larger) {
+            t->bytes = larger;
             t->capacity *= 2;
         } else
             result_text_discard(t);
@@ -72,12 +72,12 @@ void result_text_cut(result_text *t, size_t at)
 {
     if (t->cut_count == t->cut_capacity) {
         size_t capacity = t->cut_capacity ? 2 * t->cut_capacity : 64;
-        size_t *wider = realloc(t->cuts, capacity * sizeof *wider);
-        if (!wider) {
+        size_t *larger = realloc(t->cuts, capacity * sizeof *larger);
+        if (!larger) {
             result_text_discard(t);
             return;
         }
-        t->cuts = wider;
+        t->cuts = larger;
         t->cut_capacity = capacity;
     }
     t->cuts[t->cut_count++] = t->piece = at;

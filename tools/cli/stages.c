@@ -39,18 +39,18 @@ int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
 void stages_split(progress_line *line, const ebpo_build_times *times)
 {
     int at = 0;
-    double both = times->cells + times->envelopes;
+    double step_seconds = times->cells + times->envelopes;
     for (int i = 0; i < line->stage_count; i++) {
         if (strcmp(line->stages[i].name, "envelopes") == 0)
             at = i;
     }
-    if (at == 0 || !(both > 0) || line->stage_count == PROGRESS_STAGES)
+    if (at == 0 || !(step_seconds > 0) || line->stage_count == PROGRESS_STAGES)
         return;
     memmove(&line->stages[at + 1], &line->stages[at],
             (size_t)(line->stage_count - at) * sizeof *line->stages);
     line->stage_count++;
     line->stages[at].name = "cells";
-    line->stages[at].seconds *= times->cells / both;
+    line->stages[at].seconds *= times->cells / step_seconds;
     line->stages[at + 1].seconds -= line->stages[at].seconds;
 }
 
@@ -129,13 +129,13 @@ static void thesis_stage(json *j, int number, const stage_facts *f, const bool b
                          const double taken[STAGE_ROWS])
 {
     double sum = 0;
-    unsigned wanted = number == THESIS_STAGES ? (1u << THESIS_STAGES) - 1 : 1u << number;
+    unsigned stage_bits = number == THESIS_STAGES ? (1u << THESIS_STAGES) - 1 : 1u << number;
     json_object(j, NULL);
     json_int(j, "number", number + 1);
     json_text(j, "name", thesis_names[number]);
     json_array(j, "in");
     for (int r = 0; r < STAGE_ROWS; r++)
-        if (began[r] && thesis_bits((stage_row)r, f) & wanted) {
+        if (began[r] && thesis_bits((stage_row)r, f) & stage_bits) {
             json_text(j, NULL, stage_names[r].name);
             sum += taken[r];
         }

@@ -26,10 +26,10 @@ bool standard_files_occupy(void)
     for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
         if (fcntl(fd, F_GETFD) >= 0)
             continue;
-        int got = open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
-        if (got < 0) /* there may be no /dev */
-            got = open("/", O_RDONLY | O_DIRECTORY);
-        if (got != fd)
+        int opened = open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+        if (opened < 0) /* there may be no /dev */
+            opened = open("/", O_RDONLY | O_DIRECTORY);
+        if (opened != fd)
             return false;
     }
     return true;
@@ -57,14 +57,14 @@ static bool copy_stream(int from, int to)
 {
     static char buffer[BUFFER_BYTES];
     for (;;) {
-        ssize_t got = read(from, buffer, sizeof buffer);
-        if (got == 0)
+        ssize_t read_bytes = read(from, buffer, sizeof buffer);
+        if (read_bytes == 0)
             return true;
-        if (got < 0 && errno == EINTR)
+        if (read_bytes < 0 && errno == EINTR)
             continue;
-        for (ssize_t at = 0, put; got < 0 || at < got; at += put) {
-            put = got < 0 ? -1 : write(to, buffer + at, (size_t)(got - at));
-            if (put < 0 && (got < 0 || errno != EINTR))
+        for (ssize_t at = 0, put; read_bytes < 0 || at < read_bytes; at += put) {
+            put = read_bytes < 0 ? -1 : write(to, buffer + at, (size_t)(read_bytes - at));
+            if (put < 0 && (read_bytes < 0 || errno != EINTR))
                 return false;
             put = put < 0 ? 0 : put;
         }

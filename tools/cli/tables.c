@@ -37,25 +37,26 @@ void table_beyond(FILE *out)
 
 bool table_in_range(double x, int64_t exponent)
 {
-    int own;
+    int own_exponent;
     if (!isfinite(x) || fabs(x) < DBL_MIN) /* 0 is 0 at any scale */
         return isfinite(x);
-    frexp(x, &own);
-    return own + exponent > -1021 && own + exponent <= 1024;
+    frexp(x, &own_exponent);
+    return own_exponent + exponent > -1021 && own_exponent + exponent <= 1024;
 }
 
 const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exponent)
 {
     char mantissa[32];
-    int own;
+    int own_exponent;
     if (table_in_range(x, exponent)) {
         snprintf(out, TABLE_CELL, "%.*g", digits, ldexp(x, (int)exponent));
         return out;
     }
     if (!isfinite(x))
         return strcpy(out, "-");
-    double part = frexp(x, &own), log10_2 = 0.30102999566398119521;
-    double power = log10(fabs(part)) + (double)(own + exponent) * log10_2, whole = floor(power);
+    double part = frexp(x, &own_exponent), log10_2 = 0.30102999566398119521;
+    double power = log10(fabs(part)) + (double)(own_exponent + exponent) * log10_2,
+           whole = floor(power);
     digits = digits < 9 ? digits : 9; /* up to four of the 13 digits of the power come before the
                                        * point */
     snprintf(mantissa, sizeof mantissa, "%.*f", digits - 1, copysign(pow(10, power - whole), x));

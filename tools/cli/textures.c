@@ -84,18 +84,18 @@ bool textures_same(const ebpo_file *a, const ebpo_file *b)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     textures x = { 0 }, y = { 0 };
-    bool same = textures_read(&x, a, false, &error) != EBPO_OK ||
-                textures_read(&y, b, false, &error) != EBPO_OK;
-    if (!same) {
-        same = x.count == y.count && x.embedded == y.embedded;
-        for (int i = 0; i < IMAGES && same; i++)
-            same = x.list[i].count == y.list[i].count &&
-                   (!x.list[i].count ||
-                    memcmp(x.list[i].values, y.list[i].values, x.list[i].count) == 0);
+    bool equal = textures_read(&x, a, false, &error) != EBPO_OK ||
+                 textures_read(&y, b, false, &error) != EBPO_OK;
+    if (!equal) {
+        equal = x.count == y.count && x.embedded == y.embedded;
+        for (int i = 0; i < IMAGES && equal; i++)
+            equal = x.list[i].count == y.list[i].count &&
+                    (!x.list[i].count ||
+                     memcmp(x.list[i].values, y.list[i].values, x.list[i].count) == 0);
     }
     textures_free(&x);
     textures_free(&y);
-    return same;
+    return equal;
 }
 
 /* --- facts --- */
@@ -226,15 +226,15 @@ static void normalize_name(char *name)
 static char *safe_name(span s)
 {
     char *name = strndup(s.s, s.n);
-    bool good = name && strlen(name) == s.n;
-    for (char *c = name; good && *c; c++) {
+    bool is_printable = name && strlen(name) == s.n;
+    for (char *c = name; is_printable && *c; c++) {
         if (*c == '\\')
             *c = '/';
-        good = (unsigned char)*c >= ' ' && *c != 127;
+        is_printable = (unsigned char)*c >= ' ' && *c != 127;
     }
-    if (good)
+    if (is_printable)
         normalize_name(name);
-    if (good && stays_below(name))
+    if (is_printable && stays_below(name))
         return name;
     free(name);
     return NULL;
@@ -303,19 +303,20 @@ static bool write_file(int top, char *name, span bytes)
     bool named = fd < 0;
     if (named)
         fd = openat(folder, last, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0666);
-    bool good = fd >= 0 && write_all(fd, bytes) && (fsync(fd) == 0 || errno == EINVAL),
-         ours = named || (good && link_file(fd, folder, last));
-    good = good && ours;
+    bool complete = fd >= 0 && write_all(fd, bytes) && (fsync(fd) == 0 || errno == EINVAL),
+         /* this call has made the file of this name */
+        made = named || (complete && link_file(fd, folder, last));
+    complete = complete && made;
     int why = errno;
-    if (fd >= 0 && close(fd) != 0 && good) {
-        good = false;
+    if (fd >= 0 && close(fd) != 0 && complete) {
+        complete = false;
         why = errno;
     }
-    if (fd >= 0 && !good && ours)
+    if (fd >= 0 && !complete && made)
         unlinkat(folder, last, 0);
     close(folder);
     errno = why;
-    return good;
+    return complete;
 }
 
 /* Checks the names of all images in the file, before anything is written. */
@@ -352,16 +353,16 @@ static bool spans_equal(span a, span b)
 static bool is_repeated(const textures *t, uint64_t row)
 {
     char *name = safe_name(list_of(t, NAMES, row));
-    bool again = false;
-    for (uint64_t i = 0; i < row && name && !again; i++) {
+    bool repeated = false;
+    for (uint64_t i = 0; i < row && name && !repeated; i++) {
         if (!is_kept(t, i) || !spans_equal(list_of(t, IMAGES, i), list_of(t, IMAGES, row)))
             continue;
         char *before = safe_name(list_of(t, NAMES, i));
-        again = before && strcmp(before, name) == 0;
+        repeated = before && strcmp(before, name) == 0;
         free(before);
     }
     free(name);
-    return again;
+    return repeated;
 }
 
 /* Writes an image, and counts it in *written if it is a new file. */

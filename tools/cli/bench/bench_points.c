@@ -161,10 +161,10 @@ void bench_points_free(bench_points *p)
 int bench_save(FILE *stream, char *const *data, const size_t *size, const char *path)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    bool good = stream && !ferror(stream);
+    bool complete = stream && !ferror(stream);
     if (stream && fclose(stream) != 0)
-        good = false;
-    int code = !good ? command_no_memory("bench")
+        complete = false;
+    int code = !complete ? command_no_memory("bench")
                : ebpo_write_file(path, *data, *size, &error) == EBPO_OK
                    ? EXIT_OK
                    : command_failed("bench", &error);

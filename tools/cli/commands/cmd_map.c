@@ -171,12 +171,12 @@ static int lattice_of_grid(map_job *j)
     double numbers[3], low[3], high[3];
     uint64_t count[3];
     ebpo_error error = EBPO_ERROR_INIT;
-    bool good = args_read_reals(j->v->grid, 3, numbers);
-    for (int c = 0; c < 3 && good; c++) {
-        good = numbers[c] >= 1 && numbers[c] <= GRID_MAX && numbers[c] == floor(numbers[c]);
-        count[c] = good ? (uint64_t)numbers[c] : 0;
+    bool valid = args_read_reals(j->v->grid, 3, numbers);
+    for (int c = 0; c < 3 && valid; c++) {
+        valid = numbers[c] >= 1 && numbers[c] <= GRID_MAX && numbers[c] == floor(numbers[c]);
+        count[c] = valid ? (uint64_t)numbers[c] : 0;
     }
-    if (!good)
+    if (!valid)
         return refuse_value("--grid", j->v->grid, "three whole numbers, each from 1 to 1048576");
     int code = find_box(j, low, high);
     if (code != EXIT_OK)

@@ -136,11 +136,11 @@ static ebpo_status write_one(const comparison *c, const char *name,
     FILE *f = open_memstream(&text, &size);
     if (f)
         write(f, c);
-    bool good = f && !ferror(f);
+    bool complete = f && !ferror(f);
     if (f && fclose(f) != 0)
-        good = false;
+        complete = false;
     ebpo_status status = EBPO_E_MEMORY;
-    if (good)
+    if (complete)
         status = ebpo_write_file(path, text, size, error);
     else
         snprintf(error->message, sizeof error->message,

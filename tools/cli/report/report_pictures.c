@@ -97,13 +97,14 @@ static ebpo_status fit_camera(const comparison *c, ebpo_file *const *file, camer
         if (c->first > method_last(c, &c->methods[i]))
             continue;
         status = level_mesh(c, file[i], c->first, &level, error);
-        double *both =
-            status == EBPO_OK
-                ? realloc(all.xyz64, 3 * (all.vertex_count + level.vertex_count + 1) * sizeof *both)
-                : NULL;
-        if (both) {
-            memcpy(both + 3 * all.vertex_count, level.xyz64, 3 * level.vertex_count * sizeof *both);
-            all.xyz64 = both;
+        double *vertices =
+            status == EBPO_OK ? realloc(all.xyz64, 3 * (all.vertex_count + level.vertex_count + 1) *
+                                                       sizeof *vertices)
+                              : NULL;
+        if (vertices) {
+            memcpy(vertices + 3 * all.vertex_count, level.xyz64,
+                   3 * level.vertex_count * sizeof *vertices);
+            all.xyz64 = vertices;
             all.vertex_count += level.vertex_count;
         } else if (status == EBPO_OK) {
             status = no_memory(error);
