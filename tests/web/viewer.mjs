@@ -24,6 +24,7 @@ const { cutFaces, measureOf } = await load('queries.js'), { plates } = await loa
 const work = mkdtempSync(join(tmpdir(), 'ebpo-viewer-')), models = join(work, 'models'), log = join(work, 'access.log'), model = join(models, 'ring.ebpo.h5');
 const run = (program, args, input, env) => execFileSync(program, args, { encoding: 'utf8', input, env, stdio: ['pipe', 'pipe', 'pipe'], maxBuffer: 1 << 26 });
 const SIZE = { width: 800, height: 600 };
+const PATIENCE_MS = 120000; // for the page's reactions, also on a busy machine
 const cleanup = [() => rmSync(work, { recursive: true, force: true })];
 
 // --- the model, the server, the browser ---
@@ -80,6 +81,7 @@ async function browse() {
 const complaints = [];
 async function show(browser, address) {
   const page = await browser.newPage({ viewport: SIZE, colorScheme: 'dark', reducedMotion: 'reduce' });
+  page.setDefaultTimeout(PATIENCE_MS);
   page.on('pageerror', (e) => complaints.push(e.message));
   page.on('console', (m) => ['error', 'warning'].includes(m.type()) && !/GPU stall|WebGL-0x/.test(m.text()) && complaints.push(m.text()));
   await page.goto(address, { waitUntil: 'commit' });
@@ -88,7 +90,7 @@ async function show(browser, address) {
 
 const stateOf = (page) => page.evaluate(() => window.ebpoViewer?.state);
 async function settled(page) {
-  await page.waitForFunction(() => window.ebpoViewer?.state.idle || window.ebpoViewer?.state.error, undefined, { timeout: 120000, polling: 100 });
+  await page.waitForFunction(() => window.ebpoViewer?.state.idle || window.ebpoViewer?.state.error, undefined, { timeout: PATIENCE_MS, polling: 100 });
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   return stateOf(page);
 }
@@ -239,7 +241,7 @@ async function point(page) {
   const { info } = await open(readFileSync(model)), at = info.origin.map((o, k) => o + info.size[k] * [0.08, 0.45, 0.5][k]);
   for (const p of [at, info.origin.map((o, k) => o + info.size[k] / 2)]) {
     await page.evaluate((x) => window.ebpoViewer.probeAt(x), p);
-    await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: 30000 });
+    await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: PATIENCE_MS });
     const { probe } = await stateOf(page), line = p.join(' ') + '\n';
     assert.equal(probe.where.toUpperCase(), JSON.parse(run(ebpo, ['inside', '--json', model], line)).where);
     const { distance } = JSON.parse(run(ebpo, ['distance', '--json', '--unsigned', model], line));
@@ -265,7 +267,7 @@ async function click(page) {
   const [x0, y0, x1, y1] = (await look(page)).box;
   await page.keyboard.press('Escape');
   await page.mouse.click(x0 + (x1 - x0) * 0.5, y1 - (y1 - y0) * 0.12);
-  await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: 30000 });
+  await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: PATIENCE_MS });
   assert.ok((await stateOf(page)).probe.distance < 1e-12, 'a click queries a point of the real faces');
 }
 
@@ -273,7 +275,7 @@ async function fromDisk(page) {
   await page.keyboard.press('o');
   assert.ok(await page.isVisible('#start'));
   await page.setInputFiles('#file', model);
-  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: 30000 });
+  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: PATIENCE_MS });
   await settled(page);
   assert.equal(await page.textContent('#name'), 'ring.ebpo.h5');
   assert.equal(requests().length, 0);
@@ -297,7 +299,7 @@ async function errors(browser, address) {
 async function samples(browser, address) {
   const page = await show(browser, `${address}?samples=models/index.json`);
   await page.click('#samples a:has-text("ring")');
-  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: 30000 });
+  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: PATIENCE_MS });
   await page.close();
 }
 
@@ -415,7 +417,7 @@ async function dies(browser, { address, line }) {
   line.mode = 'dead';
   for (let i = 0; i < 6; i++)
     await page.keyboard.press('ArrowRight');
-  await page.waitForSelector('#stall:not([hidden]):has-text("Connection lost")', { timeout: 30000 });
+  await page.waitForSelector('#stall:not([hidden]):has-text("Connection lost")', { timeout: PATIENCE_MS });
   line.mode = 'good';
   await page.click('#stallRetry');
   const state = await settled(page);
@@ -431,7 +433,7 @@ async function statuses(browser, { address, line }) {
   for (const [status, what, next] of [[403, /403.*does not let this page/, /access/], [404, /404.*no such file/, /address/], [416, /416.*is empty/, /again/], [503, /503/, /later/]]) {
     line.mode = status;
     const page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=3`);
-    await page.waitForSelector('#error:not([hidden])', { timeout: 30000 });
+    await page.waitForSelector('#error:not([hidden])', { timeout: PATIENCE_MS });
     assert.match(await page.textContent('#errorWhat'), what);
     assert.match(await page.textContent('#errorNext'), next);
     line.mode = 'good';
@@ -526,7 +528,7 @@ async function readsPaint(browser, address, path) {
   run(ebpo, ['convert', '-q', baked, converted]);
   const page = await show(browser, address);
   await page.setInputFiles('#file', converted);
-  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: 30000 });
+  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: PATIENCE_MS });
   await settled(page);
   assert.ok(await red(page) > 500, 'what was baked is seen');
   await page.close();
