@@ -21,11 +21,12 @@
 #include "core/parallel.h"
 #include "query/query_model.h"
 
-/* Minimum and maximum number of rows in a range; maximum number of rows in a lap; maximum number of
- * points that are not sorted, because sorting them takes more time than it saves. */
+/* STRETCH_LEAST, STRETCH_MAX: limits of the number of rows in a range. LAP: maximum number of rows
+ * in a lap. UNORDERED: up to this number, points are not sorted, because sorting so few points
+ * takes more time than it saves. */
 enum { STRETCH_LEAST = 1 << 10, STRETCH_MAX = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
-/* Number of ranges for each thread. There are several, so that no thread waits long for the last
- * range of another thread. */
+/* Number of ranges for each thread. A thread gets several ranges, so that no thread waits long for
+ * the last range of another thread. */
 enum { STRETCHES_EACH = 4 };
 
 ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)
@@ -115,11 +116,11 @@ ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a, const double
 
 /* --- ranges of rows --- */
 
-/* The rows and results of a range, in the order of the curve. */
+/* The rows and results of a range, in the order of the Morton curve. */
 typedef struct gathered {
-    double *rows;
-    char *out;
-    uint64_t *model;
+    double *rows;    /* [rows of the range][job.width] */
+    char *out;       /* results, job.result bytes for each row */
+    uint64_t *model; /* for each row: index of the model that gave the result */
 } gathered;
 
 static ebpo_status query_gathered(const ebpo_catalogue_job *j, const uint32_t *order,

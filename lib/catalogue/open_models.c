@@ -4,9 +4,9 @@
  * face indices, and its share of the budget. All models of a catalogue have equal shares, of at
  * least an eighth of the budget. A model is opened by the first query that needs it. A thread that
  * queries a model holds the model, and the model's share is reserved while any thread holds the
- * model. When memory is short, models that no thread holds are closed, the least recently used
- * first. If memory is still short, the query waits until other queries end. A thread holds one
- * model at a time, so that no thread waits for itself.
+ * model. When the budget has no space for a further share, models that no thread holds are closed,
+ * the least recently used first. If the budget still has no space, the query waits until other
+ * queries end. A thread holds one model at a time, so that no thread waits for itself.
  *
  * The file is compared with its catalogue: the digest when the file is opened, and the box whenever
  * the model is lent, because two entries may describe one file differently.
@@ -41,29 +41,31 @@ typedef struct model_key {
 } model_key;
 
 struct ebpo_catalogue_held {
-    /* neighbours in the list of models, whose first model is the last used one */
+    /* neighbours in the list of models; the list begins with the most recently used model */
     ebpo_catalogue_held *before, *behind;
     model_key key; /* the model owns the texts of its key */
-    /* the lock of all models protects `users` and `bytes` */
-    unsigned users;          /* number of threads that hold the model */
-    uint64_t bytes;          /* bytes that are counted for the model */
-    pthread_mutex_t opening; /* protects the contexts, and the next fields until `model` is set */
-    pthread_rwlock_t query_lock; /* held exclusively by a query that must run alone */
+    /* ebpo_catalogue_models.lock protects `users` and `bytes` */
+    unsigned users; /* number of threads that hold the model */
+    uint64_t bytes; /* bytes of the budget that are counted for the model */
+    /* protects `idle` and `idle_count`; also `file`, `model` and `numbers` until `model` is set */
+    pthread_mutex_t opening;
+    pthread_rwlock_t query_lock; /* locked by each query: for writing if it must run alone */
     ebpo_file *file;
-    ebpo_model *_Atomic model; /* statistics are read from it without the lock for opening */
-    ebpo_catalogue_numbers numbers;
+    /* NULL: not open; atomic, because statistics are read without the lock `opening` */
+    ebpo_model *_Atomic model;
+    ebpo_catalogue_numbers numbers; /* face indices, if the key has a path of them */
     ebpo_context *idle[CONTEXTS_KEPT]; /* [idle_count] contexts that no thread uses */
     unsigned idle_count;
 };
 
 struct ebpo_catalogue_models {
-    unsigned threads, open_max;
-    pthread_mutex_t lock;              /* protects all fields below */
-    pthread_cond_t changed;            /* signalled when memory may have become available */
+    unsigned threads, open_max;        /* open_max: maximum number of models in the list */
+    pthread_mutex_t lock;              /* protects all fields that follow */
+    pthread_cond_t changed;            /* signalled when the budget may have more space */
     uint64_t memory;                   /* budget in bytes; 0: no limit */
     ebpo_catalogue_held *first, *last; /* list of all models */
-    unsigned held, busy;           /* number of models in the list; number of models with users */
-    uint64_t taken;                /* sum of the bytes of all models */
+    unsigned listed, busy;         /* number of models in the list; number of models with users */
+    uint64_t taken;                /* sum of `bytes` of all models */
     uint64_t closed;               /* number of closed models */
     ebpo_model_stats closed_stats; /* sums of the statistics of the closed models */
 };
@@ -265,19 +267,20 @@ static void drop_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
         h->closed++;
     }
     h->taken -= m->bytes;
-    h->held--;
+    h->listed--;
     unlink_model(h, m);
     held_free(m);
 }
 
+/* Returns true if the list has space for `more` models, and the budget for `size` more bytes. */
 static bool has_capacity(const ebpo_catalogue_models *h, uint64_t size, unsigned more)
 {
-    return h->held + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
+    return h->listed + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
 }
 
-/* Closes models that no thread holds, but not `kept`, until `size` more bytes are available.
- * Returns true if these bytes are available, or if no model is held, so that waiting would not make
- * memory available. */
+/* Closes models that no thread holds, except `kept`, until the budget has space for `size` more
+ * bytes. If `kept` is NULL, also makes space for a new model in the list. Returns true if there is
+ * space, or if no thread holds any model: then waiting would not make space. */
 static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *kept)
 {
     unsigned more = kept == NULL;
@@ -304,7 +307,7 @@ static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c
 }
 
 /* Returns the model with this key, which may be new, and counts the calling thread as its user.
- * Returns NULL when memory is short. */
+ * Waits while the budget has no space for the model's share. Returns NULL when out of memory. */
 static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
                                           model_key *key)
 {
@@ -320,7 +323,7 @@ static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_c
     }
     if (!m) {
         m = held_new(key);
-        h->held += m != NULL;
+        h->listed += m != NULL;
     } else {
         unlink_model(h, m);
     }
@@ -357,8 +360,8 @@ static void release_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 
 /* --- lending --- */
 
-/* Runs a query while no other query of the model runs. Idle contexts, which keep the last used
- * subtrees in memory, are freed first, so that their memory is available for this query. */
+/* Runs a query while no other query of the model runs. Frees idle contexts first: they keep the
+ * last used subtrees in memory, and this query may need that memory. */
 static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_query, void *user,
                                ebpo_error *error)
 {
@@ -432,8 +435,8 @@ ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *fac
 
 /* --- creating and freeing --- */
 
-/* Returns the maximum number of open models. They may use half of the file descriptors that the
- * system allows. */
+/* Returns the maximum number of open models. The models may use half of the file descriptors that
+ * the system allows this process. */
 static unsigned max_open_models(void)
 {
     struct rlimit limit;

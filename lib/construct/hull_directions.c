@@ -211,10 +211,10 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Removes the visible facets that no new facet has replaced: index[from] .. index[to - 1], in
- * ascending order. `count`: number of facets before. The facet with the greatest index is removed
- * first; each time, the last facet of the hull takes the removed facet's index. So the facet that
- * moves is never one that must still be removed. */
+/* Removes the visible facets that no new facet has replaced. Their indices are index[from] to
+ * index[to - 1], which ascend. `count`: number of facets before the removal. Facets are removed in
+ * descending order of index; each time, the last facet of the hull moves to the free index. So the
+ * facet that moves is never one that must still be removed. */
 static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--)

@@ -92,7 +92,8 @@ static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
     return true;
 }
 
-/* Makes candidates of the facets of the points' hull, without supports. Returns their number. */
+/* Makes a candidate for each facet of the hull of the points, largest facets first if there are too
+ * many. Supports are computed later. Returns the number of candidates. */
 static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 {
     ebpo_hull_facet facets[2 * LEAF_POINTS];
@@ -112,7 +113,8 @@ static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 /* --- many points, or all of them in a plane: the faces' directions --- */
 
 /* Makes candidates of the faces' normals (of every step-th face if there are many) and of the
- * opposite normals, which solids and surfaces without thickness need. Returns their number. */
+ * opposite normals: where all faces are in one plane, the opposite normals bound the other side of
+ * the envelope. Returns the number of candidates. */
 static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count,
                         ebpo_candidate *out)
 {
@@ -135,8 +137,9 @@ static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_
 
 /* --- offsets --- */
 
-/* Raises the support of each candidate to n . p plus the bound of the rounding error, if this is
- * greater. `n`: decoded normals of the candidates. */
+/* Raises the support of each candidate, if needed, so that the half-space n . x <= support contains
+ * the exact point. `n`: decoded normals of the candidates. `slack` bounds the error of each
+ * coordinate of `p`. */
 static void raise_supports(ebpo_candidate *c, double (*n)[3], int count, const double p[3],
                            double slack)
 {

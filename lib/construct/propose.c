@@ -61,8 +61,8 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* If a node has more candidates than about this number, only every n-th is kept, because k-medoids
- * compares all pairs. Only leaves of the deepest level have so many. */
+/* Approximate maximum number of candidates of a node. A node with more keeps every n-th candidate,
+ * because k-medoids compares all pairs. Only leaves of the deepest level have more. */
 enum { CANDIDATES_MAX = 4096 };
 
 static int by_rank(const void *a, const void *b)
@@ -122,8 +122,8 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     return p->b->thesis || sort_order(p, given);
 }
 
-/* Raises the candidate's support to n . point plus the bound of the rounding error, if this is
- * greater. `slack`: upper bound of the error of the point's coordinates. */
+/* Raises the candidate's support, if needed, so that the half-space n . x <= support contains the
+ * exact point. n is the decoded normal; `slack` bounds the error of each coordinate of `point`. */
 static void raise_support(ebpo_candidate *c, const double point[3], double slack)
 {
     int32_t n[3], d;

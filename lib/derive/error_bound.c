@@ -144,8 +144,8 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
         4 * b->frame.grain;
     if (measure->upper <= b->target || (measure->distance < 0 && corner <= -measure->distance))
         return EBPO_OK;
-    /* Also query the farthest corner. A corner may be on the envelope's rounded boundary, so it is
-     * moved a little towards the centre. */
+    /* Also query the farthest corner. Rounding may have put the corner outside the envelope, so the
+     * queried point is moved a little from the corner towards the centre. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
         xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
@@ -168,8 +168,8 @@ static ebpo_status begin_search(ebpo_bounder *b)
     ebpo_fragment *first = NULL;
     if (!ebpo_tree_find(b->model_tree, b->frame.cell, &node))
         return ebpo_fail(b->error, EBPO_E_ARGUMENT,
-                         "the model has no node for a node of level %d: the level and the model "
-                         "are not from the same file; pass the file of the model",
+                         "a node of level %d was not found in the model: the file of the level and "
+                         "the model do not belong together; open the model of the original file",
                          b->frame.cell.level);
     b->fragment_count = b->face_count = 0;
     if (node.type == EBPO_BLACK)
@@ -292,10 +292,10 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
  * and the caller uses its children, whose envelopes are smaller and closer to the model. */
 enum { NODE_QUERIES = 4096 };
 
-/* Results of earlier searches for a node. They determine the results for some other values of
- * max_error, because a search for a larger max_error never needs more queries (error_bound.h). The
- * upper bound of an earlier search is not kept: a search with this bound as max_error might use up
- * its queries before it finds the bound, and results must not depend on earlier calls. */
+/* Results of earlier searches for a node. They decide the test for some other values of max_error,
+ * because a search for a larger max_error never needs more queries (error_bound.h). The upper bound
+ * that an earlier search found is not kept: a search with this bound as max_error might use up its
+ * queries first and fail, and the result of a test must not depend on earlier calls. */
 typedef struct earlier_results {
     double enough; /* least max_error that was enough */
     double failed; /* largest max_error that was not enough */

@@ -6,8 +6,9 @@
  * children are omitted becomes a pruned node, and so does a leaf that is omitted. All arrays of a
  * level (ebpo_schema) are copied node by node for the remaining nodes. Faces keep their indices in
  * the source until subset_faces.c gives them new ones. With max_error, all envelopes of a level are
- * tested together (error_bound.h). Volumes are those of envelopes that are cut as in
- * ebpo_lod_level, but leaves are cut by stored planes only. */
+ * tested together (error_bound.h). The volume of a node is that of its envelope: the node's cell,
+ * cut by the planes that the file stores for the node and its ancestors. (If the file stores no
+ * planes of leaves, ebpo_lod_level derives them, but this file does without them.) */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -28,9 +29,9 @@
 
 /* An array with one value for each node of a type. */
 typedef struct kept_column {
-    const uint8_t *from;
-    uint8_t *to;
-    uint8_t size;         /* of a value in bytes */
+    const uint8_t *from;  /* array of the source */
+    uint8_t *to;          /* array of the result */
+    uint8_t size;         /* size of a value in bytes */
     int8_t default_value; /* value for nodes that are not in the source */
 } kept_column;
 
@@ -38,21 +39,21 @@ typedef struct kept_column {
 typedef struct kept_counts {
     ebpo_per per;          /* kind of the items */
     const uint8_t *counts; /* NULL: all counts are 0 */
-    uint8_t size;          /* of a count in bytes: 1 or 4 */
+    uint8_t size;          /* size of a count in bytes: 1 or 4 */
 } kept_counts;
 
 /* An array with the items of all nodes of a type. Several arrays may have the same counts. */
 typedef struct kept_list {
-    unsigned counts; /* index of its counts in kept_nodes.of_type[].count */
-    const uint8_t *from;
-    uint8_t *to;
-    uint8_t size; /* of an item in bytes */
+    unsigned counts;     /* index of the list's counts in kept_nodes.of_type[type].count */
+    const uint8_t *from; /* array of the source */
+    uint8_t *to;         /* array of the result */
+    uint8_t size;        /* size of an item in bytes */
 } kept_list;
 
-/* The copying of nodes from one level to another. */
+/* The copying of the nodes of one level from the source to the result. */
 typedef struct kept_nodes {
-    const ebpo_level *from;
-    ebpo_level *to;
+    const ebpo_level *from; /* the level of the source: the groups that were read */
+    ebpo_level *to;         /* the level of the result */
     struct {
         kept_column column[EBPO_LEVEL_ARRAYS];
         kept_counts count[EBPO_LEVEL_ARRAYS];
@@ -116,10 +117,10 @@ static void record_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
                      .size = ebpo_schema[id].held_size };
 }
 
-/* Begins to copy nodes. Makes the arrays of `to` that are needed for any of `needs`
- * (EBPO_NEEDS_...), with space for all nodes of `from` and for `more` nodes of each type. Leaves
- * may become gray nodes, so the arrays of planes also have space for the planes of leaves. Returns
- * false when out of memory. */
+/* Begins to copy nodes. Makes the arrays of `to` that at least one bit of `needs` (EBPO_NEEDS_...)
+ * requires. Each array has space for all entries of `from`, and for more[type] new nodes of each
+ * type. Leaves may become gray nodes, so the arrays of planes also have space for the planes of
+ * leaves. Returns false when out of memory. */
 static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
                        const uint64_t more[4])
 {
@@ -171,7 +172,7 @@ static uint64_t kept_items(const kept_counts *c, uint64_t rank)
     return count;
 }
 
-/* Adds a node to the level's count; returns the node's rank. */
+/* Adds one to the level's number of nodes of a type. Returns the rank of the added node. */
 static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 {
     uint64_t index = ebpo_level_count(level, per_of(type));
@@ -245,9 +246,10 @@ typedef struct descent {
     ebpo_level from, *to; /* the needed groups of the source's level; the level of the result */
     kept_nodes kept;      /* copies nodes from `from` to `to` */
     gray *parent, *child; /* gray nodes of the result: of the level above, and of this level */
-    ebpo_tolerance_node *tolerance_nodes; /* gray nodes and leaves in order; NULL: no max_error */
-    uint64_t next_tolerance_node;         /* index in tolerance_nodes */
     uint64_t parent_count, child_count;
+    /* gray nodes and leaves of `from` in stored order; NULL: no max_error */
+    ebpo_tolerance_node *tolerance_nodes;
+    uint64_t next_tolerance_node; /* index in tolerance_nodes of the next gray node or leaf */
     uint64_t group; /* current group of the result, which is the index of its parent in `parent` */
     uint64_t nonempty_groups; /* number of groups of this level of the result that have nodes */
     bool has_next_level;      /* some gray node of this level has children in the result */
@@ -286,8 +288,8 @@ static void hint_subtrees(const descent *d)
     free(roots);
 }
 
-/* Reads the needed groups of the level into d->from, and finds for each of their gray nodes the
- * group of its children. Needed groups that are neighbours in the source are read as one run. */
+/* Reads the needed groups of the level into d->from. For each gray node read, stores the index of
+ * its children's group. Needed groups that are neighbours in the source are read as one run. */
 static ebpo_status pick_level(descent *d)
 {
     uint64_t count = 0;
@@ -316,10 +318,11 @@ static ebpo_status pick_level(descent *d)
             status = ebpo_fail_memory(d->c->error,
                                       (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
     }
-    /* The index of the group of a gray node's children is the gray node's rank in the source, and
-     * the runs give these ranks. They are stored at the end of d->child. The front of the array is
-     * filled later, with gray nodes and with leaves that become pruned nodes. No stored rank is
-     * overwritten before it is read, because each node takes at most one entry. */
+    /* The index of the children's group is the gray node's rank in the source, which the runs give.
+     * The index for gray node r of d->from is stored in entry leaf_count + r of d->child. The front
+     * of the array is filled later, with gray nodes and with leaves that become pruned nodes.
+     * Before entry leaf_count + r is read, at most r gray nodes and leaf_count leaves have each
+     * filled one entry at the front, so the entry is not overwritten. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
@@ -327,7 +330,7 @@ static ebpo_status pick_level(descent *d)
     return status;
 }
 
-/* Makes the arrays of the level of the result. */
+/* Makes the arrays of the result's level. */
 static ebpo_status reserve_space(descent *d)
 {
     const ebpo_level *f = &d->from;
@@ -369,8 +372,8 @@ static void copy_gray(descent *d, ebpo_cell cell)
     add_child(d, cell, group);
 }
 
-/* Adds the stored planes of the next leaf to the last gray node of the result, which replaces it.
- */
+/* Adds the stored planes of the next leaf to the gray node that replaces the leaf: the last gray
+ * node of the result. */
 static void add_leaf_planes(descent *d)
 {
     const ebpo_level *f = &d->from;
@@ -447,8 +450,8 @@ static void copy_group(descent *d, uint64_t group, uint16_t types)
 
 /* --- the decision which envelopes of a level are close enough --- */
 
-/* With max_error, tests the envelopes of the level's gray nodes and leaves, as far as the results
- * are needed. */
+/* With max_error, tests the envelopes of those gray nodes and leaves of the level that would
+ * otherwise keep their children or stay leaves. */
 static ebpo_status judge_level(descent *d)
 {
     uint64_t next = 0, count = 0;
@@ -489,7 +492,9 @@ static ebpo_status cut_level(descent *d)
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
         if (d->parent[i].group == NO_GROUP)
-            for (int k = 0; k < 8; k++) /* the group of a pruned node has eight white entries */
+            /* The group of a pruned node is stored as eight white nodes, with the types word 0. So
+             * it also has values in the arrays of white nodes. */
+            for (int k = 0; k < 8; k++)
                 kept_add(&d->kept, EBPO_WHITE);
         else
             copy_group(d, i, d->from.types[next++]);
@@ -541,7 +546,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     free(d.parent);
     if (status != EBPO_OK)
         return status;
-    /* cut: nodes of the source are missing; empty: a gray node has no children in the result */
+    /* cut: nodes of the source are missing; empty: some gray node has no children in the result */
     bool cut = false, empty = false;
     for (int i = 0; i < info->level_count; i++) {
         empty = empty || c->out->level[i].pruned_count;
@@ -577,8 +582,9 @@ static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const u
     ++*node;
 }
 
-/* Adds the volumes of the envelopes in the next group of the level, and below it, to the volumes of
- * the levels. `parent` is the envelope of the group's parent; NULL: the group is the root's. */
+/* Adds the volumes of the envelopes of the level's next group, and of all groups below it, to the
+ * volumes of their levels. `parent` is the envelope of the group's parent; NULL: the group is that
+ * of the root. */
 static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
 {
     ebpo_tree *tree = m->c->out;
