@@ -31,7 +31,7 @@ typedef struct cache_slot {
     uint64_t key, bytes; /* bytes: size of the item */
     cache_slot_state state;
     unsigned pins, waiters;           /* number of pins, and of threads that wait for the load */
-    void *item;                       /* if READY */
+    void *item;                       /* set if the slot is READY */
     struct cache_slot *chain;         /* next slot in the bucket, or in a list of leaving items */
     struct cache_slot *older, *newer; /* READY and not pinned: neighbours in order of last use */
 } cache_slot;
@@ -45,11 +45,13 @@ typedef struct cache_slots {
 } cache_slots;
 
 struct ebpo_cache_pool {
-    uint64_t budget;        /* bytes; 0: no limit */
-    pthread_mutex_t lock;   /* protects all members below; never held while a source is called */
+    uint64_t budget; /* bytes; 0: no limit */
+    /* protects all members that follow, and the caches of the pool; never held while a source is
+     * called */
+    pthread_mutex_t lock;
     pthread_cond_t changed; /* broadcast when a load has ended or memory has become free */
     cache_slots slots;
-    /* bytes of all caches and of ebpo_cache_pool_take: now, and greatest so far */
+    /* bytes that all caches and ebpo_cache_pool_take use: now, and greatest so far */
     uint64_t bytes, peak_bytes;
     uint64_t pinned;    /* bytes of pinned items */
     uint64_t taken;     /* bytes that ebpo_cache_pool_take has reserved */
@@ -57,8 +59,8 @@ struct ebpo_cache_pool {
     /* bytes reserved for running loads, and bytes of items that are being released: they will
      * become free or pinned when the loads and releases end */
     uint64_t passing;
-    /* number of reservations that have waited or wait; number of those that have ended. Each waits
-     * until `serving` is its ticket */
+    /* tickets: number of tickets given so far. Each reservation takes one, except those of the
+     * background threads and of bytes set aside. serving: the ticket whose turn it is */
     uint64_t tickets, serving;
 };
 
@@ -70,18 +72,20 @@ struct ebpo_cache {
     /* signalled when the background thread has work; separate from `changed`, because each unpin
      * broadcasts `changed`, which would wake the thread */
     pthread_cond_t work_added;
-    uint64_t aside_max, aside; /* bytes set aside, and those of them that are used */
-    uint64_t leaving;          /* number of items that are out of the table and being released */
+    /* aside_max: bytes set aside (ebpo_cache_set_aside); aside: how many of these bytes are used */
+    uint64_t aside_max, aside;
+    uint64_t leaving; /* number of items that are out of the table and being released */
     ebpo_cache_stats stats;
-    bool ahead_runs, stop;            /* the background thread was started; the thread must end */
+    bool ahead_runs;                  /* true: the background thread was started */
+    bool stop;                        /* true: the background thread must end */
     pthread_t ahead_thread;           /* the background thread */
     uint64_t ahead[EBPO_CACHE_AHEAD]; /* [ahead_count] keys of the latest prefetch */
     unsigned ahead_count, ahead_next; /* ahead_next: index of the next key to load */
     uint64_t prefetch_count;          /* number of calls of ebpo_cache_prefetch */
 };
 
-/* A request for a reservation. Requests of the background thread wait for all other requests, and
- * drop no item of the same prefetch. */
+/* A request to reserve bytes. Requests of the background thread wait until no other request waits,
+ * and drop no item of the same prefetch. */
 typedef struct cache_demand {
     ebpo_cache *cache;  /* NULL: ebpo_cache_pool_take */
     uint64_t key, peak; /* peak: bytes to reserve */
@@ -90,13 +94,16 @@ typedef struct cache_demand {
     bool known;         /* true: `peak` is known from an earlier attempt */
 } cache_demand;
 
-/* Result of a reservation: made; possible later, when running loads end; never possible. */
+/* Result of a reservation. CAPACITY_LATER: the bytes are not free now, but will be when running
+ * loads and releases end. CAPACITY_NEVER: the budget is too small for the items in use and these
+ * bytes. */
 typedef enum cache_capacity { CAPACITY_MADE, CAPACITY_LATER, CAPACITY_NEVER } cache_capacity;
 
-/* The functions below are called with the lock held, and may release the lock for a time. */
+/* Static functions are called with the pool's lock held, unless their comment says otherwise. Those
+ * that wait, or call a source, release the lock meanwhile. */
 
-/* Makes an empty table. Returns false if memory is short. The caller frees the slots, and then
- * t->bucket. */
+/* Makes an empty table; the lock does not exist yet. Returns false when out of memory. The caller
+ * frees the slots, and then t->bucket. */
 static bool make_slots(cache_slots *t)
 {
     enum { BUCKETS = 64 };
@@ -121,7 +128,8 @@ static cache_slot *find_slot(const cache_slots *t, const struct ebpo_cache *owne
     return s;
 }
 
-/* Enlarges the table; if memory is short, the chains stay long. */
+/* Doubles the number of buckets. If the allocation fails, the table stays as it is, with long
+ * chains. */
 static void grow_table(cache_slots *t)
 {
     uint64_t count = 2 * t->bucket_count;
@@ -140,8 +148,8 @@ static void grow_table(cache_slots *t)
     t->bucket_count = count;
 }
 
-/* Adds a slot with the state LOADING to the table, but not to the order of use. Returns NULL if
- * memory is short. */
+/* Adds a slot with the state LOADING to the table, but not to the order of last use. Returns NULL
+ * when out of memory. */
 static cache_slot *add_slot(cache_slots *t, struct ebpo_cache *owner, uint64_t key)
 {
     cache_slot *s = ebpo_alloc_zero(1, sizeof *s);
@@ -184,6 +192,7 @@ static void unlink_slot(cache_slots *t, cache_slot *s)
 
 /* --- reservations in a budget: the least recently used item of any cache is dropped first --- */
 
+/* Adds bytes to those of the pool and of the cache `c` (NULL: no cache). */
 static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
 {
     p->bytes += bytes;
@@ -205,8 +214,9 @@ static bool is_in_prefetch(const ebpo_cache *c, uint64_t key)
     return false;
 }
 
-/* Releases items that are out of the table. Their bytes count until they are released; otherwise
- * another thread would reserve memory that is still in use. */
+/* Releases the items of the list `leaving`, which are out of the table. The bytes of an item are
+ * counted until it is released; otherwise another thread would reserve memory that is still in use.
+ */
 static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
 {
     if (!leaving)
@@ -237,8 +247,8 @@ static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
     *leaving = s;
 }
 
-/* Returns the bytes of the unpinned items that must not be dropped for a reservation of the
- * background thread, because they are in the same prefetch. */
+/* Returns the bytes of the unpinned items that must not be dropped for this request: for a request
+ * of the background thread, the items of the same prefetch; otherwise 0. */
 static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t bytes = 0;
@@ -254,22 +264,22 @@ static uint64_t saturated_sum(uint64_t a, uint64_t b)
     return a > UINT64_MAX - b ? UINT64_MAX : a + b;
 }
 
-/* Returns the bytes that are needed even if all items are dropped that may be dropped: those in use
- * or set aside, and those of the reservation. */
-static uint64_t held_for(const ebpo_cache_pool *p, const cache_demand *d)
+/* Returns the least budget with which the request is possible after all items are dropped that may
+ * be dropped. It is the sum of the bytes in use, set aside, and requested. */
+static uint64_t least_budget(const ebpo_cache_pool *p, const cache_demand *d)
 {
-    uint64_t held = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_max);
-    return saturated_sum(saturated_sum(held, kept_for(p, d)), d->aside ? 0 : d->peak);
+    uint64_t used = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_max);
+    return saturated_sum(saturated_sum(used, kept_for(p, d)), d->aside ? 0 : d->peak);
 }
 
 /* Reserves d->peak bytes. Drops the least recently used items if necessary. */
 static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
 {
     while (p->budget && saturated_sum(p->bytes, d->peak) > p->budget) {
-        uint64_t held = held_for(p, d);
-        if (held > p->budget)
+        uint64_t least = least_budget(p, d);
+        if (least > p->budget)
             return CAPACITY_NEVER;
-        if (saturated_sum(held, p->passing) > p->budget)
+        if (saturated_sum(least, p->passing) > p->budget)
             return CAPACITY_LATER;
         cache_slot *leaving = NULL;
         uint64_t total = saturated_sum(p->bytes, d->peak);
@@ -288,8 +298,8 @@ static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
     return CAPACITY_MADE;
 }
 
-/* Waits until all earlier reservations have ended, then reserves as reserve_space does, and waits
- * for free memory. Returns false if the budget will never have enough. */
+/* Waits until all earlier requests have ended, and then until reserve_space has reserved the bytes.
+ * Returns false if the budget is too small (CAPACITY_NEVER). */
 static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t ticket = p->tickets++;
@@ -301,7 +311,7 @@ static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
     return result == CAPACITY_MADE;
 }
 
-/* Returns the reservation of a load to the budget. */
+/* Gives the bytes that were reserved for a load back to the budget. */
 static void give_back_reserved(ebpo_cache *c, uint64_t reserved)
 {
     c->stats.bytes -= reserved;
@@ -342,7 +352,7 @@ ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *p, uint64_t bytes, ebpo_error 
     cache_demand d = { .peak = bytes };
     pthread_mutex_lock(&p->lock);
     bool made = wait_in_turn(p, &d);
-    uint64_t held = held_for(p, &d);
+    uint64_t sufficient = least_budget(p, &d);
     if (made) {
         p->passing -= bytes;
         p->taken += bytes;
@@ -352,7 +362,7 @@ ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *p, uint64_t bytes, ebpo_error 
                 : ebpo_fail(error, EBPO_E_LIMIT,
                             "%" PRIu64 " bytes are not free in a shared budget of %" PRIu64 " bytes"
                             "; a budget of %" PRIu64 " bytes would suffice",
-                            bytes, p->budget, held);
+                            bytes, p->budget, sufficient);
 }
 
 void ebpo_cache_pool_give_back(ebpo_cache_pool *p, uint64_t bytes)
@@ -383,7 +393,8 @@ static void pin_slot(ebpo_cache *c, cache_slot *s)
 
 /* --- loading --- */
 
-/* Waits for a reservation of `peak` bytes; fails if the budget can never hold them. */
+/* Waits until `peak` bytes are reserved. Fails if the budget is too small for the items in use and
+ * these bytes. */
 static ebpo_status wait_for_capacity(ebpo_cache *c, uint64_t peak, ebpo_error *error)
 {
     ebpo_cache_pool *p = c->pool;
@@ -421,7 +432,7 @@ static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserve
     }
 }
 
-/* Sets *peak to the bytes that loading a key takes. The lock is not held. */
+/* Sets *peak to the bytes that loading a key takes. Called without the lock. */
 static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_error *error)
 {
     uint64_t keep = 0;
@@ -431,8 +442,9 @@ static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, e
     return status;
 }
 
-/* Calls the source to load an item; the lock is not held. If the item is larger than `reserved`,
- * drops the item and fails. *needed: bytes that the source requests instead of `reserved`, or 0. */
+/* Calls the source to load an item with the `reserved` bytes. Called without the lock. If the item
+ * is larger, releases the item and fails. If the source refuses to load with so few bytes, sets
+ * *needed to the bytes that it requests; otherwise to 0. */
 static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
@@ -454,8 +466,8 @@ static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, ui
     return status;
 }
 
-/* Loads the item of slot s, and enlarges the reservation whenever the source requests this.
- * *reserved: bytes to give back when the load ends. The lock is held at beginning and end. */
+/* Loads the item of slot s with a reservation of `peak` bytes, and enlarges the reservation
+ * whenever the source requests this. *reserved: bytes to give back when the load ends. */
 static ebpo_status load_with_capacity(ebpo_cache *c, cache_slot *s, uint64_t peak,
                                       uint64_t *reserved, ebpo_error *error)
 {
@@ -476,7 +488,7 @@ static ebpo_status load_with_capacity(ebpo_cache *c, cache_slot *s, uint64_t pea
     }
 }
 
-/* Loads an item on this thread, and pins it. The lock is held at beginning and end. */
+/* Loads an item on this thread, and pins it. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
     /* after this line, other threads that need the key wait for this load */
@@ -514,8 +526,8 @@ static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
     return false;
 }
 
-/* Pins the item of a key that was not in memory. Waits if another thread loads the item, else loads
- * it on this thread. */
+/* Pins the item of a key that was not in memory. If another thread loads the item, waits for this
+ * load; otherwise loads the item on this thread. */
 static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
     for (cache_slot *s; (s = find_slot(&c->pool->slots, c, key)) != NULL;) {
@@ -530,7 +542,7 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
     return load_here(c, key, item, error);
 }
 
-/* Pins the item of a key and returns true if the item is in memory. */
+/* If the item of a key is in memory, pins it and returns true; otherwise returns false. */
 static bool pin_ready(ebpo_cache *c, uint64_t key, void **item)
 {
     cache_slot *s = find_slot(&c->pool->slots, c, key);
@@ -624,9 +636,9 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
 
 /* --- prefetch --- */
 
-/* Loads the item of d->key in the background, or skips it. Returns false if the load must wait for
- * other loads. The slot is removed in this case, so that a thread that needs the item can load it.
- */
+/* Loads the item of d->key on the background thread. Skips the item if it is in memory, another
+ * thread loads it, or the budget is too small. Returns false if the load must wait for other loads;
+ * then the slot is removed, so that a thread that needs the item can load it. */
 static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
     cache_slot *s =
@@ -654,7 +666,8 @@ static bool load_ahead(ebpo_cache *c, cache_demand *d)
     return true;
 }
 
-/* Loads the keys of the latest prefetch: the function of the background thread. */
+/* Loads the keys of the latest prefetch. This is the function of the background thread, which
+ * begins without the lock. */
 static void *run_ahead(void *context)
 {
     ebpo_cache *c = context;
@@ -680,8 +693,8 @@ static void *run_ahead(void *context)
     return NULL;
 }
 
-/* Starts the background thread with signals blocked, because signals are for the program's own
- * threads. */
+/* Starts the background thread with all signals blocked, because the threads of the calling program
+ * must receive them. Returns false if the thread cannot be started. */
 static bool start_ahead(ebpo_cache *c)
 {
     sigset_t all, before;
@@ -692,8 +705,9 @@ static bool start_ahead(ebpo_cache *c)
     return started;
 }
 
-/* Replaces the list of keys to load in the background, without repetitions. Makes items that are in
- * memory the most recently used: the item of the first key the newest, because it is used next. */
+/* Replaces the list of keys to load in the background, without repetitions. Items of these keys
+ * that are already in memory move to the newest end of the order of last use. The item of the first
+ * key becomes the newest, because it is used next. */
 static void replace_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     c->ahead_count = c->ahead_next = 0;
@@ -751,7 +765,7 @@ ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, c
     return status;
 }
 
-/* Drops unpinned items; the lock is held. */
+/* Drops all unpinned items of a cache. */
 static void drop_unpinned(ebpo_cache *c)
 {
     cache_slot *leaving = NULL;
@@ -777,6 +791,7 @@ void ebpo_cache_get_stats(ebpo_cache *c, ebpo_cache_stats *out)
     pthread_mutex_unlock(&c->pool->lock);
 }
 
+/* Ends the background thread, and waits for its end. Called without the lock. */
 static void stop_ahead(ebpo_cache *c)
 {
     pthread_mutex_lock(&c->pool->lock);
@@ -796,7 +811,9 @@ void ebpo_cache_free(ebpo_cache *c)
     stop_ahead(c);
     pthread_mutex_lock(&p->lock);
     drop_unpinned(c);
-    while (c->leaving) /* other threads have dropped items for reservations and release them now */
+    /* Other threads may have dropped items of this cache for their requests, and release them now.
+     */
+    while (c->leaving)
         pthread_cond_wait(&p->changed, &p->lock);
     p->bytes -= c->aside;
     p->aside_max -= c->aside_max;

@@ -13,15 +13,15 @@ typedef struct ebpo_cache ebpo_cache;
  * they may only call ebpo_cache_take_aside. */
 typedef struct ebpo_cache_source {
     void *user;
-    /* Estimates the memory for an item. *peak: bytes that loading takes, including the item, which
-     * are reserved before loading. *keep: bytes of the loaded item. */
+    /* Estimates the memory for an item. *peak: bytes that loading takes, including the item. They
+     * are reserved before the item is loaded. *keep: bytes of the loaded item. */
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error);
-    /* Loads an item with at most `most` bytes of memory: the estimate, or UINT64_MAX without a
-     * budget. *bytes: size of the item. If `most` is not sufficient, load returns EBPO_E_LIMIT and
-     * sets *bytes to a sufficient number above `most`; the cache then reserves this number and
-     * calls load again. If the item is larger than `most`, it is dropped, and ebpo_cache_get fails
-     * with EBPO_E_LIMIT. */
+    /* Loads an item with at most `most` bytes of memory: the reserved bytes, or UINT64_MAX if there
+     * is no budget. *bytes: size of the item. If `most` is not sufficient, load returns
+     * EBPO_E_LIMIT and sets *bytes to a sufficient number above `most`; the cache then reserves
+     * this number and calls load again. If load succeeds but the item is larger than `most`, the
+     * cache releases the item, and ebpo_cache_get fails with EBPO_E_LIMIT. */
     ebpo_status (*load)(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
                         ebpo_error *error);
     /* Frees an item. */
@@ -32,7 +32,7 @@ typedef struct ebpo_cache_stats {
     uint64_t hits;  /* number of calls of ebpo_cache_get and ebpo_cache_try that found an item */
     uint64_t loads; /* number of items that ebpo_cache_get has loaded */
     uint64_t prefetched; /* number of items that the background thread has loaded */
-    uint64_t evicted;    /* number of items that were dropped to free memory */
+    uint64_t evicted;    /* number of items that were dropped so that others fit in the budget */
     /* bytes of items, of reservations for running loads, and of used bytes that were set aside:
      * now, and greatest so far */
     uint64_t bytes, peak_bytes;

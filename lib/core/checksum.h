@@ -19,10 +19,10 @@ void ebpo_sha256_end(ebpo_sha256 *state, uint8_t digest[32]);
 /* Writes lower-case hexadecimal digits and a terminating zero byte. */
 void ebpo_sha256_hex(const uint8_t digest[32], char hex[65]);
 
-/* The functions below compare a computed checksum with the checksum that a file states. All
- * comparisons are here, so that a fuzzing build (`-Dfuzzing=true`, never installed) can skip them:
- * otherwise damaged input would be rejected by its checksum and never reach the code after the
- * comparison. */
+/* ebpo_sum_differs and ebpo_digest_differs compare a computed checksum with the checksum that a
+ * file states. All comparisons of checksums are in these two functions, so that a fuzzing build
+ * (`-Dfuzzing=true`, never installed) can skip them: with comparisons, damaged input would be
+ * rejected by its checksum, and would never reach the code that the fuzzer tests. */
 
 #ifdef EBPO_FUZZING
 enum { EBPO_CHECKSUMS_COMPARED = 0 };

@@ -1,8 +1,8 @@
 /* Fills in errors, and reads and writes versioned structs, for all public functions. An error has a
  * status and a message that names file and object; callers pass on the first cause. Structs that
  * begin with their size (ebpo/base.h) work for callers that were compiled with an older or newer
- * version of the header: as many bytes as the caller's struct has are read from options and written
- * to results. Members of options that this version does not know must be 0. */
+ * version of the header: the library reads from options, and writes to results, only as many bytes
+ * as the caller's struct has. Members of options that this version does not know must be 0. */
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -116,8 +116,8 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
     return EBPO_E_IO;
 }
 
-/* Limits for struct_size, so that a value that is not initialised is detected. A struct has at
- * least its size and one more member. */
+/* Limits of struct_size: a value outside of them was not initialised by the caller. A struct has at
+ * least the member struct_size and one more member. */
 enum { SMALLEST = 2 * sizeof(size_t), LARGEST = 8192 };
 
 static bool is_plausible_size(size_t size)

@@ -15,8 +15,8 @@ ebpo_status ebpo_fail_file(ebpo_error *error, ebpo_status status, const char *fi
                            const char *format, ...) EBPO_PRINTF(4, 5);
 
 /* Same as ebpo_fail, for an error about an object in a file: the message becomes "FILE: OBJECT:
- * ...". `object` "": no object. `offset`: offset of the wrong byte, a member of the error; -1: not
- * known. */
+ * ...". `object` "": no object. `offset`: offset of the wrong byte in the file, for error->offset;
+ * -1: not known. */
 ebpo_status ebpo_fail_at(ebpo_error *error, ebpo_status status, const char *file,
                          const char *object, int64_t offset, const char *format, ...)
     EBPO_PRINTF(6, 7);
@@ -31,8 +31,9 @@ ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes);
 /* Returns EBPO_E_IO, with the message "PATH: WHAT: " and the text of errno. */
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what);
 
-/* Structs that begin with their size (ebpo/base.h). The macros below read the caller's options and
- * fill in the caller's results, for any version of the header that the caller was compiled with. */
+/* EBPO_TAKE reads the caller's options, and EBPO_GIVE fills in the caller's results. Both are
+ * structs that begin with their size (ebpo/base.h), so the caller may have been compiled with any
+ * version of the header. */
 
 /* Reads the caller's options `given` into *own, which has the defaults. If `given` is NULL, *own
  * does not change. EBPO_E_ARGUMENT: struct_size is not set. EBPO_E_UNSUPPORTED: a member is set
@@ -46,9 +47,9 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
 /* Returns EBPO_E_ARGUMENT when the caller's result struct does not state its size. */
 #define EBPO_CHECK_SIZED(type, out, error) ebpo_sized_check((out)->struct_size, #type, error)
 
-/* Copies the members of *filled that the caller's struct has to *out. Sets members of *out that
- * *filled lacks to 0. Keeps the caller's struct_size. Returns EBPO_E_ARGUMENT and writes nothing if
- * struct_size is not set. */
+/* Copies *filled to the caller's struct *out, as far as *out has the members. Members of *out that
+ * *filled lacks become 0. Keeps the caller's struct_size. If struct_size is not set, returns
+ * EBPO_E_ARGUMENT and writes nothing. */
 #define EBPO_GIVE(type, out, filled) \
     ebpo_sized_give((out), (out)->struct_size, (filled), sizeof(type))
 

@@ -18,8 +18,9 @@ typedef struct ebpo_fp_env {
     unsigned control;
 } ebpo_fp_env;
 
-/* Mask of the control register without the six exception flags, and its default: all exceptions
- * masked, rounding to nearest, no flush to zero, no denormals-are-zero. */
+/* EBPO_FP_CONTROL: mask of the control register's bits that are not exception flags.
+ * EBPO_FP_DEFAULT: the default of these bits: all exceptions masked, rounding to nearest, no flush
+ * to zero, no denormals-are-zero. */
 enum { EBPO_FP_CONTROL = 0xffc0, EBPO_FP_DEFAULT = 0x1f80 };
 
 /* Sets the default environment. The asm prevents the compiler from moving memory reads, and

@@ -25,12 +25,12 @@ static inline double ebpo_seconds(void) { return 1e-9 * (double)ebpo_clock(); }
 int ebpo_cores(void);
 
 /* Advises the system to use pages of 2 MiB for an array, as far as such pages are completely within
- * the array. Otherwise address translation takes a fifth of the time of a search in a large model.
- * Call this function before the array is filled. Any pointer and size are allowed. */
+ * the array. With pages of 4 KiB, address translation takes a fifth of the time of a search in a
+ * large model. Call this function before the array is filled. Any pointer and size are allowed. */
 void ebpo_prefer_huge_pages(void *array, size_t bytes);
 
-/* Returns the memory of the machine in bytes, or the lowest limit of the control groups (such as
- * containers) of this process, if this limit is less. */
+/* Returns the memory of the machine in bytes. If a control group of this process (as in a
+ * container) has a lower limit, returns the lowest limit. */
 uint64_t ebpo_machine_memory(void);
 
 /* Returns the last separator of a path: '/', on Windows also '\\'. Returns NULL if there is none.
@@ -60,7 +60,7 @@ static inline bool ebpo_path_is_absolute(const char *path)
 int ebpo_open_unnamed(const char *folder);
 
 /* Removes the temporary file that another thread is creating, if the file has a name at this
- * moment. For signal handlers, just before the process ends. */
+ * moment. Signal handlers call this function just before the process ends. */
 void ebpo_workspace_abandon(void);
 
 #endif

@@ -11,7 +11,7 @@
 
 #include "core/os.h"
 
-enum { PATH_BYTES = 4096 + 64 }; /* the longest path of a folder, and a file name */
+enum { PATH_BYTES = 4096 + 64 }; /* space for the longest path of a folder, and a file name in it */
 
 /* The path of the file that has a name at this moment, for ebpo_workspace_abandon in a signal
  * handler. The lock is held from before the file exists until its name is removed. */

@@ -1,8 +1,8 @@
 /* Reads the machine's properties from the operating system: instruction sets, cores, and the memory
- * that this process may use; and advises the system on large pages. The memory is the memory of the
- * machine, or the lowest limit of the control groups of this process (as in containers; version 1
- * or 2, cgroups(7)). On systems without the files in /proc and /sys, the values come from sysconf.
- */
+ * that this process may use. Also advises the system on large pages. The memory is that of the
+ * machine, or the lowest limit of the control groups of this process (as in a container), if this
+ * is less. Control groups of version 1 and 2 are supported (cgroups(7)). On systems without the
+ * files in /proc and /sys, the values come from sysconf. */
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -56,10 +56,12 @@ static uint64_t number_of(const char *path, const char *word)
     return value;
 }
 
-/* Names in one version of control groups: the folder of all groups; the files in a group's folder
- * with its limit and its used memory; the word in memory.stat for cached file data. */
+/* The names that one version of control groups uses. */
 typedef struct group_files {
-    const char *mounted, *limit, *used, *cached;
+    const char *mounted; /* folder that has the folders of all groups */
+    const char *limit;   /* file in a group's folder with the memory limit */
+    const char *used;    /* file in a group's folder with the used memory */
+    const char *cached;  /* word in a group's file memory.stat for cached file data */
 } group_files;
 static const group_files files_of[] = {
     { "/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file" },
@@ -67,9 +69,9 @@ static const group_files files_of[] = {
       "total_inactive_file" },
 };
 
-/* Returns the least of `least` and the limits of the group `path` and all groups above it. If
- * `free` is true, uses the free memory of the groups instead of the limits; cached file data count
- * as free. Changes `path`. */
+/* Returns the least of these values: `least`, and the limits of the group `path` and of all groups
+ * above it. If `free` is true, uses the free memory of each group in place of its limit; cached
+ * file data count as free. Changes `path`. */
 static uint64_t least_limit(const group_files *files, char *path, bool free, uint64_t least)
 {
     for (;;) {

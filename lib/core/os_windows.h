@@ -77,7 +77,7 @@ struct ebpo_windows_stat {
     uint64_t st_dev, st_ino; /* serial number of the volume; number of the file in it */
     int64_t st_size;
     mode_t st_mode;
-    uid_t st_uid; /* always 0, as owners are not examined */
+    uid_t st_uid; /* always 0, because owners are not examined */
     gid_t st_gid;
     struct timespec st_atim, st_mtim, st_ctim; /* st_ctim: the last change of data or attributes */
 };
@@ -137,7 +137,7 @@ int fcntl(int fd, int what, ...);
 int pipe(int ends[2]);
 int futimens(int fd, const struct timespec *times);
 
-/* Returns the error that advice on a file is not supported. */
+/* Returns ENOSYS: advice on the use of files is not supported. */
 static inline int posix_fadvise(int fd, off_t at, off_t bytes, int advice)
 {
     (void)fd, (void)at, (void)bytes, (void)advice;
@@ -256,7 +256,8 @@ int getrlimit(int what, struct rlimit *out);
 int setrlimit(int what, const struct rlimit *limit);
 
 struct rusage {
-    uint64_t ru_minflt, ru_majflt; /* page faults of all kinds; always 0 */
+    uint64_t ru_minflt; /* number of page faults of all kinds */
+    uint64_t ru_majflt; /* always 0 */
 };
 #define RUSAGE_SELF 0
 int getrusage(int who, struct rusage *out);
@@ -268,7 +269,7 @@ struct pollfd {
 #define POLLIN 1
 int poll(struct pollfd *of, unsigned long count, int milliseconds);
 
-/* Sockets that are not provided: socket fails with ENOSYS. */
+/* Sockets are declared but not provided: `socket` fails with ENOSYS. */
 typedef int socklen_t;
 struct sockaddr {
     unsigned short sa_family;

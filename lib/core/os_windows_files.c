@@ -410,7 +410,7 @@ int access(const char *path, int mode)
     return facts == INVALID_FILE_ATTRIBUTES ? -1 : 0;
 }
 
-/* Does nothing but check that the file exists, because Windows has no permission bits. */
+/* Changes nothing, because Windows has no permission bits. Only checks that the file exists. */
 int chmod(const char *path, mode_t mode)
 {
     (void)mode;
@@ -460,7 +460,8 @@ char *realpath(const char *path, char *out)
     CloseHandle(file);
     free(wide);
     size_t size = found ? strlen(found) : 0;
-    if (size && found[size - 1] == '/') /* "C:", to which a name can be added */
+    /* "C:/" becomes "C:", so that '/' and a name can be added to every path */
+    if (size && found[size - 1] == '/')
         found[--size] = 0;
     if (!found || !out)
         return found;
@@ -545,7 +546,7 @@ static bool rename_at_once(const WCHAR *from, const WCHAR *to)
     return done;
 }
 
-/* Tries several times, as indexers and virus scanners open new files for a moment. */
+/* Tries several times, because indexers and virus scanners open new files for a moment. */
 int rename(const char *from, const char *to)
 {
     WCHAR *old = wide_path(from), *new = old ? wide_path(to) : NULL;
@@ -697,7 +698,9 @@ int fsync(int fd)
 
 int fcntl(int fd, int what, ...)
 {
-    if (what == F_DUPFD_CLOEXEC) { /* the least descriptor is ignored: 0 to 2 are in use */
+    /* The argument of F_DUPFD_CLOEXEC, the least new descriptor (3), is ignored, because the
+     * descriptors 0 to 2 are in use anyway. */
+    if (what == F_DUPFD_CLOEXEC) {
         int copy = _dup(fd);
         return copy;
     }

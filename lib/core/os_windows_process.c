@@ -26,7 +26,8 @@ pid_t waitpid(pid_t process, int *state, int flags)
     return not_provided();
 }
 
-/* Returns 0 if a process exists. Sends no signal: callers only use signal 0. */
+/* Returns 0 if a process exists. Sends no signal, because callers use only signal 0, which only
+ * tests if the process exists. */
 int kill(pid_t process, int number)
 {
     DWORD code = STILL_ACTIVE;
@@ -79,8 +80,8 @@ int sigaction(int number, const struct sigaction *action, struct sigaction *befo
 int getrlimit(int what, struct rlimit *out)
 {
     enum {
-        DESCRIPTORS = 2048,  /* of the C library */
-        MAIN_STACK = 2 << 20 /* of a program's main thread */
+        DESCRIPTORS = 2048,  /* greatest number of descriptors of the C library */
+        MAIN_STACK = 2 << 20 /* stack of a program's main thread, in bytes */
     };
     rlim_t most = what == RLIMIT_NOFILE  ? DESCRIPTORS
                   : what == RLIMIT_STACK ? MAIN_STACK
@@ -189,7 +190,7 @@ void *dlopen(const char *name, int flags)
     return NULL;
 }
 
-const char *dlerror(void) { return "libraries are not loaded on this system"; }
+const char *dlerror(void) { return "loading libraries is not supported on this system"; }
 
 static HMODULE module_of(const void *address)
 {

@@ -13,7 +13,8 @@
 #include "core/fp_env.h"
 #include "core/workspace.h"
 
-/* The library uses less than a quarter of this stack; sanitizers use several times as much. */
+/* STACK_BYTES: stack of a thread. The library uses less than a quarter of it, but with sanitizers
+ * several times as much. */
 enum { MAX_THREADS = 256, STACK_BYTES = 4 << 20 };
 
 /* State of ebpo_parallel_for. */
@@ -27,7 +28,7 @@ typedef struct run {
     _Atomic uint64_t next; /* first item of the next piece */
     _Atomic uint64_t done; /* number of finished items */
     atomic_bool stop;      /* true: begin no further pieces */
-    pthread_mutex_t lock;  /* protects the three members below */
+    pthread_mutex_t lock;  /* protects `failed_at`, `status` and `error` */
     uint64_t failed_at;    /* first item of the lowest piece that failed */
     ebpo_status status;
     ebpo_error error;

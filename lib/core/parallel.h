@@ -6,8 +6,9 @@
 #include <ebpo/workspace.h>
 #include <pthread.h>
 
-/* Starts a thread as pthread_create does, with a fixed stack size instead of that of RLIMIT_STACK
- * or the C library. All threads of the library start here. Returns 0, or an error number. */
+/* Starts a thread as pthread_create does, with a fixed stack size that does not depend on
+ * RLIMIT_STACK or the C library. All threads of the library start here. Returns 0, or an error
+ * number. */
 int ebpo_thread_start(pthread_t *thread, void *(*body)(void *), void *argument);
 
 /* Callback that works on one piece: items [begin, end). `worker`: number of the thread, 0 to
@@ -16,14 +17,14 @@ int ebpo_thread_start(pthread_t *thread, void *(*body)(void *), void *argument);
 typedef ebpo_status (*ebpo_task_fn)(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                     ebpo_error *error);
 
-/* Returns the number of threads, 1 to 256, for a requested number; 0: as many as this process may
- * use cores. */
+/* Returns the number of threads, 1 to 256, for a requested number. If 0 is requested, returns the
+ * number of cores that this process may use. */
 unsigned ebpo_thread_count(unsigned requested);
 
 /* Divides the items [0, count) into pieces of `grain` items (at least 1), and calls `task` for each
  * piece on `threads` threads (ebpo_thread_count). Pieces are begun in ascending order. The calling
- * thread also works, and reports progress: `stage` and the number of finished items, first 0. Which
- * thread runs a piece is not determined, so results must not depend on the thread. After each
+ * thread also works, and reports progress: `stage` and the number of finished items, from 0 on.
+ * Which thread runs a piece is not determined, so results must not depend on the thread. After each
  * piece, pages of `workspace` (may be NULL) are released if its budget requires this, so tasks need
  * not release pages. If several pieces fail, the failure of the lowest piece is returned. */
 ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,

@@ -63,7 +63,7 @@ EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
 {
     return _mm256_permutevar8x32_ps(_mm256_loadu_ps(x), _mm256_loadu_si256((const __m256i *)from));
 }
-/* Returns a mask with the lanes set whose bits in `lanes` are set. */
+/* Returns a mask in which lane i is set if bit i of `lanes` is set. */
 EBPO_EIGHT f8 f8_mask(unsigned lanes)
 {
     __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128),
@@ -76,8 +76,8 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 }
 /* Eight numbers below 16, which select from the 16 floats of an f8_table (f8_look_up). */
 typedef struct n8 {
-    /* low: the numbers, of which the lower three bits are used; high: mask of the numbers from 8 on
-     */
+    /* low: the numbers, whose lower three bits are used; high: mask with the lanes set that have
+     * numbers of 8 or more */
     __m256i low, high;
 } n8;
 typedef struct f8_table {

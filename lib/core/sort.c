@@ -14,13 +14,14 @@
 #include "core/parallel.h"
 
 enum {
-    GROUP = 1 << 16,         /* minimum number of records in a group, which fit a core's cache */
-    LARGE_GROUP = 4 * GROUP, /* a group with more records is sorted in the workspace */
-    GROUPS_MAX = 1024,       /* limited, because all groups are written to at the same time */
-    GRAIN = 1 << 14,         /* number of records that a thread takes at a time */
-    DIGIT = 256,             /* values of a digit of a key */
-    ALONE_MAX = 1 << 12,     /* at most this number of records is sorted as one group */
-    RELEASE_EVERY = 4        /* pages are released after this number of copies to groups */
+    GROUP = 1 << 16,         /* least number of records in a group; so many fit a core's cache */
+    LARGE_GROUP = 4 * GROUP, /* groups with more records are sorted in arrays of the workspace */
+    /* about the maximum number of groups; limited, because all groups are written to at one time */
+    GROUPS_MAX = 1024,
+    GRAIN = 1 << 14,     /* number of records that a thread takes at a time */
+    DIGIT = 256,         /* number of values of a digit of a key */
+    ALONE_MAX = 1 << 12, /* up to this number, all records are sorted as one group */
+    RELEASE_EVERY = 4    /* pages are released after this number of copies to groups */
 };
 
 /* State of a sort. A bin is a value of the leading bits of a key. */
@@ -31,7 +32,7 @@ typedef struct sorting {
     uint64_t *first;    /* [groups + 1] first record of each group in `dealt` */
     uint64_t *next;     /* [groups] position in `dealt` of the group's next records */
     uint32_t *group_of; /* [EBPO_SORT_BINS] group of each bin */
-    uint64_t *in_bin;   /* [EBPO_SORT_BINS] number of records by the leading bits of the key */
+    uint64_t *in_bin;   /* [EBPO_SORT_BINS] number of records in each bin */
     uint64_t groups;
 } sorting;
 
@@ -56,7 +57,7 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
 }
 
 /* Forms groups of neighbouring bins. Each group has at least `enough` records, except the last
- * group. Returns false when memory is short. */
+ * group. Returns false when out of memory. */
 static bool form_groups(sorting *t)
 {
     uint64_t enough = t->s->count / GROUPS_MAX > GROUP ? t->s->count / GROUPS_MAX : GROUP,
@@ -89,9 +90,10 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    /* For each group: first the number of its records in this range, then the begin of these
-     * records in `grouped`, and after the copying their end. There can be slightly more than
-     * GROUPS_MAX groups, because form_groups rounds the size of groups down. */
+    /* For each group, first the number of its records in [begin, end). Then the index in `grouped`
+     * of the first of these records, and after the copying, the index after the last one. There
+     * can be slightly more than GROUPS_MAX groups, because form_groups rounds the size of groups
+     * down. */
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);
@@ -162,21 +164,22 @@ static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
     return from;
 }
 
-/* Sorts the records [begin, end), which have equal keys. Few records are sorted by insertion. */
+/* Sorts the records [begin, end), which have equal keys, by the caller's comparison. Up to FEW
+ * records are sorted by insertion. */
 static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uint64_t end)
 {
     enum { FEW = 16 };
-    uint8_t held[EBPO_SORT_RECORD_MAX];
+    uint8_t inserted[EBPO_SORT_RECORD_MAX];
     if (end - begin > FEW) {
         qsort(records + begin * s->record, (size_t)(end - begin), s->record, s->compare);
         return;
     }
     for (uint64_t i = begin + 1; i < end; i++) {
-        memcpy(held, records + i * s->record, s->record);
+        memcpy(inserted, records + i * s->record, s->record);
         uint64_t j = i;
-        for (; j > begin && s->compare(held, records + (j - 1) * s->record) < 0; j--)
+        for (; j > begin && s->compare(inserted, records + (j - 1) * s->record) < 0; j--)
             memcpy(records + j * s->record, records + (j - 1) * s->record, s->record);
-        memcpy(records + j * s->record, held, s->record);
+        memcpy(records + j * s->record, inserted, s->record);
     }
 }
 

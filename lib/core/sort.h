@@ -19,7 +19,7 @@ enum {
 /* A sort of `count` records. The caller makes the records and receives the sorted records through
  * callbacks. */
 typedef struct ebpo_sort {
-    ebpo_workspace *workspace; /* for arrays of records; NULL: memory */
+    ebpo_workspace *workspace; /* allocates the arrays of records; NULL: malloc */
     unsigned threads;
     const ebpo_progress *progress; /* may be NULL */
     const char *stage;             /* name of the stage, for the progress */
@@ -45,8 +45,8 @@ EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error
 /* Sorts an array of numbers in ascending order; fast for short arrays. */
 void ebpo_sort_numbers(uint64_t *numbers, uint64_t count);
 
-/* A qsort with a context for the comparison, because systems declare such a function differently or
- * do not have it. */
+/* ebpo_sort_with is qsort with a context for the comparison. It is here, because systems declare
+ * qsort_r differently or do not have it. */
 
 typedef int (*ebpo_compare_with)(const void *a, const void *b, void *context);
 

@@ -22,14 +22,15 @@ typedef struct ebpo_text_stream {
     uint64_t bytes, capacity; /* length of the text, and allocated bytes */
     FILE *file;               /* stream to print to */
     bool failed;
-    size_t size;       /* for open_memstream */
-    char buffer[1024]; /* buffer of the stream, so that it allocates none */
+    size_t size;       /* length of the text, if open_memstream is used */
+    char buffer[1024]; /* buffer of `file`, so that stdio allocates none */
 } ebpo_text_stream;
 
-/* Begins a stream; `s` must not move until the stream has ended. Returns false if memory is short;
- * then there is nothing to end. */
+/* Begins a stream; `s` must not move until the stream has ended. Returns false when out of memory;
+ * then ebpo_text_stream_end must not be called. */
 bool ebpo_text_stream_begin(ebpo_text_stream *s);
-/* Ends a stream. Returns false if data is missing; then there is no text. */
+/* Ends a stream. Returns false if data is missing because an allocation failed; then s->text is
+ * NULL. */
 bool ebpo_text_stream_end(ebpo_text_stream *s);
 
 /* A named run of triangles in a mesh file: the triangles between two lines that set a name. */

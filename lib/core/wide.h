@@ -70,13 +70,13 @@ static inline ebpo_wide ebpo_wide_right(ebpo_wide a, int n)
     return n ? (ebpo_wide){ a.high >> n, a.low >> n | a.high << (64 - n) } : a;
 }
 
-/* Returns a < b, unsigned. */
+/* Returns true if a < b, as unsigned numbers. */
 static inline bool ebpo_wide_less(ebpo_wide a, ebpo_wide b)
 {
     return a.high != b.high ? a.high < b.high : a.low < b.low;
 }
 
-/* Returns a <= b, signed. */
+/* Returns true if a <= b, as signed numbers. */
 static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
 {
     const uint64_t sign = UINT64_C(1) << 63;

@@ -1,11 +1,11 @@
-/* Manages workspaces, the owners of large arrays. An array is an extent (a range of whole pages):
- * in memory until the extents take half of the budget, and then in an unnamed temporary file.
- * Arrays below LEAST_EXTENT are parts of an extent that they share (a pool), and arrays below a
- * page come from malloc. Each extent counts as a holder of its workspace, so the workspace and its
- * extents may be freed in any order. Pages of a file count towards the budget only while they are
- * in memory (resident): loops release them between pieces of work (ebpo_release_pages), and data
- * that were written stay in the file. Any thread may allocate and free. docs/develop/building.md
- * describes how a build keeps to a budget. */
+/* Manages workspaces, the owners of large arrays. A large array is an extent (a range of whole
+ * pages). As long as all extents take at most half of the budget, new extents are in memory; after
+ * that, each new extent is in an unnamed temporary file. Arrays smaller than LEAST_EXTENT share an
+ * extent (a pool), and arrays smaller than a page come from malloc. Each extent counts as a holder
+ * of its workspace, so the workspace and its extents may be freed in any order. Pages of a file
+ * count towards the budget only while they are in memory (resident): loops release them between
+ * pieces of work (ebpo_release_pages), and data that were written stay in the file. Any thread may
+ * allocate and free. docs/develop/building.md describes how a build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -38,10 +38,10 @@ typedef struct extent {
     size_t bytes;
     extent_kind kind;
     bool filed;          /* true: in a file; false: in memory */
-    struct extent *pool; /* of a part: its pool */
-    size_t used;         /* of a pool: bytes of all parts, including freed parts */
-    uint64_t parts;      /* of a pool: number of parts that are not freed */
-    struct extent *next; /* next in the bucket of the table */
+    struct extent *pool; /* if PART: the pool of this part */
+    size_t used;         /* if POOL: bytes of all parts, including freed parts */
+    uint64_t parts;      /* if POOL: number of parts that are not freed */
+    struct extent *next; /* next extent in the bucket of the table */
 } extent;
 
 struct ebpo_workspace {
@@ -50,7 +50,7 @@ struct ebpo_workspace {
     ebpo_workspace_stats usage;
     uint64_t holders;   /* number of holders: the owner and the extents */
     extent *pool;       /* pool for the next part; NULL: none */
-    _Atomic int failed; /* reason of the last failure: errno for a file; 0: memory was short */
+    _Atomic int failed; /* reason of the last failure: errno for a file; 0: out of memory */
     int statm;          /* descriptor of /proc/self/statm; -1: the system does not have this file */
     /* bytes of files, including libraries, that stay resident after pages are released */
     uint64_t floor;
@@ -320,9 +320,9 @@ static void unmap_extent(ebpo_workspace *w, extent *b)
 
 /* --- parts of pools --- */
 
-/* Makes a part of the pool. The bytes of a pool are used only once, so the bytes of a new part are
- * 0.
- */
+/* Makes a part in the current pool, or in a new pool if the part does not fit. The bytes of a pool
+ * are used only once, so the bytes of a new part are 0. Returns NULL on failure, with the reason in
+ * w->failed. */
 static extent *make_part(ebpo_workspace *w, size_t bytes)
 {
     extent *part = ebpo_alloc_zero(1, sizeof *part);
@@ -369,7 +369,8 @@ static void leave_pool(ebpo_workspace *w, extent *pool)
     unmap_extent(w, pool);
 }
 
-/* Returns a part's memory, or its space in the file, to the system, if the system allows this. */
+/* Gives a part's memory, or its space in the file, back to the system, if the system allows this.
+ */
 static void discard_pages(const extent *b)
 {
 #ifdef EBPO_HAVE_MADV_REMOVE
@@ -385,7 +386,9 @@ static void free_extent(ebpo_workspace *w, extent *b)
         unmap_extent(w, b);
         return;
     }
-    if (w->page == PAGE_BYTES) /* only whole pages, so that no neighbour is affected */
+    /* With larger pages, a part might share a page with a neighbour, which must not be discarded.
+     */
+    if (w->page == PAGE_BYTES)
         discard_pages(b);
     extent *pool = b->pool;
     free(b);
@@ -478,35 +481,36 @@ bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capa
                                            : ebpo_grow(array, capacity, need, size);
 }
 
-/* Resident memory of this process in bytes: all, and that of files. */
+/* Resident memory of this process in bytes. */
 typedef struct residency {
-    uint64_t all, files;
+    uint64_t all;   /* all resident memory */
+    uint64_t files; /* resident pages of mapped files, including libraries */
 } residency;
 
 /* Returns the resident memory of this process. */
 static residency read_residency(const ebpo_workspace *w)
 {
     char text[128], *at = text;
-    uint64_t pages[3]; /* size of the process, resident, resident and of files */
+    uint64_t pages[3]; /* number of pages: of the process, resident, resident pages of files */
     ssize_t size = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
     text[size > 0 ? size : 0] = 0;
     for (int i = 0; i < 3; i++) {
         char *end;
         pages[i] = strtoull(at, &end, 10);
         if (end == at)
-            return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: always release */
+            return (residency){ UINT64_MAX, UINT64_MAX }; /* not known, so pages are released */
         at = end;
     }
     return (residency){ pages[1] * w->page, pages[2] * w->page };
 }
 
-/* Returns the memory of an extent in a file to the system; the data stay in the file. */
+/* Gives the memory of an extent in a file back to the system; the data stay in the file. */
 static void release_extent(const extent *b)
 {
 #ifdef EBPO_HAVE_MADVISE
     madvise(b->at, b->bytes, MADV_DONTNEED);
 #else
-    msync(b->at, b->bytes, MS_ASYNC); /* the system reclaims the pages when memory is short */
+    msync(b->at, b->bytes, MS_ASYNC); /* the system reclaims the pages when it needs memory */
 #endif
 }
 
@@ -517,7 +521,7 @@ void ebpo_release_pages(ebpo_workspace *workspace)
         return;
     pthread_mutex_lock(&w->table_lock);
     residency current = read_residency(w); /* another thread may have released pages meanwhile */
-    /* also returns if a release would free few pages */
+    /* releases nothing if this would free few pages */
     if (current.all <= w->usage.memory / 4 * 3 || current.files < w->floor + w->usage.memory / 16) {
         pthread_mutex_unlock(&w->table_lock);
         return;

@@ -10,8 +10,8 @@
 EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory,
                                                   const char *temp_dir, ebpo_error *error);
 
-/* Reports why the last allocation, of `bytes` bytes, has failed. Returns EBPO_E_MEMORY, or
- * EBPO_E_IO with the folder in the message. */
+/* Reports why the last allocation (of `bytes` bytes) failed. Returns EBPO_E_MEMORY, or EBPO_E_IO
+ * with the folder in the message. */
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error);
 /* Same as ebpo_workspace_fail, for callers that do not know the size. `what` completes the message,
  * as in "while joining levels". */
@@ -27,18 +27,19 @@ uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
 
 /* Releases the pages of arrays in files if more than three quarters of the budget are in use; data
  * that were written stay in the file. Each thread calls this function whenever it has visited a few
- * megabytes. A call is cheap, and NULL is allowed. The loops below and ebpo_parallel_for make these
- * calls; other code, such as a recursion, must make them itself. */
+ * megabytes. A call is cheap, and NULL is allowed. The loops EBPO_FOR_... and ebpo_parallel_for
+ * call this function; other code, such as a recursion, must call it explicitly. */
 void ebpo_release_pages(ebpo_workspace *workspace);
 
-/* Number of items between two calls of ebpo_release_pages: for arrays that are visited in order,
- * and for loops whose items may each bring 16 pages into memory. */
+/* Numbers of items between two calls of ebpo_release_pages. EBPO_ITEMS_IN_ORDER: for arrays that
+ * are visited in order. EBPO_ITEMS_SCATTERED: for loops of which each item may bring 16 pages into
+ * memory. */
 enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 
 /* Loops over the items of large arrays. A workspace keeps arrays in files, whose visited pages stay
- * in memory until they are released. These loops release the pages, so that the loops' bodies need
- * not. Bodies may `continue`, `break` and return; `end` is evaluated once. If `workspace` is NULL,
- * a loop only costs one more test. */
+ * in memory until they are released. These loops release the pages, so the bodies of the loops need
+ * not release them. A body may `continue`, `break` and return; `end` is evaluated once. If
+ * `workspace` is NULL, a loop costs only one more test. */
 
 /* Releases pages whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two. The
  * bodies of `every` items should visit at most a few megabytes. */
@@ -67,10 +68,10 @@ static inline void ebpo_items_step(ebpo_workspace *workspace, uint64_t every, ui
 
 /* --- arrays in memory or in temporary files --- */
 
-/* Allocates count * size uninitialised bytes. Returns NULL if the product is too large, memory is
- * short or the disk is full (ebpo_workspace_fail reports the reason). `workspace` is NULL:
- * allocates with malloc. ebpo_array_free needs the same workspace, so an object that owns the array
- * also keeps a pointer to the workspace. */
+/* Allocates count * size uninitialised bytes; if `workspace` is NULL, by malloc. Returns NULL if
+ * the product is too large, an allocation fails or the disk is full; ebpo_workspace_fail reports
+ * the reason. ebpo_array_free needs the same workspace, so an object that owns the array also keeps
+ * a pointer to the workspace. */
 void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size);
 /* Same as ebpo_array_alloc, but sets all bytes to 0. */
 void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size);
