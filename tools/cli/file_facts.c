@@ -56,13 +56,13 @@ static void print_source(FILE *out, const ebpo_info *info)
 static void print_border(FILE *out, const ebpo_info *info)
 {
     char edges[40], loops[40], longest[40];
-    fprintf(
-        out,
-        "\n  border    %s in %s, the longest of %s; caps of area %.4g, %.3g %% of the mesh's area",
-        words_plural(edges, sizeof edges, info->border_points, "edge", "edges"),
-        words_plural(loops, sizeof loops, info->border_loops, "loop", "loops"),
-        words_plural(longest, sizeof longest, info->border_longest, "edge", "edges"),
-        info->border_area, 100 * info->border_area / info->report.area);
+    fprintf(out,
+            "\n  border    %s in %s (longest loop: %s); caps have area %.4g, %.3g %% of the "
+            "mesh's area",
+            words_plural(edges, sizeof edges, info->border_points, "edge", "edges"),
+            words_plural(loops, sizeof loops, info->border_loops, "loop", "loops"),
+            words_plural(longest, sizeof longest, info->border_longest, "edge", "edges"),
+            info->border_area, 100 * info->border_area / info->report.area);
 }
 
 static void print_surface(FILE *out, const ebpo_info *info)
@@ -85,7 +85,7 @@ static void print_model(FILE *out, const ebpo_info *info)
         char text[FINDINGS_VOLUME], extent[40];
         ebpo_solid_volume solid = facts_solid(info, NULL);
         findings_extent(extent, sizeof extent, solid.integral, 3, &info->report);
-        /* the volume is printed as a number, not as an interval or a range of doubles */
+        /* true: the text contains the volume as one number; false: as an interval, or not at all */
         bool printed =
             findings_volume_known(&solid) && (isnormal(solid.integral) || extent[0] == '0');
         fprintf(out, "\n  solid     %s%s, by winding number, rule %s",
@@ -147,7 +147,7 @@ static void print_subset(FILE *out, const ebpo_info *info)
     if (info->kept_error > 0)
         fprintf(out, "%s pruned where envelopes extend at most %.9g beyond the model",
                 info->cut_levels || info->boxed ? "," : "", info->kept_error);
-    fprintf(out, "; nothing below %s\n            of the file with content %s\n",
+    fprintf(out, "; nothing below %s;\n            taken from the file with content_sha256 %s\n",
             words_plural(pruned, sizeof pruned, pruned_nodes(info), "pruned node", "pruned nodes"),
             hex);
 }
@@ -197,7 +197,7 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     findings_print_repair(out, &info->repair_record);
     print_model(out, info);
     fprintf(out, "  holds     %s; codec %s%s\n", words_parts(parts, sizeof parts, info->parts),
-            words_codec(info->codec), info->gates ? "; faces across edges (gates)" : "");
+            words_codec(info->codec), info->gates ? "; faces coded as gates" : "");
     if (info->subtree_level)
         fprintf(out, "  subtrees  %llu below level %d, each to be read at once\n",
                 (unsigned long long)info->level[info->subtree_level].gray_count,
@@ -490,5 +490,5 @@ const char *facts_no_surface(const ebpo_info *info)
     return info->pruned                      ? "subsets get none"
            : !(info->parts & EBPO_PART_MESH) ? "files without their mesh get none"
            : info->face_count < LEAST_FACES  ? "models with fewer than 2,048 faces get none"
-                                             : "its faces are too small beside the model";
+                                             : "its faces are too small compared with the model";
 }

@@ -126,7 +126,8 @@ static int parse_values(job *j)
                            "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
     if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &extra) != 2 || j->width < 16 ||
         j->width > SIDE_MAX || j->height < 16 || j->height > SIDE_MAX)
-        return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
+        return usage_error("--size", v->size,
+                           "WIDTHxHEIGHT in pixels, each from 16 to 8192, such as 1920x1080");
     if (v->levels && !parse_levels(j))
         return usage_error(
             "--levels", v->levels,

@@ -43,8 +43,8 @@ static int check_values(const values *v)
 {
     if (!v->eye && (v->order > EBPO_PRIORITY_LEVEL || v->look || v->fov > 0 || v->size ||
                     v->pixels > 0 || v->distance >= 0))
-        return command_usage("view", "--order distance, pixels and front-to-back, --look, --fov, "
-                                     "--size, --pixels and --distance need --eye X,Y,Z");
+        return command_usage("view", "--look, --fov, --size, --pixels, --distance, and --order "
+                                     "with another value than level need --eye X,Y,Z");
     if (!v->look && (v->up || v->seen_only))
         return command_usage(
             "view",
@@ -88,7 +88,7 @@ static bool read_observer(const values *v, ebpo_observer *o)
     if (v->size &&
         (sscanf(v->size, "%9" SCNu32 "x%9" SCNu32 "%c", &o->width, &o->height, &extra) != 2 ||
          !o->width || !o->height)) {
-        command_usage("view", "--size: '%s' is not a width, an x, and a height, each from 1",
+        command_usage("view", "--size: '%s' is not WIDTHxHEIGHT in pixels, such as 1920x1080",
                       v->size);
         return false;
     }
@@ -114,7 +114,8 @@ static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *o
 
 /* --- printing --- */
 
-/* Prints the statistics of the stream so far. key: of the JSON object; NULL in an array. */
+/* Prints the statistics of the stream so far. `key`: key of the JSON object; NULL: the object is an
+ * element of an array. */
 static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
 {
     ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
@@ -186,15 +187,15 @@ static void print_legend(void)
 {
     table_legend(stdout);
     puts(
-        "waiting: gray nodes to divide next; pixels: size of the largest of these nodes, - without "
-        "--eye;\n"
-        "bytes: read from the file; ms: since opening");
+        "waiting: number of gray nodes to divide next; pixels: size of the largest of these nodes\n"
+        "(shown as - if there is no --eye); bytes: read from the file; ms: since opening");
 }
 
 /* --- streaming --- */
 
-/* Takes nodes from the stream until it ends, and prints them or a row each time their number has
- * doubled. If the output cannot be written, stops and sets *accepted to false. */
+/* Takes nodes from the stream until it ends. With --nodes, prints each node; otherwise prints a row
+ * of statistics each time the number of nodes has doubled. If the output cannot be written, stops
+ * and sets *accepted to false. */
 static ebpo_status report_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
                                 bool *accepted, ebpo_error *error)
 {

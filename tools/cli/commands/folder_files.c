@@ -16,8 +16,9 @@ static bool is_model_name(const char *name)
            !words_end_with(name, ".paint.h5");
 }
 
-/* Adds a path, and owns it from now on. Returns false if there is not enough memory; also frees
- * `path` then. path: NULL: there was not enough memory for the path. */
+/* Adds a path to the list, which owns the path from now on. When out of memory, frees `path` and
+ * returns false. `path` may be NULL (the caller could not allocate it); this also counts as out of
+ * memory. */
 static bool add_path(folder_files *f, char *path)
 {
     if (path && f->count == f->capacity) {
@@ -55,7 +56,7 @@ char *folder_files_shown(const char *path)
 }
 
 /* Reports that folder/below/name could not be read; `below` and `name` may be empty. The reason is
- * in errno. Returns false if there is not enough memory. */
+ * in errno. Returns false when out of memory. */
 static bool report_unread(folder_files *f, const char *folder, const char *below, const char *name)
 {
     const char *why = strerror(errno);
@@ -86,7 +87,9 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
     if (!has_stat && errno == ENOENT)
         return true; /* the entry was removed meanwhile */
     bool is_folder = has_stat && S_ISDIR(st.st_mode);
-    if (!has_stat && !is_model_name(name)) /* the entry may be a folder */
+    /* The type of the entry is unknown; it may be a folder that cannot be searched. But an entry
+     * with the name of a model is added, and the error is reported when the model is opened. */
+    if (!has_stat && !is_model_name(name))
         return report_unread(f, folder, below, name);
     if (!is_folder && !is_model_name(name))
         return true;

@@ -20,9 +20,9 @@ static ebpo_status read_table(ebpo_js_object *object)
                : status;
 }
 
-/* Array 0, double [PATCH_FACTS] of each patch: level, position of the cell (3), error in the
- * model's unit, triangles, faces; the patches of the node's children are those from the next value
- * to the last one, exclusive. */
+/* Array 0, double [PATCH_FACTS] for each patch: level, position of the cell (3 values), error in
+ * the model's unit, number of triangles, number of faces, index of the first child patch, and end
+ * of the child patches (one after the last index). */
 int EBPO_JS(ebpo_js_patches)(ebpo_js_object *object)
 {
     ebpo_js_clear(object);
@@ -50,11 +50,13 @@ int EBPO_JS(ebpo_js_patches)(ebpo_js_object *object)
 
 /* Result arrays of ebpo_js_surface. */
 enum {
-    MESH_FACTS,     /* double [2]: triangles, of which faces of the model */
-    MESH_POSITIONS, /* float [3] of each vertex: (coordinate - centre) * scale */
-    MESH_NORMALS,   /* int16 [2] of each vertex, octahedral */
-    MESH_COLOURS,   /* uint8 [4] of each vertex: red, green, blue, 0; 255: no colour */
-    MESH_TRIANGLES  /* uint32 [3] */
+    /* double [2]: number of triangles, and number of those that are faces of the model */
+    MESH_FACTS,
+    MESH_POSITIONS, /* float [3] for each vertex: (coordinate - centre) * scale */
+    MESH_NORMALS,   /* int16 [2] for each vertex: normal in octahedral coding */
+    /* uint8 [4] for each vertex: red, green, blue, and 255 minus alpha (255: no colour) */
+    MESH_COLOURS,
+    MESH_TRIANGLES /* uint32 [3] for each triangle: indices of its vertices */
 };
 
 static void put_normal(const float n[3], int16_t out[2])
@@ -94,7 +96,9 @@ static ebpo_status put_mesh(ebpo_js_object *object, const ebpo_surface_mesh *mes
     return status == EBPO_OK ? ebpo_js_put(object, MESH_FACTS, facts, sizeof facts) : status;
 }
 
-/* Separates the wanted patches that are drawn from those whose faces are drawn. */
+/* Divides the `count` wanted patches into patches that are drawn, and patches that are replaced by
+ * the model's faces. `wanted`: index and flag of each patch (ebpo_js_surface). Returns the number
+ * of drawn patches. */
 static uint64_t split_patches(const double *wanted, uint32_t count, uint64_t *drawn,
                               uint64_t *replaced)
 {
@@ -120,7 +124,9 @@ static ebpo_status make_mesh(ebpo_js_object *object, const double *place, const 
     if (replaced_count)
         of_faces = ebpo_patch_faces_read(object->patches, object->chunks, replaced, replaced_count,
                                          &faces, &object->error);
-    if (of_faces == EBPO_OK || of_faces == EBPO_E_PENDING) /* then more ranges are collected */
+    /* If the faces are pending, the patches are joined too: this collects the byte ranges that they
+     * need for the same request. */
+    if (of_faces == EBPO_OK || of_faces == EBPO_E_PENDING)
         status = ebpo_table_join(object->patches, object->chunks, drawn, count,
                                  replaced_count && of_faces == EBPO_OK ? &faces : NULL, &mesh,
                                  &object->error);
@@ -133,8 +139,9 @@ static ebpo_status make_mesh(ebpo_js_object *object, const double *place, const 
     return status;
 }
 
-/* Reads patches as one mesh without cracks. `place`: centre (3) and scale; then [count] the index
- * of a patch, ascending, and 1 to draw the model's faces instead of it, else 0. */
+/* Reads patches as one mesh without cracks. `place`: centre (3 values) and scale; then, for each of
+ * `count` patches in ascending order, its index and a flag: 1 to draw the model's faces in place of
+ * the patch, otherwise 0. */
 int EBPO_JS(ebpo_js_surface)(ebpo_js_object *object, const double *place, uint32_t count)
 {
     ebpo_js_clear(object);
