@@ -14,7 +14,7 @@ static const arg_option help_option = {
     "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL
 };
 
-/* Prints a usage error. The value of the expression is ARGS_WRONG. */
+/* Prints a usage error. The value of this macro's expression is ARGS_WRONG. */
 #define refuse_args(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
 
 /* --- values --- */
@@ -150,7 +150,8 @@ static const char *find_similar(const arg_spec *spec, const char *name)
     return best;
 }
 
-/* Refuses an unknown option. shown: the argument. name: the option's name or letters in it. */
+/* Refuses an unknown option. `shown`: the whole argument. `name`: the part of the argument that
+ * begins with the unknown option's name or letter. */
 static arg_result fail_unknown(const arg_spec *spec, const char *shown, const char *name)
 {
     size_t length = strcspn(name, "=");
@@ -174,8 +175,9 @@ typedef struct parser {
     size_t output_at;   /* index of that operand */
 } parser;
 
-/* Takes an option and its value. joined: the value in the same argument ("--name=VALUE"); NULL: the
- * value, if the option has one, is the next argument. */
+/* Takes an option and its value. `joined`: the value, if it is in the same argument
+ * ("--name=VALUE"). If `joined` is NULL and the option has a value, the value is the next argument.
+ */
 static arg_result take_option(parser *p, const arg_option *o, const char *joined)
 {
     if (o == &help_option) {
@@ -207,8 +209,8 @@ static arg_result take_long(parser *p)
     return take_option(p, o, name[length] ? name + length + 1 : NULL);
 }
 
-/* Parses letters: -qh means -q -h. After a letter that takes a value, the rest of the argument is
- * the value. */
+/* Parses an argument of letters: -qh means -q -h. After the letter of an option with a value, the
+ * value is all text up to the end of the argument. */
 static arg_result take_letters(parser *p)
 {
     const char *shown = p->argv[p->at];
@@ -241,8 +243,8 @@ static bool is_among(const char *words, const char *word)
     return false;
 }
 
-/* Refuses an output name that ends like the files of another format, because the name would mislead
- * users of the file. */
+/* Refuses an output name with the ending of another format, which would mislead users of the file.
+ */
 static arg_result check_ending(const arg_spec *spec, const char *path)
 {
     static const char known[] = "ply obj stl off glb gltf vtk vtkhdf xdmf png jpg jpeg gif svg pdf "
@@ -260,7 +262,7 @@ static arg_result check_operand(const arg_spec *spec, const char *text, int i)
         return args_dash(spec, i) != ' '
                    ? ARGS_RUN
                    : refuse_args(spec,
-                                 "'-': a file name is needed here, as the file is not read or "
+                                 "'-': a file name is needed here, because the file is not read or "
                                  "written sequentially");
     return i == 1 ? check_ending(spec, text) : ARGS_RUN;
 }

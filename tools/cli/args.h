@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 typedef enum arg_kind {
-    ARG_FLAG,   /* bool; no value */
+    ARG_FLAG,   /* bool; the option has no value */
     ARG_INT,    /* int64_t in [low, high] */
     ARG_REAL,   /* double in [low, high] */
     ARG_TEXT,   /* const char *, not empty */
@@ -25,16 +25,16 @@ typedef struct arg_option {
     const char *name; /* "max-level", without dashes; NULL ends the table */
     char letter;      /* short form; 0: none */
     arg_kind kind;
-    size_t offset;     /* offset, in the values struct of the command, of the field that is set */
-    const char *value; /* "N", for --help; NULL for flags */
-    const char *help;
-    double low, high;         /* range of ARG_INT and ARG_REAL */
+    size_t offset;     /* offset of the field to set in the command's struct of values */
+    const char *value; /* word for the value in --help, such as "N"; NULL: a flag without a value */
+    const char *help;  /* description for --help */
+    double low, high;  /* range of ARG_INT and ARG_REAL */
     const char *const *words; /* values of ARG_WORD and ARG_SET, NULL-terminated */
     const char *page; /* name of the page of `ebpo help` that describes the option; NULL: --help
                        * describes it */
 } arg_option;
 
-/* The values of a repeated option, in the order of the command line, NULL at the end. */
+/* The values of a repeated option in the order of the command line. NULL follows the last one. */
 enum { ARG_LIST_MAX = 32 };
 typedef struct arg_list {
     const char *item[ARG_LIST_MAX + 1];
@@ -46,7 +46,7 @@ typedef struct arg_spec {
     const char *command;  /* "convert" */
     const char *operands; /* "IN.ply OUT.ebpo.h5" */
     int least, most;      /* least and greatest number of operands */
-    const char *summary;  /* one line */
+    const char *summary;  /* description of the command in one line */
     const char *text;     /* further text for --help, or NULL */
     const arg_option *options;
     /* Meaning of the operand "-", one letter for each operand:
@@ -71,9 +71,9 @@ typedef enum arg_result {
 
 enum { ARGS_OPERANDS_MAX = 12 };
 
-/* Parses argv[1 ..]. Options may be anywhere; "--" ends them. Prints --help on stdout, errors on
- * stderr. values: struct of the command, which has its default values. operands: get the operands;
- * unused entries are NULL. */
+/* Parses argv[1], argv[2], ... Options may be anywhere; all arguments after "--" are operands.
+ * Prints --help on stdout, errors on stderr. `values`: the command's struct of values, which has
+ * the defaults. `operands`: receives the operands; unused entries become NULL. */
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
                       const char *operands[ARGS_OPERANDS_MAX]);
 

@@ -5,7 +5,7 @@
 #include "cli/command.h"
 #include "cli/pose_args.h"
 
-enum { DEPTH_MAX = 64 }; /* nested parentheses */
+enum { DEPTH_MAX = 64 }; /* maximum number of nested parentheses and complements */
 
 /* A recursive-descent parser. Each function read_... parses a part of the expression at `at`, sets
  * *number to the index of its node, and returns false after an error. */
@@ -145,7 +145,7 @@ bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operan
 
 bool boolean_read_plane(const char *name, const char *text, double plane[4])
 {
-    int axis = text[0] - 'x'; /* for "x=V"; for four numbers not used */
+    int axis = text[0] - 'x'; /* 0 to 2 for x, y, z; not used if the text is four numbers */
     for (int k = 0; k < 4; k++)
         plane[k] = k == axis;
     if (axis >= 0 && axis < 3 && text[1] == '=' ? args_read_reals(text + 2, 1, plane + 3)

@@ -18,8 +18,8 @@ typedef struct boolean_nodes {
  *   ^       symmetric difference
  *   ~       complement, before a model, '~' or '('
  * ~ binds first, then & and *; the other operators are evaluated from left to right. A is operand
- * 0, B is operand 1, and so on. operands: their number. Returns false after an error, which is
- * reported on stderr for the command `name`; exit with EXIT_USAGE. */
+ * 0, B is operand 1, and so on. `operands`: number of operands. Returns false after an error, which
+ * is reported on stderr for the command `name`; the caller exits with EXIT_USAGE. */
 bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out);
 
 /* Reads each text as a model and a pose (see pose_read) into pose[operands], which the caller has

@@ -27,9 +27,9 @@ typedef struct boolean_operands {
 } boolean_operands;
 
 /* Lists the operands in the order of the paths, which end with NULL. A path is a model, or a scene
- * (NAME.json), which stands for all its instances at their poses at the scene's first time. Models
- * are not opened. Returns an exit code; errors have been reported on stderr. Call
- * boolean_operands_close in any case. */
+ * (NAME.json). A scene gives one operand for each of its instances, with the instance's pose at the
+ * scene's first time. Models are not opened. Returns an exit code; errors have been reported on
+ * stderr. Call boolean_operands_close in any case. */
 int boolean_operands_list(boolean_operands *o, const char *name, const char **paths);
 
 /* Opens the models. model_options: options for each model. Returns an exit code. */

@@ -37,7 +37,7 @@ ebpo_status boolean_write_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_pr
                                            : convert_mesh(o, mesh, progress, error);
 }
 
-/* Counts the pairs of intersecting faces of the mesh. The mesh is changed by the check. */
+/* Counts the pairs of intersecting faces of the mesh. The check changes the mesh. */
 static ebpo_status count_crossings(boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
                                    ebpo_error *error)
 {
@@ -65,7 +65,8 @@ static ebpo_status write_and_count(boolean_output *o, ebpo_mesh *mesh, ebpo_prog
     ebpo_status status = boolean_write_mesh(o, mesh, progress, error);
     if (status != EBPO_OK || !o->crossings)
         return status;
-    if (!words_end_with(o->path, ".ply")) { /* the conversion has used up the mesh: read it back */
+    /* The conversion to .ebpo.h5 has freed the mesh, so the mesh is read back from the output. */
+    if (!words_end_with(o->path, ".ply")) {
         read_options.threads = o->threads;
         read_options.workspace = o->workspace;
         status = ebpo_open(o->path, &file, error);

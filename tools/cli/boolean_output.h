@@ -9,7 +9,7 @@
 
 typedef struct boolean_output {
     const char *path;
-    const char *unit; /* recorded in an .ebpo.h5 file */
+    const char *unit; /* unit of lengths to record in an .ebpo.h5 file; NULL: none */
     unsigned threads;
     bool doubles;              /* write double coordinates */
     bool changed_only;         /* write only the changes of the first operand */
@@ -21,7 +21,8 @@ typedef struct boolean_output {
     uint64_t vertices, faces; /* numbers of vertices and faces that were written */
     ebpo_boolean_mesh_report report;
     uint64_t temporary;      /* greatest size of the temporary files, in bytes */
-    uint64_t crossing_pairs; /* with `crossings`: pairs of faces that rounding made intersect */
+    uint64_t crossing_pairs; /* if `crossings`: number of pairs of faces that intersect, because
+                              * the vertices were rounded */
 } boolean_output;
 
 /* Writes a mesh to o->path: OUT.ply or OUT.ebpo.h5. */

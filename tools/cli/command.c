@@ -108,10 +108,10 @@ int command_is_hdf5(const char *name, const char *path)
     size_t size = 0;
     ssize_t read_bytes = 1;
     if (ebpo_is_url(path))
-        return 1; /* the caller opens it, and then reports an error */
+        return 1; /* the caller opens the URL, and then reports an error */
     int fd = open_regular(name, path);
     if (fd < 0)
-        return errno == ENOENT ? 1 : -1; /* 1: as for a URL */
+        return errno == ENOENT ? 1 : -1; /* 1: the caller opens the file, and reports the error */
     while (size < sizeof head && read_bytes != 0) {
         read_bytes = read(fd, head + size, sizeof head - size);
         if (read_bytes < 0 && errno != EINTR)

@@ -27,17 +27,16 @@ int command_no_memory(const char *name);
 /* Returns the number of cores that this process may use; at least 1. */
 unsigned command_cores(void);
 
-/* Starts a thread as pthread_create does, with a stack of COMMAND_STACK bytes instead of the
- * default of RLIMIT_STACK or of the C library. All commands start their threads by this function.
- */
+/* Starts a thread as pthread_create does, but always with a stack of COMMAND_STACK bytes. All
+ * commands start their threads by this function. */
 enum { COMMAND_STACK = 4 << 20 };
 int command_thread(pthread_t *thread, void *(*body)(void *), void *argument);
 
 /* Returns true if both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);
 
-/* Returns true if writing the file `out` would overwrite the file `in`. This error is reported on
- * stderr; exit with EXIT_USAGE. */
+/* Returns true, after an error message, if writing the file `out` would overwrite the file `in`.
+ * The caller then exits with EXIT_USAGE. */
 bool command_overwrites(const char *name, const char *in, const char *out);
 
 /* Returns 1 if the file begins with the signature of HDF5, 0 if it begins with other bytes, -1 if
@@ -45,20 +44,20 @@ bool command_overwrites(const char *name, const char *in, const char *out);
  * exist: the caller then opens the file, and reports the error. */
 int command_is_hdf5(const char *name, const char *path);
 
-/* Returns false if the file cannot be read or is not HDF5. This error is reported on stderr; exit
- * with EXIT_FAILED. */
+/* Returns false, after an error message, if the file cannot be read or is not HDF5. The caller then
+ * exits with EXIT_FAILED. */
 bool command_requires_hdf5(const char *name, const char *path);
 
-/* Returns false if the file has no such level. This error is reported on stderr; exit with
- * EXIT_USAGE. level: negative if no level was given. */
+/* Returns false, after an error message, if the file does not have the level. The caller then exits
+ * with EXIT_USAGE. If no level was given, `level` is negative, and the result is true. */
 bool command_has_level(const char *name, const ebpo_info *info, int64_t level);
 
-/* Flushes standard output, which detects a full disk. Returns false after an error. The first such
- * error is reported on stderr; exit with EXIT_FAILED. name: may be NULL. */
+/* Flushes standard output, which detects a full disk. Returns false after an error. Only the first
+ * error is reported on stderr. The caller then exits with EXIT_FAILED. `name` may be NULL. */
 bool command_flush(const char *name);
 
-/* Reports, from errno, why standard output could not be written, unless an earlier call did.
- * Returns false. */
+/* Reports from errno why standard output could not be written, unless an error of standard output
+ * was reported before. Returns false. */
 bool command_not_written(const char *name);
 
 /* Writes bytes to standard output, bypassing the buffer of stdio. Returns false after an error, as

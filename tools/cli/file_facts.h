@@ -17,8 +17,8 @@ uint64_t facts_white(const ebpo_info *info, int level);
 /* Returns the bytes of the header and of levels 0 .. level. */
 uint64_t facts_cumulative(const ebpo_info *info, const ebpo_stored_sizes *stored, int level);
 
-/* facts_print prints the facts of the file, facts_table a table of its levels, facts_json both.
- * stored: result of ebpo_file_locate. shells: as for facts_solid. */
+/* facts_print prints the facts of the file, facts_table prints a table of its levels, and
+ * facts_json writes both. `stored`: result of ebpo_file_locate. `shells`: as for facts_solid. */
 void facts_print(FILE *out, const char *path, const ebpo_info *info,
                  const ebpo_stored_sizes *stored);
 void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored);

@@ -10,10 +10,11 @@ enum { JSON_DEPTH = 16 };
 
 typedef struct json {
     FILE *out;
-    int depth;    /* number of open objects and arrays */
-    bool in_page; /* '<' is written as \u003c, so that no text ends an HTML script element */
-    bool filled[JSON_DEPTH]; /* [depth] the object or array has a value already */
-    char close[JSON_DEPTH];  /* [depth] the character that ends the object or array */
+    int depth; /* number of open objects and arrays */
+    /* true: '<' is written as \u003c, so that no text ends an HTML script element */
+    bool in_page;
+    bool filled[JSON_DEPTH]; /* [depth] true: the open object or array has a value already */
+    char close[JSON_DEPTH];  /* [depth] the character that ends the open object or array */
 } json;
 
 /* Begins JSON text. */
@@ -39,8 +40,8 @@ void json_bool(json *j, const char *key, bool v);
 void json_null(json *j, const char *key);
 void json_reals(json *j, const char *key, const double *v, int count);
 
-/* Returns a JSON number with the fewest digits that identify the double, for use with printf; null
- * when it is not finite. */
+/* Writes a JSON number with the fewest digits that identify the double, or "null" if the double is
+ * not finite. Returns `text`, for use with printf. */
 const char *json_number(double x, char text[32]);
 
 #endif

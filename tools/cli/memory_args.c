@@ -24,8 +24,8 @@ bool memory_check(const char *command, const memory_values *v)
     return bytes >= EBPO_WORKSPACE_MIN;
 }
 
-/* Makes freed memory return to the system at once. Otherwise freed memory stays in the heaps of
- * threads and counts as resident memory of the process. */
+/* Sets malloc so that freed memory returns to the system at once. By default, freed memory stays in
+ * the heaps of threads, and counts as resident memory of the process. */
 static void return_memory(void)
 {
 #ifdef __GLIBC__

@@ -8,13 +8,14 @@ static void print_parts(FILE *out, const ebpo_model_plan *p)
 {
     char top[40], chunks[40], skeletons[40], subtree[40];
     fprintf(out,
-            "          levels 0 to %d stay loaded, %s; %" PRIu64 " subtrees below, %s on average\n",
+            "          levels 0 to %d stay in memory and take %s; the %" PRIu64
+            " subtrees below them take %s each on average\n",
             p->cut_level, words_bytes(top, sizeof top, p->top), p->subtrees,
             words_bytes(subtree, sizeof subtree, p->subtree_bytes));
     if (p->subtrees_held < p->subtrees)
         fprintf(out,
-                "          %" PRIu64 " of these in memory at a time; up to %s for chunks, %s for "
-                "skeletons (bounds of subtrees that are not in memory)\n",
+                "          at most %" PRIu64 " of these subtrees are in memory at a time; chunks "
+                "take up to %s, skeletons (bounds of subtrees that are not in memory) up to %s\n",
                 p->subtrees_held, words_bytes(chunks, sizeof chunks, p->chunks),
                 words_bytes(skeletons, sizeof skeletons, p->skeletons));
 }

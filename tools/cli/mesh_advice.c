@@ -45,7 +45,8 @@ static const char *steps_text(char *out, size_t size, const ebpo_repair_record *
 
 /* ---- warnings ---- */
 
-/* Prints the number of findings of one kind, if there are any. *any: a kind was printed before. */
+/* Prints the number of findings of one kind, if there are any. *any: true if another kind was
+ * printed before; becomes true if this kind is printed. */
 static void print_count(FILE *out, bool *any, const ebpo_finding *f, const char *one,
                         const char *many)
 {
@@ -74,8 +75,8 @@ static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try
     return findings_volume(text, &solid, &t->report, "");
 }
 
-/* Writes "a solid of volume V", or "a solid with ..." if the volume is not known, for the result of
- * a repair. */
+/* Writes text for the result of a repair: "a solid of volume V", or, if the volume is not known, "a
+ * solid with integral of the winding number V". */
 static const char *solid_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
 {
     char volume[FINDINGS_VOLUME];
@@ -124,8 +125,8 @@ static void warn_of_nested(FILE *out, const char *command, const char *path, con
             s->nested == 1 ? "is" : "are");
 }
 
-/* Warns of faces that have the positions and the orientation of an earlier face, but other
- * vertices. */
+/* Warns of faces whose vertices have the same positions, in the same orientation, as those of an
+ * earlier face, but are other vertices. */
 static void warn_of_repeated_positions(FILE *out, const char *command, const char *path,
                                        const mesh_input *p)
 {
@@ -259,8 +260,10 @@ void advice_print_shells(FILE *out, const mesh_input *p)
     fprintf(out, ", %s",
             words_plural(text, sizeof text, s->inside_out, "is inside out", "are inside out"));
     if (s->nested)
-        fprintf(out, ", %llu within another and outwards like it (--orient makes a cavity of it)",
-                (unsigned long long)s->nested);
+        fprintf(out, ", %s (--orient makes cavities)",
+                words_plural(text, sizeof text, s->nested,
+                             "is within another and oriented outwards like it",
+                             "are within others and oriented outwards like them"));
     fputc('\n', out);
 }
 
@@ -309,8 +312,8 @@ static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
     json_end(j);
 }
 
-/* Writes the number of faces that repeat positions. If no vertices coincide, writes null, because
- * the report then counts all repeated faces. */
+/* Writes the number of faces at the positions of an earlier face. If no vertices coincide, writes
+ * null, because repeated_faces of the report then counts the same faces. */
 static void json_repeated(json *j, const mesh_input *p)
 {
     if (!p->prepared.report.repeated_positions.count) {

@@ -8,15 +8,15 @@
 #include "cli/json.h"
 #include "cli/mesh_input.h"
 
-/* Prints warnings if the mesh is a surface or has doubts, of repeated faces, and of components that
- * are inside out or nested. command, path: for the messages. */
+/* Prints warnings: if the mesh is a surface, if there are doubts, if faces are repeated, and if
+ * components are inside out or nested. `command`, `path`: for the messages. */
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p);
 
 /* Prints the result of each sequence of repairs that was tried, if any. */
 void advice_print(FILE *out, const mesh_input *p);
 
-/* Prints the numbers of repeated faces, and of closed components that are cavities, inside out or
- * nested, after repairs. Prints nothing if there are none. */
+/* Prints facts about the repaired mesh: the number of repeated faces, and the numbers of closed
+ * components that are cavities, inside out or nested. Prints nothing if all numbers are 0. */
 void advice_print_shells(FILE *out, const mesh_input *p);
 
 /* Writes the members "doubts", "repeated_by_position", "shells" and "repairs". */

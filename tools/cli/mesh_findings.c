@@ -97,7 +97,7 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
         if (mesh->polygons_concave)
             fprintf(out, " (%llu concave)", (unsigned long long)mesh->polygons_concave);
         if (mesh->polygons_guessed)
-            fprintf(out, ", %llu of which by a guess: the outline crosses itself",
+            fprintf(out, ", %llu of which by a guess, because the outline crosses itself",
                     (unsigned long long)mesh->polygons_guessed);
         fputc('\n', out);
     }
@@ -176,7 +176,7 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
     return text;
 }
 
-/* Returns a note to append if the area or volume x is beyond the range of doubles; else "". text:
+/* Returns a note to append if the area or volume x is beyond the range of doubles; else "". `text`:
  * result of findings_extent for x. */
 static const char *beyond_text(double x, const char *text)
 {

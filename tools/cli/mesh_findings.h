@@ -17,15 +17,16 @@ static inline bool findings_volume_known(const ebpo_solid_volume *solid)
     return solid->lo >= solid->hi;
 }
 /* Writes "volume" and the volume or its bounds. If the integral of the winding number differs from
- * the volume, also writes the integral; if no bounds are known, writes only the integral. unit:
- * unit of lengths, "" for none. */
+ * the volume, also writes the integral; if no bounds are known, writes only the integral. `unit`:
+ * unit of lengths; "": none. */
 enum { FINDINGS_VOLUME = 320 };
 const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume *solid,
                             const ebpo_mesh_report *report, const char *unit);
 /* Writes members volume (null: not known), volume_lo, volume_hi and winding_integral. */
 void findings_volume_json(json *j, const ebpo_solid_volume *solid);
 /* Prints the kind of the mesh, each kind of finding (defect) with its first faces or vertices, and
- * the omitted checks. crossings_follow: the caller checks intersecting faces later. */
+ * a note about the check that was omitted. `crossings_follow`: the caller makes this check, that of
+ * intersecting faces, later; then the note is not printed. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, const ebpo_solid_volume *solid,
                     bool crossings_follow);
@@ -41,7 +42,7 @@ const char *findings_extent(char *text, size_t size, double x, int power,
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report,
                    const ebpo_solid_volume *solid);
 void findings_json_repair(json *j, const char *key, const ebpo_repair_record *record);
-/* Writes facts of the input file. unread: description of data that was not read; "": none. */
+/* Writes facts about the input file. `unread`: description of data that was not read; "": none. */
 void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const char *unread);
 
 #endif

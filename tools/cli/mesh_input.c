@@ -26,7 +26,7 @@ int repair_check(const char *command, repair_request requested)
     return EXIT_OK;
 }
 
-/* Adds the effects of a second preparation of the mesh to those of the first one. */
+/* Adds the repairs of a second preparation of the mesh to the record of the first one. */
 static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
 {
     ebpo_repair_record *a = &first->record;
@@ -79,8 +79,8 @@ static ebpo_status try_and_repair(mesh_input *p, repair_request requested,
                : status;
 }
 
-/* Counts repeated faces by position. If no vertices coincide, these are the repeated faces that the
- * check of the mesh has counted. */
+/* Counts faces at the positions of an earlier face. If no vertices coincide, these are the repeated
+ * faces that the check of the mesh has counted. */
 static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *error)
 {
     p->repeated = p->prepared.report.repeated_faces;
@@ -111,7 +111,8 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     ebpo_solid_volume solid =
         findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
                        same_mesh && p->shells_counted ? &p->shells : NULL, NULL);
-    /* where faces repeat others with the same orientation, the volume counts twice */
+    /* Faces that repeat others with the same orientation count twice in the volume, so the volume
+     * is not known. */
     if (same_mesh && p->repeated_same) {
         solid.lo = 0;
         solid.hi = INFINITY;

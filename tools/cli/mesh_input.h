@@ -12,25 +12,25 @@ typedef struct repair_request {
     bool weld, drop_duplicates, orient, flip, fill_holes;
     bool repair; /* --repair: apply the shortest sequence of the repairs weld, drop_duplicates,
                   * orient and fill_holes that gives a plausible solid */
-    /* above 0: merge vertices within this distance, before other repairs are tried */
+    /* above 0: merge vertices within this distance before other repairs; 0: do not */
     double weld_distance;
     /* set by commands, not by an option: if no repair is requested, try repairs on copies */
     bool advise;
 } repair_request;
 
 typedef struct mesh_input {
-    ebpo_mesh mesh;    /* after repairs */
-    ebpo_mesh as_read; /* the mesh before repairs: only its facts are valid; array pointers show
-                        * which arrays existed, and must not be used */
+    ebpo_mesh mesh;    /* the mesh after repairs */
+    ebpo_mesh as_read; /* the mesh before repairs. Only its facts are valid: its array pointers show
+                        * which arrays existed, but must not be used */
     char unread[512];  /* result of ebpo_mesh_ignored; empty: everything was read */
     ebpo_prepared prepared; /* findings before and after repairs, and the repairs made */
-    bool repairs_tried;     /* repairs were tried; their results are in `repairs` */
+    bool repairs_tried;     /* true: repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;
     ebpo_finding repeated; /* faces of the repaired mesh at the positions of an earlier face */
-    /* if vertices coincide: how many of these faces have the opposite and the same orientation as
-     * the earlier face; else 0 */
+    /* if vertices coincide: numbers of the faces in `repeated` that have the opposite orientation
+     * of the earlier face, or the same orientation; else 0 */
     uint64_t repeated_opposite, repeated_same;
-    bool shells_counted; /* closed components were counted in `shells` */
+    bool shells_counted; /* true: closed components were counted in `shells` */
     ebpo_shells shells;
     uint32_t doubts; /* ebpo_doubt bits: reasons why the repaired mesh may not bound the intended
                       * solid */
@@ -48,21 +48,22 @@ typedef enum mesh_reading {
     READ_TEXTURES /* attributes, and the bytes of the images that they name */
 } mesh_reading;
 
-/* Reads, repairs and checks a mesh. more: the data to read. After success call
- * ebpo_mesh_free(&out->mesh); after a failure there is nothing to free. */
+/* Reads, repairs and checks a mesh. `more`: which further data to read. After success, call
+ * ebpo_mesh_free(&out->mesh); after a failure, there is nothing to free. */
 EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path,
                                           repair_request requested, mesh_reading more,
                                           ebpo_workspace *workspace, unsigned threads,
                                           ebpo_progress progress, ebpo_error *error);
 
-/* Also reads the groups of the file: see ebpo_mesh_read_groups. */
+/* Same as mesh_input_read, but also reads the groups of the file if `groups` is not NULL (see
+ * ebpo_mesh_read_groups). */
 EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path,
                                                  repair_request requested, mesh_reading more,
                                                  ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
 
-/* Returns the bounds of the volume of the solid, after (or before) repairs. */
+/* Returns the bounds of the volume of the solid. `after`: true: after repairs; false: before. */
 ebpo_solid_volume mesh_input_solid(const mesh_input *input, bool after);
 
 /* Warns of file contents that were not read, and of ambiguous triangulations. */

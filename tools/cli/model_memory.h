@@ -11,8 +11,9 @@
 void model_memory_default(const char *command, const ebpo_file *file, const char *path,
                           ebpo_model_options *options);
 
-/* Prints this note. what: name of the model. least: bytes that it needs at least. half: bytes of
- * half of the free memory. */
+/* Prints the note that a model needs more than half of the free memory. `what`: name of the model.
+ * `least`: the least memory that the model needs, in bytes. `half`: half of the free memory, in
+ * bytes. */
 void model_memory_report_least(const char *command, const char *what, uint64_t least,
                                uint64_t half);
 

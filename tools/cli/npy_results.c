@@ -9,8 +9,8 @@
 
 #include "cli/command.h"
 
-/* PREFIX_SIZE: bytes of the signature, the version and the length; HEADER_SIZE: bytes of the whole
- * header. */
+/* PREFIX_SIZE: number of bytes of the signature, the version and the length field. HEADER_SIZE:
+ * number of bytes of the whole header. */
 enum { PREFIX_SIZE = 10, HEADER_SIZE = 192 };
 
 static void write_header(char head[HEADER_SIZE], const char *dtype, uint64_t count)

@@ -10,13 +10,14 @@ typedef struct npy_results {
     const char *command; /* name of the command, for messages */
     const char *dtype;   /* type of a result, as NumPy writes it in a header */
     unsigned bytes;      /* bytes of a result */
-    off_t begin; /* offset of the header in standard output, which npy_end writes again; -1: the
-                  * number of results was known at the beginning */
+    /* offset of the header in standard output, for npy_end, which rewrites the header; -1: the
+     * number of results was known at the beginning */
+    off_t begin;
 } npy_results;
 
 /* Writes the header, which states the number of results. If standard output is a file, npy_end sets
- * the number later; otherwise the input must state it. Returns false if the number is not known or
- * writing failed (reported on stderr). */
+ * this number later; otherwise the input must state the number of its rows. Returns false, after an
+ * error message, if the number is not known or writing failed. */
 bool npy_begin(npy_results *npy, points *in);
 /* Sets the number of results in the header, if standard output is a file. Returns false if writing
  * failed (reported on stderr). */

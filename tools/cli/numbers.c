@@ -7,7 +7,7 @@
 
 /* --- reading --- */
 
-/* Returns true for characters that may follow a number. Before such a character the fast reader and
+/* Returns true for characters that may follow a number. If such a character follows, <charconv> and
  * strtod read the same number. */
 static bool ends_number(char c)
 {
@@ -15,8 +15,9 @@ static bool ends_number(char c)
            c == '#' || c == '\n';
 }
 
-/* Moves *after to the end of a name such as #INF. Microsoft's C library writes 1.#INF, 1.#IND,
- * 1.#QNAN and 1.#SNAN for non-finite numbers. */
+/* If a name such as #INF follows the number v, moves *after to the end of the name, and returns
+ * NAN; otherwise returns v. Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and 1.#SNAN for
+ * non-finite numbers. */
 static double pass_names(double v, const char **after)
 {
     const char *at = *after;
@@ -75,8 +76,8 @@ static char *put_zeros(char *out, int count)
     return count > 0 ? out + count : out;
 }
 
-/* Writes a number without an exponent. digits: "123" for 1.23 times ten to the power `exponent`,
- * which is -4 to 16. count: number of digits. */
+/* Writes a number without an exponent. `digits`: "123" for 1.23 times ten to the power `exponent`.
+ * `count`: number of digits. `exponent`: -4 to 16. Returns the end of the output. */
 static char *write_fixed(char *out, const char *digits, int count, int exponent)
 {
     int whole = exponent < 0 ? 0 : exponent + 1 < count ? exponent + 1 : count;

@@ -7,12 +7,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Size of the output of the functions below, which has no zero byte at its end. */
+/* Maximum size of the output of the functions number_write..., which has no zero byte at its end.
+ */
 enum { NUMBER_CAPACITY = 32 };
 
 /* Returns the number at `text`. A character that cannot be part of a number, such as a zero byte,
- * must follow the number. *after: the end of the number; equal to `text`: there is no number. end:
- * the end of the line; no number may continue beyond it. */
+ * must follow the number. *after: the end of the number; if it equals `text`, there is no number.
+ * `end`: the end of the line, which must also end the number. */
 double number_read(const char *text, const char *end, const char **after);
 
 /* Returns the beginning of the text of a file, after a byte order mark, if any. */

@@ -103,8 +103,7 @@ static const char *last_line_end(const char *text, size_t bytes)
 #endif
 }
 
-/* Reads complete lines into the block. At the end of the input, the last line may lack its line
- * end. */
+/* Reads complete lines into the block. The last line of the input may lack its line end. */
 static void take_lines(points *p, points_block *b)
 {
     size_t whole = 0, scanned = 0; /* bytes of complete lines; bytes searched for line ends */
@@ -132,8 +131,8 @@ static void take_lines(points *p, points_block *b)
     }
 }
 
-/* Compares the number of rows with the number that the header of the array states. count: rows of
- * this block. */
+/* Compares the number of rows read so far with the number that the header of the array states.
+ * `count`: number of rows of this block. */
 static void check_rows(points *p, points_block *b, uint64_t count)
 {
     p->rows_taken += count;
@@ -159,7 +158,7 @@ static void take_numbers(points *p, points_block *b)
         keep_unread(p, b, b->count - partial_bytes);
     else if (partial_bytes && !b->failed)
         points_fault(b, 0,
-                     "%zu bytes remain at the end, but each item takes %zu; the input is "
+                     "%zu bytes remain at the end, but each row takes %zu bytes; the input is "
                      "truncated or in another format",
                      partial_bytes, row_bytes);
     b->count -= p->is_ended ? partial_bytes : 0;
@@ -175,7 +174,7 @@ static void take_all_rows(points *p, points_block *b)
     p->all_rows_at += b->row_count;
 }
 
-/* Recognises the format, unless this has been done. */
+/* Recognises the format of the input, unless an earlier call has done so. */
 static void begin_input(points *p, points_block *b)
 {
     if (!p->is_begun && !p->failed)
@@ -223,8 +222,8 @@ bool points_take(points *p, points_block *b)
 
 /* --- end of a block --- */
 
-/* Prints the error of a block, with its position: a line, or a point, ray or box (counted from 1),
- * or a vertex (counted from 0, as in PLY files). */
+/* Prints the error of a block with its position. The position is the number of a line, point, ray
+ * or box (from 1), or the index of a vertex (from 0, as in PLY files). */
 static void report_fault(const points *p, const points_block *b)
 {
     static const char *const names[] = { "point", "ray", "box" };

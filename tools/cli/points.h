@@ -8,13 +8,13 @@
 
 #include "cli/points_input.h"
 
-/* Opens the input. command: its name, for messages. path: NULL or "-" for standard input. raw: the
- * input is doubles. tmax: default for rays without tmax. Returns false if the input cannot be
- * opened (reported on stderr). Call points_close in any case. */
+/* Opens the input. `command`: name of the command, for messages. `path`: NULL or "-" for standard
+ * input. `raw`: the input is doubles. `tmax`: default for rays without tmax. Returns false, after
+ * an error message, if the input cannot be opened. Call points_close in any case. */
 bool points_open(points *p, const char *command, const char *path, points_kind kind, bool raw,
                  double tmax);
-/* Opens the input as points_open does, but reads only part `number` of `part_count` if it is an
- * HDF5 dataset. Call points_cut(p, number, part_count) next. */
+/* Opens the input as points_open does. If the input is an HDF5 dataset, reads only part `number` of
+ * `part_count` parts. Call points_cut(p, number, part_count) next. */
 bool points_open_shard(points *p, const char *command, const char *path, points_kind kind, bool raw,
                        double tmax, uint64_t number, uint64_t part_count);
 void points_close(points *p);
@@ -26,8 +26,9 @@ bool points_begin(points *p);
  * row. Returns false at the end and after a fatal error. The caller initializes new blocks with
  * zeros. Only one thread at a time may call this. */
 bool points_take(points *p, points_block *block);
-/* Counts the rows of a block whose results were written, and reports the error of the block, if
- * any, on stderr. Call in the order in which blocks were taken. Returns false after an error. */
+/* Counts the rows of a block after their results were written, and reports the error of the block,
+ * if any, on stderr. Call this in the order in which blocks were taken. Returns false if the block
+ * has an error. */
 bool points_finish_block(points *p, points_block *block);
 
 /* Reads, parses and finishes blocks on one thread: fills rows[POINTS_BATCH][points_width]. Returns

@@ -18,7 +18,7 @@ static bool fail_cut(points *p, const char *what)
     return false;
 }
 
-/* Limits reading to bytes `from` to `to` of the file. */
+/* Limits reading to the bytes [from, to) of the file. */
 static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 {
     p->unread_count = 0;
@@ -31,7 +31,7 @@ static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 
 /* --- numbers --- */
 
-/* Selects a part of binary numbers. begin: offset of the first row in the file of `size` bytes. */
+/* Selects a part of binary numbers. `begin`: offset of the first row. `size`: size of the file. */
 static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number,
                         uint64_t part_count)
 {
@@ -44,7 +44,7 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
     uint64_t first = points_share(rows, number, part_count),
              end = points_share(rows, number + 1, part_count);
     p->row = first;
-    p->rows_stated = false; /* checked above; take_numbers need not check it */
+    p->rows_stated = false; /* already checked, so take_numbers need not check it */
     p->rows_known = true;
     p->rows_total = end - first;
     /* the last part also reads the bytes after the last whole row, so that they are reported */
@@ -66,9 +66,9 @@ static bool cut_all_rows(points *p, uint64_t number, uint64_t part_count)
 
 /* --- text --- */
 
-/* Returns the offset of the first line that begins at the offset `at` or later, in a file of `size`
- * bytes; `size`: there is no such line; UINT64_MAX after an error (reported on stderr). begin:
- * offset of the first line. */
+/* Returns the offset of the first line that begins at the offset `at` or later. Returns `size`, the
+ * size of the file, if there is no such line, and UINT64_MAX after an error (reported on stderr).
+ * `begin`: offset of the file's first line. */
 static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
 {
     char piece[1 << 14];
@@ -90,8 +90,8 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
     return size;
 }
 
-/* Reads the line with the names of columns, which all parts need. begin: offset of the first line.
- * *out: offset of the line after the names, where the first part begins. */
+/* Reads the line with the names of columns, which all parts need. `begin`: offset of the file's
+ * first line. *out: offset of the line after the names, at which the first part begins. */
 static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };

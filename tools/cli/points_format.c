@@ -184,7 +184,7 @@ bool points_file(const char *path, struct stat *st, const char **dataset)
     return found;
 }
 
-/* Reads rows from `first` up to, but not including, `end`, and the total number of rows. */
+/* Reads the rows [first, end) of a dataset, and sets *total to the dataset's number of rows. */
 static ebpo_status read_dataset(points *p, const char *file, const char *name, uint64_t first,
                                 uint64_t end, uint64_t *total, ebpo_error *error)
 {
@@ -198,7 +198,7 @@ static ebpo_status read_part(points *p, const char *file, const char *name, uint
                              uint64_t part_count, ebpo_error *error)
 {
     uint64_t first = 0, end = 0, total, total_again;
-    /* with several parts, first reads only the number of rows */
+    /* If there are several parts, the first call reads only the number of rows. */
     ebpo_status status =
         read_dataset(p, file, name, 0, part_count > 1 ? 0 : UINT64_MAX, &total, error);
     if (status != EBPO_OK || part_count == 1)
@@ -228,7 +228,7 @@ bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t 
     return !p->failed;
 }
 
-/* --- all of them --- */
+/* --- all formats --- */
 
 static bool begins_with(const points *p, const char *with, size_t count)
 {

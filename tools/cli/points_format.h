@@ -14,7 +14,7 @@ bool points_is_dataset(const char *path);
  * *dataset: the text after the file name (":/path"), or "". */
 struct stat;
 bool points_file(const char *path, struct stat *st, const char **dataset);
-/* Reads part `number` of `part_count` parts of a dataset, the same part that points_cut would
+/* Reads part `number` of `part_count` parts of a dataset. This is the part that points_cut would
  * select. Returns false after an error, which has been reported. */
 bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t part_count);
 

@@ -8,9 +8,9 @@
  * p->field, p->fields and p->separator are set. Returns false after an error, which is in the
  * block. */
 bool points_take_header(points *p, points_block *b);
-/* Splits a line into fields; removes blanks and quotes around each field, and ends it by a zero
- * byte. A zero byte is at `end`, the end of the line. separator: 0 for blanks. Returns the number
- * of fields. */
+/* Splits a line into fields. Removes blanks and quotes around each field, and writes a zero byte
+ * after it. `separator`: 0: blanks. `end`: end of the line, where a zero byte is. Returns the
+ * number of fields. */
 int points_split(char separator, char *line, char *end, char *field[POINTS_FIELDS]);
 
 #endif

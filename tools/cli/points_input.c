@@ -35,7 +35,8 @@ void points_block_free(points_block *b)
     *b = (points_block){ .bytes = NULL };
 }
 
-/* Waits for more input. Returns false if p->wake_fd has ended the wait. */
+/* Waits for more input if p->wake_fd is a descriptor. Returns false if p->wake_fd has become
+ * readable. */
 static bool wait_for_more(const points *p)
 {
     struct pollfd both[] = { { .fd = p->wake_fd, .events = POLLIN },

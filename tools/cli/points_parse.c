@@ -12,7 +12,7 @@
 
 /* --- checks for all kinds of input --- */
 
-/* Checks the values of a row. at: its line or row, for the message. */
+/* Checks the values of a row. `at`: number of the row's line, or of the row, for the message. */
 static bool check_row(const points *p, points_block *b, uint64_t at, const double *row)
 {
     for (int i = 0; i < points_raw_width(p->kind); i++)
@@ -77,7 +77,7 @@ static bool all_finite(const double *v, uint64_t count)
     return !bad;
 }
 
-/* Sets b->row_count to the number of rows before the first invalid one. */
+/* Checks `count` rows. Sets b->row_count to the number of rows before the first invalid row. */
 static void check_rows(const points *p, points_block *b, uint64_t count)
 {
     uint64_t width = (uint64_t)points_width(p->kind), valid_rows = 0;
@@ -119,8 +119,8 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-/* Reports a wrong number of values. at: the text at which parsing stopped. more: parsing stopped
- * because the row is complete, but more values follow. */
+/* Reports a wrong number of values. `at`: the text at which parsing stopped. `more`: true: the row
+ * is complete, but more values follow. */
 static bool wrong_count(const points *p, points_block *b, const char *at, bool more)
 {
     static const char *const expected[] = {
@@ -200,7 +200,7 @@ static void parse_text(const points *p, points_block *b)
 {
     char *s = b->bytes + b->begin, *all = b->bytes + b->count;
     const char *zero = memchr(s, 0, (size_t)(all - s));
-    /* the shortest row: a digit and a separator for each number */
+    /* The shortest possible row has a digit and a separator for each number. */
     if (!alloc_rows(p, b, (uint64_t)(all - s) / (2 * (uint64_t)points_raw_width(p->kind)) + 1))
         return;
     while (s < all) {
@@ -220,14 +220,14 @@ static void parse_text(const points *p, points_block *b)
     }
 }
 
-/* If points_take has recorded an error, it belongs after the last row of the block. An error in an
- * earlier row replaces it. */
+/* An error that points_take has recorded is after the last row of the block. If parsing finds an
+ * error in an earlier row, this error replaces it. */
 void points_parse(const points *p, points_block *b)
 {
     if (p->all_rows)
         check_rows(p, b, b->row_count);
     else if (b->count > b->begin)
         (p->raw ? parse_numbers : parse_text)(p, b);
-    if (b->failed && b->fault_at == POINTS_NEXT_LINE) /* the error of points_take */
+    if (b->failed && b->fault_at == POINTS_NEXT_LINE) /* an error that points_take has recorded */
         b->fault_at = b->lines + 1;
 }

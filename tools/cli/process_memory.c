@@ -10,11 +10,11 @@
 enum { THREADS_MAX = 256 };
 
 static uint64_t limit_bytes; /* limit of this process without stacks; 0: only the inherited limit */
-static bool limit_by_option; /* --memory has set the limit */
+static bool limit_by_option; /* true: --memory has set the limit; false: the default */
 static rlim_t inherited_limit = RLIM_INFINITY; /* limit inherited from the parent process */
 
-/* Returns the bytes in use that count for the limit: private writable memory. Under sanitizers this
- * is most of the address space. */
+/* Returns the number of bytes in use that count for the limit: private writable memory. Under
+ * sanitizers, this is most of the address space. 0: not known. */
 static uint64_t used_bytes(void)
 {
     unsigned long long pages = 0;
@@ -27,8 +27,9 @@ static uint64_t used_bytes(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Returns the bytes of the stacks of threads. Stacks count completely, although little of each is
- * used. `threads`: number of threads; 0: one for each core. */
+/* Returns the number of bytes of the stacks of threads. The system counts the whole stacks for the
+ * limit, although threads use little of them. `threads`: number of threads; 0: one for each core.
+ */
 static uint64_t stack_bytes(int64_t threads)
 {
     struct rlimit stack;
@@ -40,8 +41,8 @@ static uint64_t stack_bytes(int64_t threads)
     return each * (uint64_t)(most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most);
 }
 
-/* Sets the limit, which never exceeds the limit inherited from the parent process. bytes: 0: only
- * the inherited limit. given: the limit comes from --memory. */
+/* Sets the limit, which never exceeds the limit inherited from the parent process. If `bytes` is 0,
+ * only the inherited limit remains. `given`: true: the limit comes from --memory. */
 static void set_limit(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;

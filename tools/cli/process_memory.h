@@ -10,13 +10,13 @@
 void process_memory_default(void);
 
 /* Sets the limit from the value of --memory, for commands that have no other way to limit their
- * memory. size: NULL: the limit stays unchanged. threads: value of --threads; the stacks of the
- * threads do not count for `size`. The limit inherited from the parent process is never exceeded.
- * Returns false, after an error message, for an invalid size. */
+ * memory. If `size` is NULL, the limit stays unchanged. `threads`: value of --threads; the stacks
+ * of the threads do not count for `size`. The limit never exceeds the limit inherited from the
+ * parent process. Returns false, after an error message, for an invalid size. */
 bool process_memory_take(const char *command, const char *size, int64_t threads);
 
-/* Writes the limit and its origin, to be appended to messages about memory; "": there is no limit.
- */
+/* Writes text about the limit and its origin, to be appended to messages about memory. Writes "" if
+ * this process has set no limit. */
 void process_memory_reason(char *out, size_t capacity);
 
 #endif

@@ -10,8 +10,9 @@
 
 double progress_now(void) { return 1e-9 * (double)tool_clock(); }
 
-/* Draws the rate of the work: in bytes while a mesh is read, then in faces, if line->faces is set;
- * else in the units of the reports. speed: units per second. */
+/* Draws the rate of the work. If line->faces is set: in bytes per second while the mesh is read,
+ * then in faces per second. Otherwise: in units of the progress reports. `speed`: units of the
+ * reports per second. */
 static void draw_rate(const progress_line *line, double speed, uint64_t total)
 {
     char rate[32];
@@ -56,8 +57,8 @@ void progress_end_stage(progress_line *line)
     line->begun = now;
 }
 
-/* Begins a stage. If there is no space for another stage, its time is added to that of the last
- * stage. */
+/* Begins a stage. If the array `stages` is full, the time of a new stage is added to its last
+ * entry. */
 static void begin_stage(progress_line *line, const char *stage)
 {
     int i = 0;
@@ -67,8 +68,8 @@ static void begin_stage(progress_line *line, const char *stage)
         line->stages[line->stage_count++].name = stage;
     line->current = i < PROGRESS_STAGES ? i : PROGRESS_STAGES - 1;
     line->stage = stage;
-    for (i = line->at; i < line->plan_count;
-         i++) /* the shown number of the stage never decreases */
+    /* The search begins at the current stage, so that the shown number never decreases. */
+    for (i = line->at; i < line->plan_count; i++)
         if (line->plan[i] == (int)stages_row(stage)) {
             line->at = i;
             break;

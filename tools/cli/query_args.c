@@ -10,7 +10,7 @@ const char *const inside_modes[] = { "fast",        "cache",       "nodes",     
 const char *const distance_modes[] = { "exact", "recursive", "leaves", "envelope", NULL };
 const char *const ray_sides[] = { "both", "front", "back", NULL };
 
-/* [index in inside_modes] options of the mode */
+/* The options of the library for each mode, in the order of inside_modes. */
 static const struct {
     ebpo_loading loading;
     ebpo_envelopes envelopes;
@@ -21,7 +21,7 @@ static const struct {
     { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_SKIP },
 };
 
-/* --- options without effect beside others --- */
+/* --- options that have no effect with other options --- */
 
 bool query_check_effect(const char *name, const query_values *v, unsigned ineffective,
                         const char *with)

@@ -12,7 +12,8 @@ typedef struct query_values {
     const char *memory, *deadline, *attribute, *out, *shard;
     int64_t cut_level, threads, level, nearest, together;
     double max_distance, tmax, within, threshold;
-    int inside_mode, distance_mode, ray_sides; /* indices into the word lists below */
+    /* indices in the lists of words with these names: inside_modes, distance_modes, ray_sides */
+    int inside_mode, distance_mode, ray_sides;
     bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy, force;
     remote_values remote;
 } query_values;
@@ -43,22 +44,23 @@ static inline bool query_lists(const query_values *v)
     return v->nearest > 0 || isfinite(v->within);
 }
 
-/* Returns false if one of the options `ineffective` was given, which have no effect together with
- * the option `with`, such as "--mode leaves". This error is reported on stderr; exit with
- * EXIT_USAGE. */
+/* Checks the options whose bits are in `ineffective`: they have no effect together with the option
+ * `with`, such as "--mode leaves". Returns false, after an error message, if one of them was given.
+ * The caller then exits with EXIT_USAGE. */
 bool query_check_effect(const char *name, const query_values *v, unsigned ineffective,
                         const char *with);
-/* Return false if an option was given that has no effect with the other options of `inside` or
- * `distance`. This error is reported on stderr; exit with EXIT_USAGE. */
+/* Return false, after an error message, if an option was given that has no effect with the other
+ * options of the command `inside` or `distance`. The caller then exits with EXIT_USAGE. */
 bool query_inside_fits(const char *name, const query_values *v);
 bool query_distance_fits(const char *name, const query_values *v);
 
-/* Converts the values to options of the library. name: the command, for messages. Returns false for
- * an invalid value, which is reported on stderr; exit with EXIT_USAGE. */
+/* Converts the values to options of the library. `name`: name of the command, for messages. Returns
+ * false, after an error message, for an invalid value. The caller then exits with EXIT_USAGE. */
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
                         ebpo_inside_options *inside, ebpo_distance_options *distance);
 
-/* Reads the value of --deadline in ns. Returns false for an invalid value, reported on stderr. */
+/* Reads the value of --deadline as nanoseconds. Returns false, after an error message, for an
+ * invalid value. */
 bool query_read_time(const char *name, const char *text, uint64_t *out);
 
 /* A file, the model of the file in memory, and a context. */
@@ -72,8 +74,8 @@ typedef struct query_session {
         NULL, NULL, NULL   \
     }
 
-/* Opens a file, its model and a context. level: a level that the file must have; -1: none. Returns
- * an exit code; errors have been reported on stderr. Call query_close in any case. */
+/* Opens a file, its model and a context. `level`: a level that the file must have; -1: none.
+ * Returns an exit code; errors have been reported on stderr. Call query_close in any case. */
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote);
 /* Open the file and then its model, in two steps, without a context. */

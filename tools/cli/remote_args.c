@@ -36,9 +36,9 @@ ebpo_status remote_open_own(const char *path, ebpo_file **out, ebpo_error *error
     return ebpo_open_with(path, &any, out, error);
 }
 
-/* Verifies all of a file that another program has rewritten, before the first result. Such a file
- * has no checksums of chunks, and the checksum of the content does not cover HDF5 attributes such
- * as the root box. */
+/* Verifies all of a file that another program has rewritten, so that no result is computed from
+ * damaged data. Such a file has no checksums of chunks, and the checksum of the content does not
+ * cover HDF5 attributes such as the root box. */
 static ebpo_status verify_all(const ebpo_file *file, const char *name, ebpo_error *error)
 {
     ebpo_verify_report r = EBPO_VERIFY_REPORT_INIT;

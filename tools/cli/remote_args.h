@@ -1,5 +1,5 @@
-/* Opens the file of a command by its path or URL. Defines the options that all commands have for
- * this, and prints --stats. */
+/* Opens the file of a command by its path or URL. Defines the options for files and URLs that all
+ * commands have, and prints the statistics of --stats. */
 #ifndef EBPO_TOOLS_REMOTE_ARGS_H
 #define EBPO_TOOLS_REMOTE_ARGS_H
 
@@ -18,7 +18,7 @@ typedef struct remote_values {
     double timeout, stall;
     int64_t retries, connections;
     arg_list headers;
-    /* not options: as in ebpo_http_options */
+    /* set by commands, not by options: see ebpo_http_options */
     bool (*stop)(void *user);
     void *stop_user;
 } remote_values;
@@ -27,8 +27,8 @@ typedef struct remote_values {
         .timeout = -1, .stall = -1, .retries = -1, .connections = -1 \
     }
 
-/* Opens a file by its path or URL (ebpo_open_with, ebpo_open_compat). EBPO_E_ARGUMENT: also for an
- * invalid option. */
+/* Opens a file by its path or URL (ebpo_open_with; ebpo_open_compat with --compat).
+ * EBPO_E_ARGUMENT: also if the value of an option is invalid. */
 EBPO_MUST_USE ebpo_status remote_open(ebpo_file **out, const char *name,
                                       const remote_values *values, ebpo_error *error);
 
@@ -40,14 +40,14 @@ const char *remote_shown(const char *name);
 
 /* Traffic of a file since it was opened. */
 typedef struct traffic {
-    uint64_t bytes, reads; /* bytes and number of reads that were requested from the source */
-    bool remote;           /* the file is a URL */
-    ebpo_http_stats http;
+    uint64_t bytes, reads; /* numbers of bytes, and of reads, that were requested from the source */
+    bool remote;           /* true: the file was opened by a URL */
+    ebpo_http_stats http;  /* valid if `remote` */
 } traffic;
 traffic traffic_of(const ebpo_file *file);
 
-/* Print the traffic if --stats was given: remote_report on stderr, as a line or as JSON,
- * remote_json as a member "traffic" of a JSON object. */
+/* Print the traffic if --stats was given. remote_report prints it on stderr, as a line or as JSON;
+ * remote_json writes it as the member "traffic" of a JSON object. */
 void remote_report(const traffic *t, const remote_values *values, bool as_json);
 void remote_json(json *j, const traffic *t, const remote_values *values);
 

@@ -7,7 +7,7 @@ static const struct {
     const char *old, *current;
 } commands[] = { { "repair", "recover" }, { "touch", "haptic" } };
 
-/* Former options; command NULL: an option of every command. */
+/* Former options. If `command` is NULL, the option is one of every command. */
 static const struct {
     const char *command, *old, *current;
 } options[] = {

@@ -1,9 +1,9 @@
 /* Buffers results as bytes until they are written to standard output.
  *
  * A *row* is all output for one input row; it has one or more *results*, such as the faces of a
- * list. Consecutive results of at most RESULT_PIECE bytes together are a *piece*, which is written
- * to a pipe at once. If a row becomes too long for the buffer, the buffer *spills*: the owner
- * decides whether to write or to drop the text (`spill`). */
+ * list. A *piece* is a sequence of results that is written to a pipe at once; it has at most
+ * RESULT_PIECE bytes, unless a single result is longer. If a row becomes too long for the buffer,
+ * the buffer *spills*: the owner decides whether to write or to drop the text (`spill`). */
 #ifndef EBPO_TOOLS_RESULT_TEXT_H
 #define EBPO_TOOLS_RESULT_TEXT_H
 
@@ -19,28 +19,31 @@ struct result_text {
     size_t result, piece; /* end of the last result and of the last piece */
     size_t *cuts;         /* [cut_count] ends of pieces */
     size_t cut_count, cut_capacity;
-    uint64_t rows;        /* complete rows since the owner has set this to 0 */
+    uint64_t rows;        /* number of complete rows since the owner has set this to 0 */
     size_t row;           /* end of the last complete row */
     size_t row_written;   /* bytes of the row after `row` that were already written */
     size_t skipped_bytes; /* first bytes of the text that were already written, to be skipped */
-    bool failed;          /* out of memory; the buffered text is lost */
-    bool write_failed;    /* writing failed, which has been reported */
-    bool full;            /* text after the last complete row is dropped until result_text_retry */
+    bool failed;          /* true: out of memory; the buffered text is lost */
+    bool write_failed;    /* true: writing failed, which has been reported */
+    bool full; /* true: text after the last complete row is dropped until result_text_retry */
     /* Called when the text is too long to be kept: writes it, discards it, or sets `full`. */
     void (*spill)(result_text *t, void *user);
     void *user;
 };
 
-/* Longest result in bytes, except lists of hits and faces, whose items are shorter. */
+/* Maximum size of a result in bytes. For a list of hits or faces, this is the maximum size of an
+ * item. */
 enum { RESULT_MAX = 768 };
 
-/* Returns false if memory is short. Call result_text_free in any case. */
+/* Begins an empty buffer. Returns false when out of memory. Call result_text_free in any case. */
 bool result_text_init(result_text *t);
 void result_text_free(result_text *t);
 
-/* Grows or spills the buffer, so that there is space for RESULT_MAX bytes; returns where. */
+/* Grows or spills the buffer, so that there is space for RESULT_MAX bytes. Returns the position of
+ * this space. */
 char *result_text_grow(result_text *t);
-/* A pipe takes RESULT_PIECE bytes atomically; RESULT_SPILL is the default size before spilling. */
+/* RESULT_PIECE: number of bytes that a pipe takes at once, without a part of another writer in
+ * between. RESULT_SPILL: default of spill_at. */
 enum { RESULT_PIECE = 4096, RESULT_SPILL = 1 << 20 };
 
 /* Returns the position at which the caller may write at most RESULT_MAX bytes. The caller then
@@ -58,7 +61,8 @@ static inline void result_text_end(result_text *t, const char *end)
 
 /* Ends a piece at the offset `at`. */
 void result_text_cut(result_text *t, size_t at);
-/* Ends a result, and, before it, the piece if both together are longer than RESULT_PIECE. */
+/* Ends a result. If the result and the current piece together are longer than RESULT_PIECE, first
+ * ends the piece before the result. */
 static inline void result_text_close(result_text *t)
 {
     if (t->count - t->piece > RESULT_PIECE && t->result > t->piece)

@@ -75,9 +75,9 @@ void raw_double(FILE *out, double v)
 
 /* --- attributes: written after the face index --- */
 
-/* Writes the attributes of a face at a point; face: may be EBPO_NO_FACE. ebpo_sample should not
- * fail, because the sampler was made for the file of the queries; if it fails, the values are
- * written as missing. */
+/* Writes the attributes of a face at a point. `face` may be EBPO_NO_FACE; then the values are
+ * written as missing. ebpo_sample should not fail, because the sampler was made for the file of the
+ * queries; if it fails, the values are also written as missing. */
 static char *put_attributes(char *at, result_form form, const ebpo_sampler *sampler,
                             const double point[3], uint64_t face)
 {
@@ -103,8 +103,8 @@ static char *put_attributes(char *at, result_form form, const ebpo_sampler *samp
 
 /* --- the model of a catalogue --- */
 
-/* Writes the index of the model in the catalogue. model: NULL: there is no catalogue, and nothing
- * is written. *model: UINT64_MAX: no model. */
+/* Writes the index of the model in the catalogue; UINT64_MAX: no model. If `model` is NULL, there
+ * is no catalogue, and nothing is written. */
 static char *put_model(char *at, result_form form, const uint64_t *model)
 {
     if (!model)
@@ -340,7 +340,7 @@ static void end_list(result_text *t, result_form form)
     end_row(t, form, put_text(result_text_capacity(t), form == RESULTS_JSON ? "]" : ""));
 }
 
-/* Writes the separator before the next item of a list; returns where to write the item. */
+/* Writes the separator before the next item of a list. Returns the position of the item. */
 static char *next_item(result_text *t, result_form form, bool first)
 {
     char *at = result_text_capacity(t);

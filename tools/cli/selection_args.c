@@ -39,8 +39,8 @@ static bool from_root(const ebpo_selection_traits *t) { return !t->from_leaves; 
 static bool uses_normal_distance(const ebpo_selection_traits *t) { return t->uses_normal_distance; }
 static bool uses_seed(const ebpo_selection_traits *t) { return t->uses_seed; }
 
-/* Returns the selections with a trait as bits, and writes their names, "kmedoids, offset or
- * random", to `names`. */
+/* Returns the selections that have a trait, as bits. Writes their names to `names`, in the form
+ * "kmedoids, offset or random". */
 static uint32_t selections_with(trait_fn has, char *names, size_t size)
 {
     uint32_t bits = 0;
@@ -58,8 +58,8 @@ static uint32_t selections_with(trait_fn has, char *names, size_t size)
     return bits;
 }
 
-/* Refuses options that were given but affect none of the chosen selections. options: "--epsilon
- * is"; has: the trait of the selections that use the options. */
+/* Refuses options that were given but affect none of the chosen selections. `options`: beginning of
+ * the message, such as "--epsilon is". `has`: the trait of the selections that use the options. */
 static int check_effect(const char *name, const selection_options *o, bool given,
                         const char *options, trait_fn has)
 {

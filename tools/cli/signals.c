@@ -18,9 +18,9 @@ static void give_up(int number)
         command_cleanup();
     if (scratch_cleanup)
         scratch_cleanup();
-    /* SA_RESETHAND restored the default action, so that the parent process sees the signal. It is
-     * raised before this handler returns, and outputs are removed once more just before, because
-     * another thread may have opened an output again. */
+    /* SA_RESETHAND has restored the default action, so raising the signal again ends the process,
+     * and the parent process sees the signal. Just before, outputs are removed once more, because
+     * another thread may have opened an output meanwhile. */
     sigset_t only;
     sigemptyset(&only);
     sigaddset(&only, number);
@@ -31,9 +31,10 @@ static void give_up(int number)
 
 void signals_install(void)
 {
-    /* A write beyond the limit on file size then fails with an error, as on a full disk. */
+    /* Without SIGXFSZ, a write beyond the limit on file size fails with an error, as on a full
+     * disk. */
     signal(SIGXFSZ, SIG_IGN);
-    /* SIGPIPE: the reader of the output has read enough, as head does. */
+    /* SIGPIPE arrives when the reader of the output (such as `head`) has read enough. */
     static const int numbers[] = { SIGINT, SIGTERM, SIGHUP, SIGPIPE };
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         struct sigaction action, before;

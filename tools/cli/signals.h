@@ -6,8 +6,8 @@
 void signals_install(void);
 
 /* Registers the function that removes the files of the running command when one of these signals
- * arrives; NULL: none. It replaces the function of an earlier call, and must be async-signal-safe.
- */
+ * arrives; NULL: none. The function replaces that of an earlier call, and must be
+ * async-signal-safe. */
 void signals_set_cleanup(void (*clean_up)(void));
 
 /* Registers a second function, which removes the temporary copies of standard input and output. A

@@ -13,7 +13,8 @@ static double cell_volume(const ebpo_info *info, int level)
 
 double facts_volume(const ebpo_info *info, int level)
 {
-    if (!isnormal(cell_volume(info, level))) /* the volumes in the file have overflowed */
+    /* Such volumes are beyond the range of doubles, so those in the file are not valid. */
+    if (!isnormal(cell_volume(info, level)))
         return NAN;
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
@@ -60,7 +61,7 @@ double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double
                    : findings_volume_known(solid) ? solid->lo
                                                   : fabs(solid->integral);
     double percent = 100 * volume / whole;
-    return isfinite(percent) ? percent : NAN; /* infinity would have a meaningless sign */
+    return isfinite(percent) ? percent : NAN; /* not infinity, whose sign would mean nothing */
 }
 
 double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int level)
@@ -86,11 +87,11 @@ double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid,
 void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume *solid)
 {
     if (info->solid && !findings_volume_known(solid))
-        fputs("% integral: of the integral of the winding number, as the solid's volume is not "
-              "known\n",
+        fputs("% integral: percent of the integral of the winding number, because the solid's "
+              "volume is not known\n",
               out);
     else
-        fputs(info->solid ? "% solid: of the solid's volume\n"
-                          : "% box: of the volume of the root's box\n",
+        fputs(info->solid ? "% solid: percent of the solid's volume\n"
+                          : "% box: percent of the volume of the root's box\n",
               out);
 }

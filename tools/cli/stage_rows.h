@@ -3,7 +3,8 @@
 #ifndef EBPO_TOOLS_STAGE_ROWS_H
 #define EBPO_TOOLS_STAGE_ROWS_H
 
-/* In the order of their start, except for ordering and checking, which also come before repairs. */
+/* The rows in the order in which their stages start, except that ordering and checking also run
+ * before repairs. */
 typedef enum stage_row {
     STAGE_READING,
     STAGE_REPAIR,

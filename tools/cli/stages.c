@@ -76,8 +76,8 @@ static void print_thesis(FILE *out, unsigned thesis)
     fprintf(out, "%s\n", thesis ? "" : "-");
 }
 
-/* Sums the seconds of each row. began: rows with a stage that began. Returns the bits of the
- * thesis' stages that these rows do. */
+/* Sums the seconds of each row. Sets `began` to true for each row that has a stage which began.
+ * Returns the bits of the thesis' stages whose work these rows do. */
 static unsigned sum_by_row(const progress_line *line, const stage_facts *f,
                            double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
 {
@@ -123,8 +123,8 @@ static void thesis_numbers(json *j, unsigned thesis)
     json_end(j);
 }
 
-/* Writes a stage of the thesis, and the rows that do its work. number: 0 to 5; THESIS_STAGES: the
- * sum of all stages. */
+/* Writes a stage of the thesis, and the rows that do its work. `number`: 0 to 5, or THESIS_STAGES
+ * for the sum of all stages. */
 static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS],
                          const double taken[STAGE_ROWS])
 {

@@ -11,26 +11,26 @@
 #include "cli/stage_rows.h"
 
 typedef struct stage_facts {
-    bool may_repair; /* the options or the format of the input may cause repairs */
+    bool may_repair; /* true: the options or the format of the input may cause repairs */
     bool solid;
-    bool from_leaves; /* envelopes are selected from the leaves, as in the theses */
-    bool selected;    /* levels are selected by error or size after the build */
-    bool leaf_planes; /* leaf planes are stored, not derived by readers */
-    uint64_t faces;
+    bool from_leaves; /* true: envelopes are selected from the leaves, as in the theses */
+    bool selected;    /* true: levels are selected by error or size after the build */
+    bool leaf_planes; /* true: leaf planes are stored; false: readers derive them */
+    uint64_t faces;   /* number of faces of the mesh */
     ebpo_build_times times;
 } stage_facts;
 
 enum { STAGE_PLAN_MAX = STAGE_ROWS + 3 };
-/* Sets `plan` to the rows of all stages to come, in their order, for progress. Returns their
- * number. */
+/* Sets `plan` to the rows of all stages of the build in their order, for the display of progress.
+ * Returns the number of stages. */
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX]);
 
-/* The library makes cells and envelopes in one stage. Splits its time into two stages, in the ratio
- * of the processor times in `times`. Call this before stages_print and stages_json. */
+/* Splits the time of the stage in which the library makes cells and envelopes into two stages, in
+ * the ratio of the processor times in `times`. Call this before stages_print and stages_json. */
 void stages_split(progress_line *line, const ebpo_build_times *times);
 
-/* Print the times of the stages, as a table or as JSON. Call them after progress_end_stage.
- * seconds: total time. */
+/* Print the times of the stages, as a table or as JSON. Call these functions after
+ * progress_end_stage. `seconds`: total time. */
 void stages_print(FILE *out, const progress_line *line, const stage_facts *f, double seconds);
 void stages_json(json *j, const progress_line *line, const stage_facts *f);
 

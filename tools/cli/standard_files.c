@@ -17,10 +17,10 @@ enum { PATH_BYTES = 4096, BUFFER_BYTES = 1 << 16 };
 static char folder[PATH_BYTES], input[PATH_BYTES], output[PATH_BYTES];
 static int saved_stdout = -1; /* copy of standard output while it is redirected */
 
-/* Occupies the descriptors 0 to 2 that are closed. An opened file gets the lowest free descriptor.
- * So a file could otherwise get the descriptor of standard output, and prints would go into this
- * file. Descriptor 0 gets a file that cannot be read, 1 and 2 get files that cannot be written, so
- * that using them fails as for a closed stream (EBADF). */
+/* Occupies those of the descriptors 0 to 2 that are closed. A file that is opened gets the lowest
+ * free descriptor. So if descriptor 1 were free, a file could get it, and text for standard output
+ * would go into this file. Descriptor 0 gets a file that cannot be read, 1 and 2 get files that
+ * cannot be written, so that using the descriptors fails as for a closed stream (EBADF). */
 bool standard_files_occupy(void)
 {
     for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
@@ -45,7 +45,8 @@ static void clean_up(void)
         rmdir(folder);
 }
 
-/* Reports an error, its reason from errno, and what to do (remedy; NULL: nothing). */
+/* Reports an error: what failed, the reason from errno, and what to do (`remedy`; NULL: nothing).
+ * Returns EXIT_FAILED. */
 static int fail_stream(const char *command, const char *what, const char *remedy)
 {
     fprintf(stderr, "ebpo %s: %s: %s%s%s\n", command, what, strerror(errno), remedy ? "; " : "",
@@ -120,8 +121,8 @@ static int redirect_output(const char *command, const char **operand)
     return EXIT_OK;
 }
 
-/* Returns true for a pipe or device that has a name, such as /dev/stdin or <(...) of a shell. It
- * can be read only once. */
+/* Returns true for a pipe or device with a name, such as /dev/stdin or <(...) of a shell. Such a
+ * file can be read only once. */
 static bool is_pipe(const char *path)
 {
     struct stat st;

@@ -1,6 +1,7 @@
-/* Handles standard streams. Replaces closed streams. Replaces the operand "-" by a temporary file:
- * standard input is copied to it at first, or it is copied to standard output at the end. Commands
- * need files, because meshes are not read sequentially, and outputs are replaced atomically. */
+/* Handles standard streams. Replaces closed streams. Replaces the operand "-" by a temporary file.
+ * For an input, standard input is copied to the temporary file at first. For an output, the
+ * temporary file is copied to standard output at the end. Commands need files, because meshes are
+ * not read sequentially, and outputs are replaced atomically. */
 #ifndef EBPO_TOOLS_STANDARD_FILES_H
 #define EBPO_TOOLS_STANDARD_FILES_H
 
@@ -10,9 +11,9 @@
  * Returns false if this is impossible; then nothing may be opened. */
 bool standard_files_occupy(void);
 
-/* Replaces operands "-" by temporary files, as spec->dash states. If an output is replaced, prints
- * of the command to standard output go to standard error. Returns an exit code, EXIT_OK also if no
- * operand is "-". Errors have been reported. */
+/* Replaces operands "-" by temporary files, as spec->dash states. If an output is replaced, all
+ * text that the command prints on standard output goes to standard error. Returns an exit code,
+ * EXIT_OK also if no operand is "-". Errors have been reported. */
 int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX]);
 
 /* Returns the name of a file for messages: "standard-input" or "standard-output" for a temporary

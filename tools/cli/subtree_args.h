@@ -11,7 +11,7 @@
 extern const char *const face_coding_words[];
 
 /* Reads --subtree-faces as the member subtree_faces of ebpo_write_options; `text` may be NULL.
- * Returns false, with the usage message printed, for an invalid number. */
+ * Returns false, after an error message, for an invalid number. */
 bool subtree_faces_read(const char *command, const char *text, uint64_t *out);
 
 #endif

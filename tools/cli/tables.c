@@ -30,7 +30,7 @@ const char *table_volume(char out[TABLE_CELL], const char *format, double x)
 
 void table_beyond(FILE *out)
 {
-    fputs("-: not known, as volumes exceed the range of numbers in the file, 2.2e-308 to "
+    fputs("-: not known, because volumes exceed the range of numbers in the file, 2.2e-308 to "
           "1.8e+308\n",
           out);
 }
@@ -57,8 +57,9 @@ const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exp
     double part = frexp(x, &own_exponent), log10_2 = 0.30102999566398119521;
     double power = log10(fabs(part)) + (double)(own_exponent + exponent) * log10_2,
            whole = floor(power);
-    digits = digits < 9 ? digits : 9; /* up to four of the 13 digits of the power come before the
-                                       * point */
+    /* `power` has about 13 exact digits. Up to four of them are before its point, so nine digits of
+     * the mantissa are exact. */
+    digits = digits < 9 ? digits : 9;
     snprintf(mantissa, sizeof mantissa, "%.*f", digits - 1, copysign(pow(10, power - whole), x));
     if (fabs(strtod(mantissa, NULL)) >= 10) { /* 9.9999... was rounded */
         snprintf(mantissa, sizeof mantissa, "%.*f", digits - 1, copysign(1, x));

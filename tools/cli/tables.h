@@ -17,7 +17,7 @@ void table_legend(FILE *out);
 /* Prints x by the printf `format` with one conversion of a double; "-" when x is not finite. */
 const char *table_cell(char out[TABLE_CELL], const char *format, double x);
 
-/* Does the same as table_cell, but if x is not finite, returns words that can follow "volume". */
+/* Same as table_cell, but if x is not finite, returns words that can follow "volume". */
 const char *table_volume(char out[TABLE_CELL], const char *format, double x);
 
 /* Prints the meaning of "-" in columns of volumes, below a table that has such cells. */

@@ -8,10 +8,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Indices in textures.list; DIGEST: bytes of a digest. */
+/* NAMES to IMAGES: indices in textures.list. DIGEST: number of bytes of a digest. */
 enum { NAMES, USES, DIGESTS, IMAGES, DIGEST = 32 };
 
-/* Bytes in memory, and their number. */
+/* The n bytes at s. */
 typedef struct span {
     const char *s;
     uint64_t n;
@@ -119,7 +119,7 @@ static bool is_kept(const textures *t, uint64_t row)
            (byte_count(t, row) || memcmp(digest.s, digest_of_nothing, DIGEST) == 0);
 }
 
-/* Returns a zero-terminated copy without control characters; NULL when memory is short. */
+/* Returns a zero-terminated copy without control characters; NULL when out of memory. */
 static char *text_of(span s)
 {
     char *text = strndup(s.s, s.n);
@@ -188,8 +188,8 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* Returns true if the name is that of a file below the folder: no word between its slashes is empty
- * or "..", the last word is not ".", and it has no drive letter. */
+/* Returns true if the name is that of a file below the folder. Such a name has no drive letter; no
+ * word between its slashes is empty or ".."; and its last word is not ".". */
 static bool stays_below(const char *name)
 {
     size_t n = 0;
@@ -221,8 +221,8 @@ static void normalize_name(char *name)
     *to = 0;
 }
 
-/* Returns the name without backslashes. NULL: memory is short, or the name is not that of a file
- * below the folder. */
+/* Returns the name with slashes in place of backslashes. Returns NULL when out of memory, and if
+ * the name is not that of a file below the folder. */
 static char *safe_name(span s)
 {
     char *name = strndup(s.s, s.n);
@@ -240,8 +240,9 @@ static char *safe_name(span s)
     return NULL;
 }
 
-/* Opens the folder of a file, and creates it if needed; does not follow links. top: the folder in
- * which `name` is. *last: the file's name without folders. Returns -1 after an error (errno). */
+/* Opens the folder of the file `name`, and creates the folder if needed. Does not follow links.
+ * `top`: descriptor of the folder to which `name` is relative. *last: the file's name without
+ * folders. Returns the folder's descriptor, or -1 with errno. */
 static int open_folder(int top, char *name, char **last)
 {
     int folder = dup(top);
@@ -372,7 +373,8 @@ static ebpo_status write_one(const textures *t, uint64_t row, int top, uint64_t 
     char *name = safe_name(list_of(t, NAMES, row)), *shown = text_of(list_of(t, NAMES, row));
     ebpo_status status = EBPO_OK;
     if (!name || !shown)
-        status = fail_file(error, EBPO_E_MEMORY, "no memory", "an image's name");
+        status = fail_file(error, EBPO_E_MEMORY, "out of memory",
+                           "the name of an image could not be copied");
     else if (write_file(top, name, list_of(t, IMAGES, row)))
         ++*written;
     else if (errno != EEXIST || !is_repeated(t, row))

@@ -13,14 +13,14 @@ enum { TEXTURE_ARRAYS = 4 };
  */
 typedef struct textures {
     uint64_t count;                             /* number of images */
-    ebpo_attribute_values list[TEXTURE_ARRAYS]; /* without values: absent or not read */
+    ebpo_attribute_values list[TEXTURE_ARRAYS]; /* an array without values is absent or not read */
     uint32_t columns[TEXTURE_ARRAYS]; /* bytes of each row, for arrays whose rows are equally long
                                        * (list[i].ends is NULL) */
-    bool embedded;                    /* the file has the bytes of images */
+    bool embedded;                    /* true: the file has the bytes of images */
 } textures;
 
-/* Reads the arrays. bytes: reads also the bytes of the images. On failure there is nothing to free.
- */
+/* Reads the arrays. `bytes`: true: also reads the bytes of the images. After a failure, there is
+ * nothing to free. */
 EBPO_MUST_USE ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes,
                                         ebpo_error *error);
 void textures_free(textures *t);

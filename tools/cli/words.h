@@ -16,7 +16,7 @@ char *words_count(char *out, size_t capacity, double v);
 char *words_bytes(char *out, size_t capacity, uint64_t bytes);
 /* Writes the fewest digits that read as the same double, as number_write does. */
 char *words_real(double x, char out[32]);
-/* Prints to standard output. */
+/* Prints `count` numbers on standard output, with the text `between` between them. */
 void words_print_reals(const double *v, int count, const char *between);
 /* Writes "1 hole", "3 holes". */
 char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, const char *many);
@@ -29,20 +29,22 @@ char *words_colour(char out[8], uint32_t colour);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);
-/* Reads digits, then nothing or one of the units. Sets *out to the number times the factor of its
- * unit. units: NULL-terminated; "" for no unit. factors: [unit]. Returns false for other text. */
+/* Reads digits and a unit. Sets *out to the number times the factor of the unit. `units`: names of
+ * the units, NULL-terminated; the name "" permits numbers without a unit. `factors`: factor of each
+ * unit. Returns false for other text. */
 bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors,
                      uint64_t *out);
 /* Reads 64M, 1GB, 0.5G, 512k, 1000000 (powers of 1000) and 64MiB, 1Gi (of 1024). */
 bool words_read_size(const char *text, uint64_t *out);
 
-/* Levels named by "3", "0-5", "3-" (to the deepest) and comma-separated lists of these. */
+/* The levels that a text names: "3", "0-5", "3-" (to the deepest level), or a list of these,
+ * separated by commas. */
 typedef struct word_levels {
-    uint32_t set; /* one bit for each level */
-    int first, last;
-    bool
-        to_end; /* a range is open ("3-"), so the deepest level of a file may be less than `last` */
-    bool is_contiguous; /* no level between the first and the last is missing */
+    uint32_t set;    /* bit i is set if level i is named */
+    int first, last; /* least and greatest level of `set` */
+    /* true: a range is open ("3-"); then the deepest level of a file may be less than `last` */
+    bool to_end;
+    bool is_contiguous; /* true: no level between `first` and `last` is missing */
 } word_levels;
 
 bool words_read_levels(const char *text, word_levels *out);
@@ -57,7 +59,7 @@ bool words_read_levels(const char *text, word_levels *out);
 bool words_end_with(const char *text, const char *end);
 void words_hex(const uint8_t digest[32], char out[65]);
 
-/* NULL-terminated, in the order of the enums; for option tables. */
+/* Lists of words for option tables, each in the order of its enum, NULL-terminated. */
 extern const char *const rule_words[];
 extern const char *selection_words[];     /* by ebpo_selection; words_init fills it in */
 extern const char *const normals_words[]; /* by ebpo_normal_distance */
