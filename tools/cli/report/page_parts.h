@@ -1,4 +1,4 @@
-/* Files of the page (page/, and Chart.js), which the build embeds in the program. */
+/* Declares the files of the page (page/ and Chart.js) that the build embeds in the program. */
 #ifndef EBPO_TOOLS_PAGE_PARTS_H
 #define EBPO_TOOLS_PAGE_PARTS_H
 

@@ -1,6 +1,6 @@
-/* Measures distance queries under a memory budget. Under a budget, a model keeps the levels 0 to
- * its cut level in memory. These levels give an interval of each distance without loading; an exact
- * query loads subtrees. */
+/* Measures distance queries under a memory budget. Under a budget, a model keeps only levels 0 to
+ * its cut level in memory. These levels give an interval of each distance, and nothing is loaded
+ * for it; an exact query loads subtrees. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -10,7 +10,8 @@
 /* Maximum number of points; it is small because loading subtrees takes time. */
 enum { BUDGET_POINTS = 500 };
 
-/* Sets the metrics f of a budget. cut_level: of the model; -1: the whole model is in memory. */
+/* Sets the metrics `f` of a budget. `cut_level`: cut level of the model; -1: the whole model is in
+ * memory. */
 static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, int cut_level,
                                        double *f, ebpo_error *error)
 {
@@ -111,7 +112,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
             m->budget[i][k] = NAN;
         method_note(m, "memory budgets", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;
-        return EBPO_OK; /* this budget is too small, and the following ones are even smaller */
+        return EBPO_OK; /* the budget is too small, and each later budget is even smaller */
     }
     return EBPO_OK;
 }

@@ -9,9 +9,9 @@
 const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
 
-#define NO_VOLUME                                                                                \
-    "a surface, or a solid without volume, has no volume to exceed; or the volume of the solid " \
-    "is not known, as components intersect or the mesh is no 2-manifold; or volumes are "        \
+#define NO_VOLUME                                                                                 \
+    "a surface, or a solid without volume, has no volume to exceed; or the volume of the solid "  \
+    "is not known, because components intersect or the mesh is not a 2-manifold; or volumes are " \
     "beyond the range of a double, and could not be computed in another unit"
 #define OUT_OF_RANGE "the volume in the model's unit cubed is beyond the range of a double"
 #define NO_MESH      "the file has no mesh, see below"

@@ -14,12 +14,12 @@ enum {
     METHODS_MAX = ARGS_OPERANDS_MAX,
     METHOD_NOTES = 10, /* maximum number of notes of a method */
     SETTINGS_MAX = METHODS_MAX,
-    DEADLINES = 8, /* numbers of measured deadlines, budgets and targets */
-    BUDGETS = 5,
-    TARGETS = 8,
-    ROUNDS = 3, /* see round_times */
-    /* maximum number of distance queries for the error bounds of a level, because flat and huge
-     * models would need too much time */
+    DEADLINES = 8, /* number of measured deadlines */
+    BUDGETS = 5,   /* number of measured budgets */
+    TARGETS = 8,   /* number of measured targets */
+    ROUNDS = 3,    /* number of rounds (round_times) */
+    /* maximum number of distance queries for the error bounds of a level; without a maximum, flat
+     * and huge models would need too much time */
     REPORT_QUERIES = 200000
 };
 
@@ -109,8 +109,8 @@ typedef enum target_metric {
 typedef struct metric_name {
     /* unit "1": a share or a ratio; "model": the model's unit of length; "model^3": its cube */
     const char *name, *unit;
-    bool timed; /* the value differs from run to run */
-    const char *meaning;
+    bool timed;          /* true: the value depends on times, and differs from run to run */
+    const char *meaning; /* description of the value */
     /* why the value may be absent if no note of the method gives a reason; NULL: never absent */
     const char *absent;
 } metric_name;
@@ -118,22 +118,26 @@ extern const metric_name level_metrics[LEVEL_METRICS], whole_metrics[WHOLE_METRI
     deadline_metrics[DEADLINE_METRICS], budget_metrics[BUDGET_METRICS],
     target_metrics[TARGET_METRICS];
 
-extern const unsigned deadlines_us[DEADLINES];
-extern const unsigned budget_parts[BUDGETS]; /* budgets are memory_bytes divided by these */
+extern const unsigned deadlines_us[DEADLINES]; /* deadlines in microseconds */
+/* budget i is the memory of the whole model (METRIC_MEMORY_BYTES) divided by budget_parts[i] */
+extern const unsigned budget_parts[BUDGETS];
 
 typedef enum target_kind { TARGET_ERROR, TARGET_SIZE } target_kind;
 
 typedef struct target_result {
     target_kind kind;
-    double requested; /* model's unit, or bytes */
+    double requested; /* TARGET_ERROR: error in the model's unit; TARGET_SIZE: bytes */
     double metric[TARGET_METRICS];
 } target_result;
 
 /* Times of one round. Methods take turns within a round, so that other load of the machine affects
  * all methods alike. The results are medians of the rounds. */
 typedef struct round_times {
-    double reading[EBPO_LEVELS_MAX], inside[EBPO_LEVELS_MAX], distance[EBPO_LEVELS_MAX];
-    double open, exact_inside, exact_distance;
+    double reading[EBPO_LEVELS_MAX]; /* seconds (METRIC_READING_SECONDS) */
+    /* nanoseconds of a query to each level */
+    double inside[EBPO_LEVELS_MAX], distance[EBPO_LEVELS_MAX];
+    double open;                         /* seconds (METRIC_OPEN_SECONDS) */
+    double exact_inside, exact_distance; /* nanoseconds of an exact query */
     double deadline[DEADLINES][DEADLINE_METRICS];
 } round_times;
 
@@ -153,10 +157,10 @@ typedef struct method {
     round_times round[ROUNDS];
     target_result targets[TARGETS];
     int target_count, note_count;
-    ebpo_thesis_levels *unlimited; /* --unlimited; NULL: not computed */
-    double unlimited_seconds;
+    ebpo_thesis_levels *unlimited;  /* results of --unlimited; NULL: not computed */
+    double unlimited_seconds;       /* time of this computation */
     char note[METHOD_NOTES][320];   /* [note_count] */
-    char *picture[EBPO_LEVELS_MAX]; /* data URIs; NULL: no picture */
+    char *picture[EBPO_LEVELS_MAX]; /* picture of each level as a data URI; NULL: no picture */
 } method;
 
 /* Values of the options. */
@@ -176,9 +180,9 @@ typedef struct report_values {
 /* A number of planes for the selections of the theses. Each setting makes one method for each
  * selection. */
 typedef struct plane_setting {
-    double percent;  /* --percent, used if `k_root` is "" */
-    char k_root[24]; /* --k-root */
-    char word[32];   /* follows the selection's name; "" if there is only one setting */
+    double percent;  /* value of --percent, used if `k_root` is "" */
+    char k_root[24]; /* value of --k-root */
+    char word[32];   /* text after the selection's name in the method's name; "": one setting */
 } plane_setting;
 
 typedef struct comparison {
@@ -186,7 +190,7 @@ typedef struct comparison {
     plane_setting setting[SETTINGS_MAX];
     int settings;
     int first, last;           /* levels to measure; a method that has fewer levels ends earlier */
-    double azimuth, elevation; /* of the pictures, in degrees */
+    double azimuth, elevation; /* direction from which pictures are drawn, in degrees */
     method *methods;           /* [count] */
     int count;
     char model[256];   /* model name for the page */
@@ -195,13 +199,14 @@ typedef struct comparison {
     uint64_t points;   /* number of points for queries, which are the same for all methods */
     double *uniform;   /* [points][3] uniform in the bounding box of the model */
     double *near;      /* [points][3] near the surface; NULL: no method has a mesh */
-    char folder[4096]; /* for temporary files */
+    char folder[4096]; /* the temporary folder in which the report is written */
     const char *without_pictures; /* why there are no pictures; NULL: there are pictures */
     ebpo_progress progress;
     double seconds; /* duration of the whole report */
 } comparison;
 
-/* Returns the last measured level of this method; less than c->first: none. */
+/* Returns the last measured level of this method. If no level is measured, the result is less than
+ * c->first. */
 int method_last(const comparison *c, const method *m);
 /* Returns the deepest measured level of all methods. */
 int comparison_last(const comparison *c);
@@ -212,16 +217,15 @@ void method_begin(method *m, const char *name, const char *path);
 void method_note(method *m, const char *what, const char *why);
 void comparison_free(comparison *c);
 
-/* Writes the short name of a file: "bunny" for "dir/bunny.ebpo.h5", or for a URL with this ending.
- */
+/* Writes the short name of a file or URL: "bunny" for "dir/bunny.ebpo.h5". */
 void report_stem(const char *path, char *out, size_t capacity);
 
 /* If `status` means that a file or this build does not support what was measured, adds the note
  * "WHAT: " and the message of `error`, and returns EBPO_OK. Otherwise returns `status`. */
 ebpo_status method_note_missing(method *m, const char *what, ebpo_status status, ebpo_error *error);
 
-/* Sorts the values, and returns their quantile: the least value that at most a share of 1 - `share`
- * of the values exceeds. Returns NAN if `count` is 0. */
+/* Sorts the values, and returns their quantile: the least of the values for which a fraction of at
+ * least `share` of all values is less or equal. Returns NAN if `count` is 0. */
 double quantile_of(double *values, uint64_t count, double share);
 
 /* The steps of a report in their order. Each sets values of one method. */
@@ -246,13 +250,13 @@ EBPO_MUST_USE ebpo_status report_targets(comparison *c, method *m, ebpo_file *fi
                                          ebpo_model *model, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_pictures(comparison *c, ebpo_error *error);
 
-/* Opens files of the operands, or builds them from one mesh with each selection. Returns an exit
- * code; errors have been reported on stderr. */
+/* Finds the methods: reads the files of the operands, or builds a file with each selection from a
+ * mesh. Returns an exit code; errors have been reported on stderr. */
 int report_find_methods(comparison *c, const char *const *operand);
 
-/* Write the report as CSV, JSON and HTML. */
+/* Write the report as CSV, JSON or HTML. `in_page`: see json.h. */
 void report_csv(FILE *out, const comparison *c);
-void report_to_json(FILE *out, const comparison *c, bool in_page); /* in_page: see json.h */
+void report_to_json(FILE *out, const comparison *c, bool in_page);
 void report_page(FILE *out, const comparison *c);
 /* Returns why this build writes no page, and how to get a build that does. Returns NULL if this
  * build writes the page. */

@@ -30,8 +30,8 @@ static void set_header_values(const comparison *c, method *m)
 
 /* --- levels --- */
 
-/* Returns true if the volume of the root cell, or of a cell 20 levels below (2^-60 of it), is no
- * normal double. */
+/* Returns true if the volume of the root cell, or 2^-60 of it (the volume of a cell 20 levels
+ * below), is not a normal double. */
 static bool is_out_of_range(const ebpo_info *info)
 {
     double volume = info->box_size[0] * info->box_size[1] * info->box_size[2];
@@ -138,7 +138,8 @@ static ebpo_status gather_levels_volumes(comparison *c, method *m, ebpo_file *fi
         status = ebpo_stream_next_level(stream, &reported, &has_more, error);
         if (status == EBPO_OK && i >= c->first) {
             m->level[i][METRIC_LEVELS_VOLUME] = reported.volume;
-            /* in a file with leaf planes, the levels alone have the same envelopes */
+            /* If the file stores leaf planes, the envelopes are the same with and without the mesh.
+             */
             m->level[i][METRIC_LEVELS_EXCESS] =
                 !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, reported.volume)
                 : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][METRIC_EXCESS]
@@ -188,8 +189,8 @@ static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file
     options.seed = (uint64_t)c->v->seed;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    /* Begins at the root even if --levels omits it, because the bound of a level is at most the
-     * bound of the level above. */
+    /* The loop begins at level 0 even if --levels omits it, because the bound of each level is used
+     * as an upper bound for the next level. */
     for (int i = 0; i <= method_last(c, m); i++) {
         ebpo_error_bound bound = EBPO_ERROR_BOUND_INIT;
         double *f = m->level[i];

@@ -128,11 +128,11 @@ typedef struct level_queries {
     ebpo_distance_result *distance; /* results of the last distance query */
     double *width;                  /* widths of intervals */
     round_times *round;
-    bool first; /* the first round; later rounds only measure times */
+    bool first; /* true: the first round; later rounds only measure times */
 } level_queries;
 
-/* Runs a query of all points: a distance query if `distance`, otherwise an inside query. Sets *ns
- * to the nanoseconds per point. */
+/* Runs queries of all points: distance queries if `distance`, otherwise inside queries. Sets *ns to
+ * the nanoseconds per point. */
 static ebpo_status time_queries(level_queries *q, bool distance, const double *points, int level,
                                 double *ns, ebpo_error *error)
 {

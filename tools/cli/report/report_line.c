@@ -9,19 +9,22 @@
 
 #include "cli/report/report_data.h"
 
-/* Bytes fetched when a file is opened, and bytes of later blocks, as in the library for URLs. */
+/* HEAD_BYTES: number of bytes that are fetched when a file is opened. BLOCK_BYTES: number of bytes
+ * of each later block. Both are as in the library for URLs. */
 enum { HEAD_BYTES = 128 << 10, BLOCK_BYTES = 4096 };
 
 /* A simulated network connection. Only one thread reads, so there is no lock. */
 typedef struct simulated_line {
-    int file;               /* descriptor of the local file */
-    uint64_t size, bytes;   /* of the file; number of bytes sent */
-    uint64_t trips;         /* number of completed round trips */
-    uint32_t *arrival_trip; /* for each block: the round trip that brings it; 0: not requested */
+    int file;       /* descriptor of the local file */
+    uint64_t size;  /* bytes of the file */
+    uint64_t bytes; /* number of bytes sent so far */
+    uint64_t trips; /* number of completed round trips */
+    /* for each block: number of the round trip that brings it, from 1; 0: not requested */
+    uint32_t *arrival_trip;
 } simulated_line;
 
-/* Requests the missing blocks of a range, which come with the next round trip. Returns the number
- * of the round trip after which all blocks of the range are there. */
+/* Requests the missing blocks of a range; they arrive with the next round trip. Returns the number
+ * of the round trip with which the last block of the range arrives. */
 static uint64_t request_blocks(simulated_line *l, uint64_t offset, uint64_t size)
 {
     uint64_t last = 0;
@@ -60,9 +63,8 @@ static void prefetch_ranges(void *user, const ebpo_range *ranges, size_t count)
         (void)request_blocks(user, ranges[i].offset, ranges[i].size);
 }
 
-/* Opens the file over the simulated connection and reads levels 0 to `level`; sets the counts of
- * `l`.
- */
+/* Opens the file over the simulated connection and reads levels 0 to `level`. Sets l->bytes and
+ * l->trips to the numbers for this. */
 static ebpo_status load_level(simulated_line *l, const char *path, int level, ebpo_error *error)
 {
     ebpo_stream_options stream_options = EBPO_STREAM_OPTIONS_INIT;

@@ -57,8 +57,8 @@ static int read_facts(comparison *c, method *m)
     return EXIT_FAILED;
 }
 
-/* Sets `name` to the name of the file without folder and endings, with '_' instead of characters
- * that names of methods must not have. */
+/* Sets `name` to the name of the file without folder and endings. Replaces characters that names of
+ * methods must not have by '_'. */
 static void write_method_name(const char *path, char *name, size_t capacity)
 {
     report_stem(path, name, capacity);
@@ -105,7 +105,7 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->max_level = (int)v->max_level;
     o->leaf_faces = (uint32_t)v->leaf_faces;
     o->epsilon = v->epsilon;
-    o->parts |= EBPO_PART_LEAF_PLANES; /* so that levels have all planes, without the mesh */
+    o->parts |= EBPO_PART_LEAF_PLANES; /* so that all planes are known without the mesh */
     o->select = (ebpo_selection)selection;
     o->percent = setting->percent;
     o->normals = (ebpo_normal_distance)v->normals;
@@ -114,8 +114,8 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->progress = c->progress;
 }
 
-/* Computes the levels of --unlimited: without the limits that the file format sets, such as the
- * number of planes of a node. Empties the mesh. */
+/* Computes the levels of --unlimited, to which the limits of the file format do not apply, such as
+ * that on the number of planes of a node. Empties the mesh. */
 static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
                                      const ebpo_build_options *build, build_result *out,
                                      ebpo_error *error)
@@ -136,8 +136,8 @@ static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
     return status;
 }
 
-/* Builds one file, or computes the levels without the limits of files. Reads the mesh for each
- * method, because the builder consumes it. */
+/* Builds one file, or, if `unlimited`, computes the levels of --unlimited. Reads the mesh again for
+ * each method, because the builder consumes the mesh. */
 static ebpo_status build_one(comparison *c, const char *mesh, int selection,
                              const plane_setting *setting, const char *path, bool unlimited,
                              build_result *out, ebpo_error *error)

@@ -14,8 +14,8 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 
-/* For the signal handler: the temporary folder ("": none), and the names of the model files that
- * may be in the folder. */
+/* Data for the signal handler: the temporary folder ("": none), and the names of the model files
+ * that may be in this folder. */
 static char temporary_folder[4096];
 static char model_names[OUTPUT_MODELS_MAX][OUTPUT_NAME_MAX];
 static volatile sig_atomic_t model_count;
@@ -128,7 +128,7 @@ static int check_place(const char *place, const char *const *operand)
     return code;
 }
 
-/* Removes all files of the folder or, if `report_files_only`, files with names of a report. Then
+/* Removes the files of the folder; if `report_files_only`, only files with names of a report. Then
  * removes the folder if it is empty. Returns true if the folder was removed. */
 static bool remove_folder(const char *folder, bool report_files_only)
 {
@@ -258,7 +258,8 @@ bool output_commit(const char *place, const char *folder)
         length--;
     snprintf(target, sizeof target, "%.*s", (int)length, place);
     /* Exchanges the folders atomically, so that a report always exists under this name. Some file
-     * systems cannot exchange folders; then the two renames below do it. */
+     * systems cannot exchange folders; then the old folder is renamed first, and the new one after
+     * it. */
     errno = 0;
 #ifdef EBPO_HAVE_RENAMEAT2
     if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {

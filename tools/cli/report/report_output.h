@@ -9,7 +9,7 @@
 #include "cli/report/report_data.h"
 
 enum {
-    OUTPUT_NAME_MAX = 80, /* bytes of the longest name of a model file, including the final 0 */
+    OUTPUT_NAME_MAX = 80, /* maximum size of a model file's name, including the final zero byte */
     OUTPUT_MODELS_MAX = METHODS_MAX + 1 /* a file for each method, and one temporary model */
 };
 
@@ -21,8 +21,8 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
 /* Sets `path` to the path of the model file STEM.ebpo.h5 in the temporary folder. A signal removes
  * this file. Must be called before the file is made. */
 void output_add_model(const char *folder, const char *stem, char *path, size_t capacity);
-/* Renames the folder to `place` and replaces an existing report. Returns false after a failure,
- * reported on stderr. */
+/* Renames the folder to `place`, and replaces an existing report. Returns false after a failure,
+ * which has been reported on stderr. */
 bool output_commit(const char *place, const char *folder);
 /* Removes the folder and its contents, if it exists. */
 void output_remove(const char *folder);

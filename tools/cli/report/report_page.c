@@ -21,7 +21,7 @@ static const page_part *find_part(const char *name, size_t length)
     return p;
 }
 
-/* Writes the pictures, as data URIs, by their levels. */
+/* Writes the pictures as data URIs: for each method, an object with the levels as keys. */
 static void pictures_to_json(FILE *out, const comparison *c)
 {
     json j;
@@ -43,7 +43,7 @@ static void pictures_to_json(FILE *out, const comparison *c)
     json_finish(&j);
 }
 
-/* Writes what replaces {{name}}. */
+/* Writes the text that replaces {{name}}. */
 static void put_part(FILE *out, const comparison *c, const char *name, size_t length)
 {
     const page_part *part = find_part(name, length);

@@ -15,8 +15,10 @@
 #include "cli/render/raster.h"
 
 enum {
-    TILE_WIDTH = 320, /* sizes in pixels: of a level's picture, and of the model's picture */
+    /* size in pixels of the picture of a level */
+    TILE_WIDTH = 320,
     TILE_HEIGHT = 250,
+    /* size in pixels of the picture of the model itself */
     PORTRAIT_WIDTH = 720,
     PORTRAIT_HEIGHT = 540,
     LEVELS_DRAWN = 12 /* maximum number of levels with a picture */
@@ -25,11 +27,12 @@ enum {
 static ebpo_status no_memory(ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message,
-             "no memory for pictures; omit them with --no-pictures");
+             "not enough memory for the pictures; omit them with --no-pictures");
     return error->status = EBPO_E_MEMORY;
 }
 
-/* Computes the colours and the opacity of a picture that was drawn on black and on white. */
+/* Computes the colours and the opacity of a picture that was drawn twice: on a black and on a white
+ * background. */
 static void make_transparent(const picture *black, const picture *white, uint8_t *rgba)
 {
     for (size_t i = 0; i < (size_t)black->width * (size_t)black->height; i++) {

@@ -1,5 +1,5 @@
-/* Measures times in rounds in which the methods take turns: reading a level, queries to a level,
- * queries with a deadline. */
+/* Measures the times of reading a level, of queries to a level, and of queries with a deadline. The
+ * measurements are made in rounds, in which the methods take turns. */
 #include <stdio.h>
 
 #include "cli/bench/bench_run.h"

@@ -26,7 +26,7 @@ static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const target
     return ebpo_subset(file, path, &options, error);
 }
 
-/* Sets the size and the error of the subset in the file `path`. model: the whole model. */
+/* Sets the size and the error of the subset in the file `path`. `model`: the whole model. */
 static ebpo_status measure_error(const comparison *c, ebpo_model *model, const char *path,
                                  target_result *target, ebpo_error *error)
 {

@@ -2,16 +2,16 @@
  * section 4.2): uncompressed, level after level from the root, each leaf with its faces and their
  * vertices. The costs are:
  *   leaf              1 byte for its corners
- *   plane             16 bytes when its normal occurs first, otherwise 4; and 4 for its offset
- *   face              12 bytes when it occurs first, otherwise 4
- *   vertex of a leaf  12 bytes when it occurs first, otherwise 4 */
+ *   plane             4 bytes for its offset; 16 more when its normal occurs first, otherwise 4
+ * more face              12 bytes when it occurs first, otherwise 4 vertex of a leaf  12 bytes when
+ * it occurs first, otherwise 4 */
 #include <stdlib.h>
 #include <string.h>
 
 #include "cli/reading.h"
 #include "cli/report/report_data.h"
 
-enum { NORMAL_SPAN = 1023 }; /* number of values of a normal's component, -511 .. 511 */
+enum { NORMAL_SPAN = 1023 }; /* number of values of a component of a normal: -511 to 511 */
 
 typedef struct cost_state {
     ebpo_mesh mesh;
@@ -29,8 +29,8 @@ static bool mark_first(uint8_t *bits, uint64_t i)
     return !before;
 }
 
-/* Returns the bytes of the planes of a cell. All cells have one shape, so equal integers are equal
- * directions at every level. */
+/* Returns the cost of the planes of a cell in bytes. All cells have the same proportions, so equal
+ * decoded normals are equal directions at every level. */
 static double plane_bytes(cost_state *s, const uint32_t *codes, uint64_t count)
 {
     double sum = 0;
@@ -51,7 +51,7 @@ static double face_bytes(cost_state *s, uint64_t face)
     for (int k = 0; k < 3; k++) {
         uint32_t v = s->mesh.faces[3 * face + (unsigned)k];
         if (s->leaf_of[v] == s->leaves)
-            continue; /* belongs to another face of this leaf */
+            continue; /* the vertex was counted for another face of this leaf */
         s->leaf_of[v] = s->leaves;
         sum += mark_first(s->vertices, v) ? 12 : 4;
     }
@@ -72,7 +72,7 @@ static double leaf_bytes(cost_state *s, const ebpo_level *l)
     return sum;
 }
 
-/* Returns false if there is not enough memory. */
+/* Makes the arrays of the counting. Returns false when out of memory. */
 static bool begin_counting(cost_state *s)
 {
     s->normals = calloc((size_t)NORMAL_SPAN * NORMAL_SPAN * 2 / 8 + 1, 1);

@@ -26,7 +26,7 @@ static void print_metrics(json *j, const metric_name *names, const double *v, in
 }
 
 /* Prints the levels of --unlimited. The envelope volume of a level includes the leaves and black
- * nodes of the levels above, which also represent the solid there. */
+ * nodes of the levels above, because they also represent the solid at this level. */
 static void print_unlimited(json *j, const method *m)
 {
     double above = 0;
