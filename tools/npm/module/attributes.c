@@ -1,5 +1,5 @@
-/* Attributes of the source, samples of them, maps, and corners of faces, for the WebAssembly
- * module. */
+/* Reads attributes of the source, samples of attributes, maps, and corners of faces, for the
+ * WebAssembly module. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,9 +8,9 @@
 #include "mesh/attributes.h"
 #include "module.h"
 
-/* Array 0: values of the n-th array of attributes, in its type and the order of the file. Array 1:
- * ends of lists of different lengths, doubles; empty for other arrays. With `values` 0, array 0 is
- * empty. */
+/* Gets array n of the file's attributes. Result array 0: values in the type of the array and the
+ * order of the file; empty if `values` is 0. Result array 1: if the rows are lists of different
+ * lengths, the end of each list, doubles; otherwise empty. */
 int EBPO_JS(ebpo_js_attribute)(ebpo_js_object *object, uint32_t n, int values)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -35,7 +35,7 @@ int EBPO_JS(ebpo_js_attribute)(ebpo_js_object *object, uint32_t n, int values)
     return status;
 }
 
-/* Array 0: source indices of vertices; array 1: of faces; uint32. */
+/* Gets the source indices, uint32. Result array 0: of vertices. Result array 1: of faces. */
 int EBPO_JS(ebpo_js_maps)(ebpo_js_object *object)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -60,8 +60,9 @@ int EBPO_JS(ebpo_js_sampler)(ebpo_js_object *object, const char *names)
                : ebpo_sampler_new(object->file, names, 1, &object->sampler, &object->error);
 }
 
-/* Array 0: values of each point and attribute, doubles. `points` are [count][3]; `faces` are
- * doubles, below 0: no face. */
+/* Samples attributes at points. Result array 0: the value of each attribute for each point,
+ * doubles. `points`: [count][3]. `faces`: [count] index of the face of each point; below 0: no
+ * face. */
 int EBPO_JS(ebpo_js_sample)(ebpo_js_object *object, const double *points, const double *faces,
                             uint32_t count)
 {
@@ -78,8 +79,8 @@ int EBPO_JS(ebpo_js_sample)(ebpo_js_object *object, const double *points, const 
     return status;
 }
 
-/* Array 0: corners of faces [count][3][3], floats or doubles as the file has them. `faces`: indices
- * in the file. */
+/* Gets the corners of faces. Result array 0: [count][3][3] coordinates, floats or doubles as in the
+ * file. `faces`: [count] indices of the faces in the file. */
 int EBPO_JS(ebpo_js_corners)(ebpo_js_object *object, const double *faces, uint32_t count)
 {
     enum { CORNERS, NUMBERS, ROWS, CACHE = 16 << 20 };

@@ -5,9 +5,9 @@
 
 #include "module.h"
 
-/* codes[*count] are the octcodes of the gray nodes of the level above `level`. Frees them, and
- * returns the octcodes of the gray nodes of `level`; NULL: not enough memory. root: `level` is
- * level 0. */
+/* Returns the octcodes of the gray nodes of `level`, and sets *count to their number. On entry,
+ * codes[*count] are the octcodes of the gray nodes of the level above; this function frees them.
+ * Returns NULL when out of memory. `root`: true: `level` is level 0. */
 static uint64_t *next_codes(uint64_t *codes, uint64_t *count, const ebpo_level *level, bool root)
 {
     uint64_t found = 0, *next = malloc((size_t)(level->gray_count + 1) * sizeof *next);
@@ -20,7 +20,7 @@ static uint64_t *next_codes(uint64_t *codes, uint64_t *count, const ebpo_level *
     return next;
 }
 
-/* Opens each subtree, if the file has a table of subtrees. */
+/* Opens and closes each subtree, if the file has a table of subtrees. */
 static ebpo_status check_subtrees(ebpo_js_object *object, const ebpo_tree *tree)
 {
     int last = ebpo_file_info(object->file)->subtree_level;

@@ -1,5 +1,5 @@
-/* Queries pairs of models, for the WebAssembly module that includes collide.h. Both models are in
- * the memory of one instance of the module. */
+/* Queries pairs of models, for the build of the WebAssembly module that includes the functions of
+ * collide.h. Both models are in the memory of one instance of the module. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,8 +12,7 @@ typedef struct ebpo_js_pair {
     ebpo_collider *collider;
 } ebpo_js_pair;
 
-/* Makes a pair of two models, or of one model twice. A repeated call after EBPO_E_PENDING continues
- * with the same pair. */
+/* Returns an empty pair; NULL: out of memory. */
 ebpo_js_pair *EBPO_JS(ebpo_js_pair_new)(void)
 {
     ebpo_js_pair *pair = calloc(1, sizeof *pair);
@@ -22,6 +21,8 @@ ebpo_js_pair *EBPO_JS(ebpo_js_pair_new)(void)
     return pair;
 }
 
+/* Sets the models of the pair: two models, or one model twice. A repeated call after EBPO_E_PENDING
+ * continues with the same pair. */
 int EBPO_JS(ebpo_js_pair_make)(ebpo_js_pair *pair, ebpo_js_object *a, ebpo_js_object *b)
 {
     ebpo_collider_options options = EBPO_COLLIDER_OPTIONS_INIT;
@@ -36,7 +37,7 @@ void EBPO_JS(ebpo_js_pair_free)(ebpo_js_pair *pair)
     free(pair);
 }
 
-/* Poses are 13 doubles: rotation, translation, scale. */
+/* Reads a pose from 13 doubles: rotation (9), translation (3), scale. */
 static ebpo_pose read_pose(const double *x)
 {
     ebpo_pose pose;
@@ -70,9 +71,9 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return faces && kinds && file_faces;
 }
 
-/* Gets one pair of intersecting faces. Array 0: faces [2] (face_a and face_b of ebpo_face_pair),
- * uint32. Array 1: ebpo_pair_kind, uint8. Array 2: indices of the faces in the files [2], uint32.
- * Empty arrays: no faces intersect. */
+/* Gets one pair of intersecting faces. Result array 0: uint32 [2], face_a and face_b of
+ * ebpo_face_pair. Result array 1: uint8, ebpo_pair_kind. Result array 2: uint32 [2], indices of the
+ * faces in the files. If no faces intersect, the arrays are empty. */
 int EBPO_JS(ebpo_js_pair_first)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -110,8 +111,8 @@ static bool take_segments(void *user, const ebpo_contact_segment *segments, uint
     return points && faces;
 }
 
-/* Gets the segments in which faces cross. Array 0: segments [2][3], doubles. Array 1: faces [2],
- * uint32. */
+/* Gets the segments in which faces cross. Result array 0: double [2][3] for each segment, its ends.
+ * Result array 1: uint32 [2] for each segment, its faces. */
 int EBPO_JS(ebpo_js_pair_contacts)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -122,7 +123,8 @@ int EBPO_JS(ebpo_js_pair_contacts)(ebpo_js_pair *pair, const double *poses)
     return pair->object.error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
 }
 
-/* Array 0: `relation` and `contact` of ebpo_relation_result, int32. */
+/* Gets the relation of the models. Result array 0: int32 [2], `relation` and `contact` of
+ * ebpo_relation_result. */
 int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -134,8 +136,9 @@ int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
     return status == EBPO_OK ? ebpo_js_put(&pair->object, 0, out, sizeof out) : status;
 }
 
-/* Array 0: both bounds of the distance, then the nearest points [2][3], doubles. Array 1: faces
- * [2], uint32. */
+/* Gets the distance of the models. Result array 0: double [8], the lower and the upper bound of the
+ * distance, then the two nearest points. Result array 1: uint32 [2], the faces of these points;
+ * UINT32_MAX: no faces. */
 int EBPO_JS(ebpo_js_pair_distance)(ebpo_js_pair *pair, const double *poses, double tolerance)
 {
     ebpo_collide_options options = read_options(poses);

@@ -17,21 +17,22 @@ int EBPO_JS(ebpo_js_stream)(ebpo_js_object *object, int planes, int polygons)
     return ebpo_stream_new(object->file, &options, &object->stream, &object->error);
 }
 
-/* Result arrays of a level of the stream; all but the last one are of nodes. */
+/* Result arrays of a level of the stream. All arrays before LEVEL_FACTS are for the nodes of the
+ * level, one node after the other. */
 enum stream_array {
-    NODE_CODES,    /* uint64 */
-    NODE_TYPES,    /* uint8 */
-    NODE_WINDINGS, /* int32 */
-    NODE_CELLS,    /* double [6]: min, max */
-    NODE_VOLUMES,  /* double */
-    NODE_COLOURS,  /* uint32; UINT32_MAX: none */
-    PLANE_COUNTS,  /* uint32 */
-    PLANES,        /* double [4] */
-    VERTEX_COUNTS, /* uint32 */
-    VERTICES,      /* double [3] */
-    POLYGON_COUNTS,
-    POLYGON_FIRST,                    /* uint32 [polygon_count + 1] of each node with polygons */
-    CORNERS,                          /* uint32: vertices of the node */
+    NODE_CODES,     /* uint64 for each node: octcode */
+    NODE_TYPES,     /* uint8 for each node */
+    NODE_WINDINGS,  /* int32 for each node: winding number */
+    NODE_CELLS,     /* double [6] for each node: min, max */
+    NODE_VOLUMES,   /* double for each node */
+    NODE_COLOURS,   /* uint32 for each node; UINT32_MAX: no colour */
+    PLANE_COUNTS,   /* uint32 for each node: number of planes */
+    PLANES,         /* double [4] for each plane */
+    VERTEX_COUNTS,  /* uint32 for each node: number of vertices */
+    VERTICES,       /* double [3] for each vertex */
+    POLYGON_COUNTS, /* uint32 for each node: number of polygons */
+    POLYGON_FIRST,  /* uint32 [polygon_count + 1] for each node with polygons: first corners */
+    CORNERS,        /* uint32 for each corner: index of a vertex of the node */
     LEVEL_FACTS = EBPO_JS_NODE_ARRAYS /* double [4]: level, number of nodes, bytes, volume */
 };
 
@@ -66,7 +67,7 @@ bool ebpo_js_put_node(ebpo_js_object *object, const ebpo_stream_node *n)
            put_polygons(object, n);
 }
 
-/* Reads the next level of the stream. Array LEVEL_FACTS is empty after the last one. After
+/* Reads the next level of the stream. After the last level, array LEVEL_FACTS is empty. After
  * EBPO_E_PENDING, the next call appends the remaining nodes of the level to the arrays. */
 int EBPO_JS(ebpo_js_next_level)(ebpo_js_object *object)
 {
@@ -146,10 +147,11 @@ static ebpo_status put_lod(ebpo_js_object *object, const ebpo_mesh *mesh,
     return status != EBPO_OK ? status : ok ? EBPO_OK : EBPO_E_MEMORY;
 }
 
-/* Gets the envelopes of a level. Arrays 0: vertices [3], 1: triangles [3], 2: number of corners of
- * each polygon, uint8, 3: normals of the polygons, float [3], 4 to 10: octcode, type, winding
- * number, volume, number of vertices, number of polygons and colour of each node, 11: volume of the
- * level. cell_faces: as in ebpo_lod_options. */
+/* Gets the envelopes of a level. Result array 0: double [3] for each vertex. 1: uint32 [3] for each
+ * triangle. 2: uint8 for each polygon, its number of corners. 3: float [3] for each polygon, its
+ * normal. 4 to 10: for each node, its octcode, type, winding number, volume, number of vertices,
+ * number of polygons, and colour. 11: double, volume of the level. `cell_faces`: as in
+ * ebpo_lod_options. */
 int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
 {
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
@@ -170,9 +172,10 @@ int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
 
 /* ---- mesh ---- */
 
-/* Array 0: vertices [3], floats; array 1: vertices [3], doubles; one of the two is empty. Array 2:
- * triangles [3], uint32. `in_source_order`: rows are in the order of the source, if the file has
- * source indices; else in the order of the file. */
+/* Gets the mesh. Result array 0: float [3] for each vertex; result array 1: double [3] for each
+ * vertex; one of these two arrays is empty. Result array 2: uint32 [3] for each triangle.
+ * `in_source_order`: true: rows are in the order of the source, if the file has source indices;
+ * otherwise in the order of the file. */
 int EBPO_JS(ebpo_js_mesh)(ebpo_js_object *object, int in_source_order)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;

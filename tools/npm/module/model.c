@@ -23,8 +23,8 @@ void EBPO_JS(ebpo_js_unload)(ebpo_js_object *object)
 
 /* ---- queries ---- */
 
-/* Returns an object for queries of a model, one at a time; NULL: not enough memory. Streams and
- * information of the file need no model. */
+/* Returns an object that runs one query of a model at a time; NULL: out of memory. `model->model`
+ * may be NULL, because streams and information of the file need no model. */
 ebpo_js_object *EBPO_JS(ebpo_js_query)(const ebpo_js_object *model)
 {
     ebpo_js_object *object = calloc(1, sizeof *object);
@@ -62,8 +62,9 @@ void EBPO_JS(ebpo_js_query_free)(ebpo_js_object *object)
 
 /* ---- results of the whole file ---- */
 
-/* Puts statistics into array 0: memory, its peak and budget, whether everything is in memory, cut
- * level, hits, loads, evicted, bytes read, reads, supplied bytes in memory. */
+/* Gets statistics. Result array 0: double [11]: memory, peak of the memory, budget, 1 if the whole
+ * model is in memory (else 0), cut level, hits, loads, evicted subtrees, bytes read, reads, and
+ * supplied bytes that are in memory. */
 int EBPO_JS(ebpo_js_stats)(ebpo_js_object *object)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
@@ -84,7 +85,8 @@ int EBPO_JS(ebpo_js_stats)(ebpo_js_object *object)
     return ebpo_js_put(object, 0, values, sizeof values);
 }
 
-/* Puts into array 0: area, volume, centroid, inertia, bounds of the volume, integral. */
+/* Measures the model (ebpo_mass). Result array 0: double [17]: area, volume, centroid (3), inertia
+ * (9), lower and upper bound of the volume, integral of the winding number. */
 int EBPO_JS(ebpo_js_measure)(ebpo_js_object *object)
 {
     ebpo_mass m = EBPO_MASS_INIT;

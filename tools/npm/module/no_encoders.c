@@ -1,5 +1,5 @@
-/* Stands in for the encoders of zstd and zlib, to which the table of codecs refers: the module
- * writes no files, so nothing calls them. */
+/* Defines functions that replace the encoders of zstd and zlib. The table of codecs refers to the
+ * encoders, but the module writes no files, so nothing calls them. */
 #define ZSTD_STATIC_LINKING_ONLY
 #include <zlib.h>
 #include <zstd.h>

@@ -1,4 +1,5 @@
-/* Objects of the WebAssembly modules: opening, bytes, results and information. */
+/* Provides the objects of the WebAssembly module: opening, supply of bytes, result arrays, and
+ * information of the file. */
 #include <float.h>
 #include <inttypes.h>
 #include <math.h>
@@ -85,7 +86,7 @@ double EBPO_JS(ebpo_js_offset)(const ebpo_js_object *object)
 
 /* ---- bytes ---- */
 
-/* Returns an object without an open file; NULL: not enough memory. */
+/* Returns an object without an open file; NULL: out of memory. */
 ebpo_js_object *EBPO_JS(ebpo_js_new)(double size, const char *name, const char *version,
                                      double memory)
 {
@@ -123,7 +124,8 @@ void EBPO_JS(ebpo_js_end)(ebpo_js_object *object, double operation)
     ebpo_async_end(object->async, (uint64_t)operation);
 }
 
-/* Puts the needed ranges into array 0: offset and size of each. */
+/* Puts the byte ranges that the object needs into array 0: offset and size of each range, doubles.
+ */
 int EBPO_JS(ebpo_js_needed)(ebpo_js_object *object)
 {
     const ebpo_range *ranges = NULL;
@@ -163,7 +165,7 @@ ebpo_status ebpo_js_need_mesh(ebpo_js_object *object)
 
 /* ---- opening ---- */
 
-/* Opens the file. `whole`: all bytes are supplied already, so nothing is fetched in advance. */
+/* Opens the file. `whole`: true: all bytes are supplied already, so no prefetch hints are sent. */
 int EBPO_JS(ebpo_js_open)(ebpo_js_object *object, const char *name, int whole)
 {
     ebpo_source source = EBPO_SOURCE_INIT;
@@ -190,7 +192,7 @@ static EBPO_PRINTF(2, 3) ebpo_status put_text(ebpo_js_object *object, const char
     return ebpo_js_put(object, 0, text, (size_t)length);
 }
 
-/* Appends a member of a JSON object and a comma; so do the next functions. */
+/* put_string, put_number, put_vector and put_hash append a member of a JSON object, and a comma. */
 static ebpo_status put_string(ebpo_js_object *object, const char *name, const char *value)
 {
     ebpo_status status = put_text(object, "\"%s\":\"", name);

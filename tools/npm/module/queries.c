@@ -1,7 +1,7 @@
 /* Evaluates queries of many points, rays and boxes, for the WebAssembly module. Inputs are arrays
- * of doubles; results are one array for each member of the library's result structs. Indices of
- * faces have 32 bits; UINT32_MAX is EBPO_NO_FACE. A call after EBPO_E_PENDING has the same
- * arguments and keeps completed items. */
+ * of doubles. There is one result array for each member of the library's result struct. Indices of
+ * faces have 32 bits; UINT32_MAX is EBPO_NO_FACE. After EBPO_E_PENDING, the caller repeats the call
+ * with the same arguments, and completed items are not evaluated again. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,7 @@ static uint32_t face_index(uint64_t face)
     return face == EBPO_NO_FACE ? UINT32_MAX : (uint32_t)face;
 }
 
-/* Array of the flags of completed items. */
+/* Index of the result array with the flags of completed items. */
 enum { DONE = 15 };
 
 static bool *done_flags(ebpo_js_object *object, uint32_t count)
@@ -30,7 +30,7 @@ double EBPO_JS(ebpo_js_completed)(const ebpo_js_object *object)
     return (double)completed;
 }
 
-/* Array 0: ebpo_where, int8. Array 1: winding numbers, int32. */
+/* Classifies points. Array 0: ebpo_where, int8. Array 1: winding numbers, int32. */
 int EBPO_JS(ebpo_js_inside)(ebpo_js_object *object, const double *points, uint32_t count, int level)
 {
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
@@ -50,7 +50,7 @@ int EBPO_JS(ebpo_js_inside)(ebpo_js_object *object, const double *points, uint32
     return status;
 }
 
-/* Array 0: lower and upper bound of each winding number, doubles. */
+/* Computes winding numbers. Array 0: lower and upper bound of each winding number, doubles. */
 int EBPO_JS(ebpo_js_winding)(ebpo_js_object *object, const double *points, uint32_t count,
                              double width)
 {
@@ -59,8 +59,8 @@ int EBPO_JS(ebpo_js_winding)(ebpo_js_object *object, const double *points, uint3
                   : EBPO_E_MEMORY;
 }
 
-/* Arrays 0 and 1: distances and upper bounds, 2 and 3: points and normals [3], doubles. Array 4:
- * faces. Array 5: lower bounds. */
+/* Computes distances. Array 0: distances. Array 1: upper bounds. Array 2: nearest points [3]. Array
+ * 3: normals [3]. Array 4: faces, uint32. Array 5: lower bounds. Arrays 0 to 3 and 5: doubles. */
 int EBPO_JS(ebpo_js_distance)(ebpo_js_object *object, const double *points, uint32_t count,
                               int level, double max_distance, int is_unsigned)
 {
@@ -102,7 +102,8 @@ static bool take_near_face(void *user, const ebpo_near_face *near)
            ebpo_js_put(object, 4, &face, sizeof face) == EBPO_OK;
 }
 
-/* The faces nearest to a point, in arrays as ebpo_js_distance. `most` 0: all. */
+/* Gets the faces within `radius` of a point. Arrays 0, 2, 3 and 4 are as in ebpo_js_distance.
+ * `most`: maximum number of faces; 0: all faces. */
 int EBPO_JS(ebpo_js_within)(ebpo_js_object *object, const double *point, double radius, double most)
 {
     ebpo_within_options options = EBPO_WITHIN_OPTIONS_INIT;
@@ -117,7 +118,8 @@ int EBPO_JS(ebpo_js_within)(ebpo_js_object *object, const double *point, double 
 
 /* ---- rays ---- */
 
-/* Puts rays of doubles [count][6] (origin and direction) into array 6. */
+/* Converts rays from doubles [count][6] (origin and direction). Returns the rays, which are in
+ * array 6; NULL when out of memory. */
 static ebpo_ray *make_rays(ebpo_js_object *object, const double *lines, uint32_t count,
                            double t_max)
 {
@@ -130,7 +132,7 @@ static ebpo_ray *make_rays(ebpo_js_object *object, const double *lines, uint32_t
     return rays;
 }
 
-/* Puts t into array 0, faces into array 1, sides into array 2. */
+/* Puts hits into result arrays. Array 0: t. Array 1: faces. Array 2: sides. */
 static ebpo_status put_hits(ebpo_js_object *object, const ebpo_ray_hit *hits, uint64_t count)
 {
     double *t = ebpo_js_fixed(object, 0, count, sizeof *t);
@@ -154,6 +156,7 @@ static ebpo_ray_options ray_options(int sides)
     return options;
 }
 
+/* Gets the first hit of each ray, in the arrays of put_hits. */
 int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint32_t count,
                                double t_max, int sides)
 {
@@ -168,7 +171,8 @@ int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint
     return status == EBPO_OK ? put_hits(object, hits, count) : status;
 }
 
-/* As ebpo_js_ray_first, all hits. Array 3: index of the first hit of each ray, and the count. */
+/* Gets all hits of each ray, in the arrays of put_hits. Array 3: index of the first hit of each
+ * ray, and at the end the number of all hits. */
 int EBPO_JS(ebpo_js_ray_all)(ebpo_js_object *object, const double *lines, uint32_t count,
                              double t_max, int sides)
 {
@@ -189,7 +193,7 @@ int EBPO_JS(ebpo_js_ray_all)(ebpo_js_object *object, const double *lines, uint32
     return put_hits(object, hits, begin[count]);
 }
 
-/* Array 0: 1 for each ray that hits, else 0. */
+/* Array 0: for each ray, 1 if the ray hits a face, else 0; uint8. */
 int EBPO_JS(ebpo_js_ray_any)(ebpo_js_object *object, const double *lines, uint32_t count,
                              double t_max, int sides)
 {
@@ -202,7 +206,7 @@ int EBPO_JS(ebpo_js_ray_any)(ebpo_js_object *object, const double *lines, uint32
     return ebpo_ray_any_many(object->context, rays, count, &options, any, &object->error);
 }
 
-/* ---- one point or ray a call: results are numbers of the object ---- */
+/* ---- queries of one point or ray: results are in `number` of the object ---- */
 
 /* Returns the numbers of an object, which JavaScript reads. */
 const double *EBPO_JS(ebpo_js_numbers)(const ebpo_js_object *object) { return object->number; }
@@ -261,7 +265,7 @@ int EBPO_JS(ebpo_js_ray_one)(ebpo_js_object *object, double x, double y, double 
 
 /* ---- boxes ---- */
 
-/* Array 0: the faces that intersect the box; `box` is min, then max. */
+/* Gets the faces that intersect a box. Array 0: faces. `box`: [6] min, max. */
 int EBPO_JS(ebpo_js_box_faces)(ebpo_js_object *object, const double *box)
 {
     const uint64_t *faces = NULL;
@@ -277,7 +281,7 @@ int EBPO_JS(ebpo_js_box_faces)(ebpo_js_object *object, const double *box)
     return EBPO_OK;
 }
 
-/* Takes triangles until there are more than a limit. */
+/* Context of take_triangles, which stops the query after more than `most` triangles. */
 typedef struct triangle_taking {
     ebpo_js_object *object;
     double most;
@@ -296,8 +300,8 @@ static bool take_triangles(void *user, const ebpo_triangles *triangles)
            (double)object->array[0].bytes / sizeof *faces <= taking->most;
 }
 
-/* As ebpo_js_box_faces, with the corners of the triangles [3][3] in array 1. Stops when there are
- * more than `most`. */
+/* Gets the faces that intersect a box, and their corners. Array 0: faces. Array 1: corners [3][3],
+ * doubles. Stops when there are more than `most` faces. */
 int EBPO_JS(ebpo_js_box_triangles)(ebpo_js_object *object, const double *box, double most)
 {
     triangle_taking taking = { object, most };

@@ -3,30 +3,31 @@
 
 #include "module.h"
 
-/* Result arrays of ebpo_js_subtree: members of ebpo_subtree_nodes and ebpo_subtree_faces. Empty if
- * the file or the request does not have the data. */
+/* Result arrays of ebpo_js_subtree: members of ebpo_subtree_nodes and ebpo_subtree_faces. An array
+ * is empty if the file does not have its data, or the data was not requested. */
 enum {
-    SUBTREE_FACTS, /* double [3]: level; 1: has faces; number of shared faces */
+    SUBTREE_FACTS, /* double [3]: level; 1 if faces were read, else 0; number of shared faces */
     LEVEL_FIRST,   /* uint64 */
     OCTCODES,      /* uint64 */
     TYPES,         /* uint8 */
     WINDINGS,      /* int32 */
     CHILDREN,      /* uint32 */
-    PLANE_FIRST,
-    PLANES,
-    ABOVE_FIRST,
-    ABOVE_PLANES,
-    VERTICES, /* float or double */
-    FACES,    /* uint32 */
-    NUMBERS,
-    SOURCE,
-    LIST_FIRST,
-    LIST
+    PLANE_FIRST,   /* uint32 */
+    PLANES,        /* uint32 */
+    ABOVE_FIRST,   /* uint32 */
+    ABOVE_PLANES,  /* uint32 */
+    VERTICES,      /* float [3] or double [3] */
+    FACES,         /* uint32 [3] */
+    NUMBERS,       /* uint32: file_faces */
+    SOURCE,        /* uint32 */
+    LIST_FIRST,    /* uint32 */
+    LIST           /* uint32 */
 };
 
 _Static_assert(LIST < EBPO_JS_ARRAYS, "result arrays");
 
-/* Appends data[count], items of `size` bytes, to result array n. NULL: no items. */
+/* Appends `count` items of `size` bytes to result array n. If `data` is NULL, appends nothing.
+ * Returns false when out of memory. */
 static bool put_items(ebpo_js_object *object, unsigned n, const void *data, uint64_t count,
                       size_t size)
 {
@@ -59,7 +60,8 @@ static bool put_faces(ebpo_js_object *object, const ebpo_subtree_faces *f, uint6
            put_items(object, LIST, f->list, f->list_first[nodes], 4);
 }
 
-/* Reads the subtree of a node. `levels` -1: all, with the faces. */
+/* Reads the subtree of a node. `levels`: number of levels below the node; -1: all levels, with the
+ * faces. */
 int EBPO_JS(ebpo_js_subtree)(ebpo_js_object *object, uint64_t octcode, int levels, double memory,
                              int or_leaf_above)
 {
@@ -86,7 +88,8 @@ int EBPO_JS(ebpo_js_subtree)(ebpo_js_object *object, uint64_t octcode, int level
     return ok ? EBPO_OK : EBPO_E_MEMORY;
 }
 
-/* Returns the octcode of the cell of a level that contains a point; 0: outside the root cell. */
+/* Returns the octcode of the cell of a level that contains a point; 0: the point is outside the
+ * root cell. */
 uint64_t EBPO_JS(ebpo_js_octcode)(const ebpo_js_object *object, double x, double y, double z,
                                   int level)
 {

@@ -19,9 +19,10 @@ enum {
     DRAWN = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES | EBPO_NEEDS_COLOURS
 };
 
-/* Begins drawing. `memory`: size of the cache of decoded chunks in bytes; whole levels do not use
- * the cache. Chunks are not compared with the list of chunk checksums until ebpo_js_sums has read
- * it, because the list may arrive late. Returns 1 if the file has such a list. */
+/* Begins drawing. `memory`: size of the cache of decoded chunks in bytes; reading a whole level
+ * does not use the cache. Chunks are not compared with their checksums until ebpo_js_sums has read
+ * the list of chunk checksums, because this list may arrive late. Returns 1 if the file has such a
+ * list. */
 int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
 {
     ebpo_file *file = ebpo_reader_own(object->file); /* the same file, mutable */
@@ -31,8 +32,8 @@ int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
     return has_checksums;
 }
 
-/* Reads the list of chunk checksums. Then empties the cache, so that repeated calls compare all
- * chunks. */
+/* Reads the list of chunk checksums. Then empties the cache, so that later reads compare all chunks
+ * with their checksums. */
 int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
 {
     ebpo_file *file = ebpo_reader_own(object->file); /* the same file, mutable */
@@ -67,16 +68,17 @@ int EBPO_JS(ebpo_js_level_bytes)(ebpo_js_object *object)
 
 /* Result arrays of ebpo_js_nodes. */
 enum {
-    /* double [13] of each part: [0] level, [1] part, [2] first group, [3] number of groups, [4] to
-     * [7] rank of the first white, black, leaf and gray node, [8] to [12] number of the part's
-     * items in PART_COUNTS, PART_PLANES, PART_LEAF_COUNTS, PART_LEAF_PLANES and PART_COLOURS */
+    /* double [13] for each part: [0] level, [1] index of the part, [2] first group, [3] number of
+     * groups, [4] to [7] ranks of the first white, black, leaf and gray node, [8] to [12] numbers
+     * of the part's items in PART_COUNTS, PART_PLANES, PART_LEAF_COUNTS, PART_LEAF_PLANES and
+     * PART_COLOURS */
     PART_FACTS,
-    PART_TYPES,       /* uint16 of each group: types of its eight nodes */
-    PART_COUNTS,      /* uint8 of each gray node: number of planes */
-    PART_PLANES,      /* uint32 of each of these planes: code */
-    PART_LEAF_COUNTS, /* uint8 of each leaf: number of stored planes */
-    PART_LEAF_PLANES, /* uint32 of each of these planes: code */
-    PART_COLOURS      /* uint32 of each gray node; none in files without colours */
+    PART_TYPES,       /* uint16 for each group: types of its eight nodes */
+    PART_COUNTS,      /* uint8 for each gray node: number of planes */
+    PART_PLANES,      /* uint32 for each plane of a gray node: code */
+    PART_LEAF_COUNTS, /* uint8 for each leaf: number of stored planes */
+    PART_LEAF_PLANES, /* uint32 for each stored plane of a leaf: code */
+    PART_COLOURS      /* uint32 for each gray node; empty if the file has no colours */
 };
 
 typedef struct wanted_part {
@@ -111,8 +113,8 @@ static ebpo_status find_run(ebpo_js_object *object, const wanted_part *wanted, e
     return status;
 }
 
-/* Appends data[count], items of `size` bytes, to result array n, and the number of items to
- * PART_FACTS. NULL: no items. */
+/* Appends `count` items of `size` bytes to result array n, and the number of items to PART_FACTS.
+ * If `data` is NULL, there are 0 items. Returns false when out of memory. */
 static bool put_items(ebpo_js_object *object, unsigned n, const void *data, uint64_t count,
                       size_t size)
 {
@@ -171,9 +173,9 @@ static ebpo_status read_part(ebpo_js_object *object, const wanted_part *wanted)
     return status;
 }
 
-/* Collects in `hints` the chunks of the wanted parts that are not in memory. wanted[count] has the
- * levels of a subtree one after another, ascending: the subtree is collected once, down to the
- * deepest of these levels. */
+/* Collects in `hints` the chunks of the wanted parts that are not in memory. The levels of one
+ * subtree are adjacent in wanted[count] and ascend. So the chunks of the subtree are collected
+ * once, down to the deepest of these levels. */
 static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_part *wanted,
                        uint32_t count)
 {
@@ -189,9 +191,9 @@ static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_p
     }
 }
 
-/* Returns a number of first parts that together take at most `bytes` bytes of the file, but at
- * least LEAST parts or all: doubles this number while the parts fit. Parts of levels that are not
- * stored by subtree are not counted, because such levels are small. */
+/* Returns a number n, so that the first n parts together take at most `bytes` bytes of the file.
+ * But n is at least LEAST, or `count` if this is less. Doubles n while the parts fit. Parts of
+ * levels that are not stored by subtree are not counted, because such levels are small. */
 static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
                                  double bytes)
 {
@@ -210,8 +212,8 @@ static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *want
 }
 
 /* Reads the parts wanted[count] into the result arrays. The levels of one subtree must be adjacent
- * in `wanted` and ascend. Reads only as many first parts as take about `bytes` bytes of the file.
- */
+ * in `wanted` and ascend. Reads only the first parts, up to about `bytes` bytes of the file
+ * (affordable_parts). */
 int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
                            double bytes)
 {
@@ -240,7 +242,8 @@ int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, ui
     ebpo_hint_all(&hints);
     for (uint32_t i = 0; i < count && (status == EBPO_OK || status == EBPO_E_PENDING); i++) {
         ebpo_status one = read_part(object, &wanted[i]);
-        /* goes on after EBPO_E_PENDING, so that the missing bytes of all parts are requested */
+        /* The loop goes on after EBPO_E_PENDING, so that the missing bytes of all parts are
+         * requested. */
         status = one == EBPO_OK ? status : one;
     }
     return status;

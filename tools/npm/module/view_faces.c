@@ -15,24 +15,27 @@
 
 enum { LISTS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
 
-/* A leaf: its level, the index of its group (the eight children of a node) in the level, its octant
- * in the group, and the index of its subtree; subtree -1: the file does not store the level by
- * subtree. */
+/* The position of a leaf in the file. */
 typedef struct wanted_leaf {
-    double level, group, octant, subtree;
+    double level;
+    double group;   /* index in the level of the leaf's group (the eight children of a node) */
+    double octant;  /* index of the leaf in the group */
+    double subtree; /* index of the leaf's subtree; -1: the file does not store the level by
+                     * subtree */
 } wanted_leaf;
 
 /* Result arrays of ebpo_js_leaf_faces. */
 enum {
-    FACE_COUNTS,  /* uint32 of each leaf */
+    FACE_COUNTS,  /* uint32 for each leaf: number of its faces */
     FACE_NUMBERS, /* uint32: faces (indices in the file), leaf after leaf, ascending in each leaf */
-    FACE_CORNERS, /* double or float [9] of each face */
-    FACE_COLOURS, /* uint8 [3][3] of each face: red, green and blue of the corners */
-    FACE_ROWS     /* uint32 [3] of each face: vertices, in the file */
+    FACE_CORNERS, /* double or float [9] for each face: its corners */
+    FACE_COLOURS, /* uint8 [3][3] for each face: red, green and blue of the corners */
+    FACE_ROWS     /* uint32 [3] for each face: indices of its vertices in the file */
 };
 
-/* Maximum number of groups between two leaves that are read with the leaves, because a further run
- * of groups would cost more (its nodes before the first group must be counted). */
+/* If at most this number of groups is between two leaves, these groups are read too, in one run
+ * with the leaves. Two runs would cost more, because for each run the nodes before its first group
+ * must be counted. */
 enum { GAP_GROUPS = 32 };
 
 /* Compares by level, then by group, for qsort. */
@@ -66,8 +69,8 @@ static void make_runs(leaf_reading *r)
     }
 }
 
-/* Calls visit(leaf, its index in the level's lists) for each leaf. Returns false if a node is not a
- * leaf. */
+/* Calls visit(user, i, at) for each leaf i of the reading; `at` is the index of the leaf among the
+ * leaves of r->level. Returns false if a wanted node is not a leaf. */
 static bool visit_leaves(const leaf_reading *r, int level,
                          void (*visit)(void *, uint32_t, uint64_t), void *user)
 {
@@ -92,12 +95,14 @@ static bool visit_leaves(const leaf_reading *r, int level,
 typedef struct face_lists {
     const wanted_leaf *wanted;
     leaf_reading *reading;
-    uint64_t
-        *ref_begin; /* [leaves of the level + 1] index in leaf_refs of a leaf's first reference */
-    /* [leaves of the request] first new face, number of new faces, number of references (faces that
-     * an earlier leaf lists, too; see ebpo_level) */
-    uint32_t *first, *fresh, *counts;
-    uint32_t **refs; /* [leaves of the request] references of each leaf */
+    /* [leaves of the level + 1] index in leaf_refs of a leaf's first reference */
+    uint64_t *ref_begin;
+    /* The other arrays have an entry for each leaf of the request. References are faces that an
+     * earlier leaf lists, too (ebpo_level). */
+    uint32_t *first;  /* first new face */
+    uint32_t *fresh;  /* number of new faces */
+    uint32_t *counts; /* number of references */
+    uint32_t **refs;  /* references */
 } face_lists;
 
 /* Stores the list of leaf i of the reading, which is leaf `at` of the level. */
@@ -205,7 +210,8 @@ int EBPO_JS(ebpo_js_coloured)(ebpo_js_object *object)
     return coloured;
 }
 
-/* Puts the colours of the corners of faces. `vertices` are [count][3]. */
+/* Puts the colours of the faces' corners into FACE_COLOURS. `vertices`: [count][3] the vertices of
+ * the faces. */
 static ebpo_status put_colours(ebpo_js_object *object, const uint32_t *faces,
                                const uint32_t *vertices, uint32_t count)
 {
@@ -223,7 +229,8 @@ static ebpo_status put_colours(ebpo_js_object *object, const uint32_t *faces,
 
 /* ---- corners ---- */
 
-/* Puts the corners of the faces of FACE_NUMBERS, and their colours. */
+/* Puts the corners of the faces in FACE_NUMBERS, and the colours of the corners, into the result
+ * arrays. */
 static ebpo_status put_corners(ebpo_js_object *object)
 {
     const ebpo_info *info = ebpo_file_info(object->file);

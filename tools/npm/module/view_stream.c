@@ -5,13 +5,13 @@
 
 /* Result arrays of views. The arrays before VIEW_LEVELS are those of ebpo_js_put_node. */
 enum {
-    VIEW_LEVELS = EBPO_JS_NODE_ARRAYS, /* uint8 */
-    VIEW_FLAGS,                        /* uint8: 1: complete, 2: seen */
-    VIEW_SIZES,                        /* double [2]: distance, pixels */
-    FACE_COUNTS,                       /* uint32 of each node */
-    FACE_CORNERS,                      /* double [9] */
-    FACE_NUMBERS,                      /* uint32 */
-    FACE_REPEATED,                     /* uint8 */
+    VIEW_LEVELS = EBPO_JS_NODE_ARRAYS, /* uint8 for each node */
+    VIEW_FLAGS,                        /* uint8 for each node: bits 1: complete, 2: seen */
+    VIEW_SIZES,                        /* double [2] for each node: distance, pixels */
+    FACE_COUNTS,                       /* uint32 for each node: number of faces */
+    FACE_CORNERS,                      /* double [9] for each face */
+    FACE_NUMBERS,                      /* uint32 for each face: index in the file */
+    FACE_REPEATED,                     /* uint8 for each face */
     VIEW_FACTS                         /* double [2]: ebpo_view_end, number of nodes */
 };
 
@@ -105,8 +105,8 @@ static ebpo_status put_facts(ebpo_js_object *object, double end, double count)
     return ebpo_js_put(object, VIEW_FACTS, facts, sizeof facts);
 }
 
-/* Reads at most `most` next nodes into the result arrays; fewer if a node needs missing bytes.
- * EBPO_E_PENDING: the first node needs missing bytes. */
+/* Reads the next nodes, at most `most`, into the result arrays. Stops earlier at a node that needs
+ * missing bytes. EBPO_E_PENDING: the first of these nodes needs missing bytes. */
 int EBPO_JS(ebpo_js_view_next)(ebpo_js_object *object, double most)
 {
     ebpo_status status = EBPO_OK;
@@ -127,11 +127,11 @@ int EBPO_JS(ebpo_js_view_next)(ebpo_js_object *object, double most)
     return status;
 }
 
-/* Nodes of the cut that were put into the result arrays. ok: false: not enough memory. */
+/* Context of take_cut, which puts the nodes of the cut into the result arrays. */
 typedef struct cut_nodes {
     ebpo_js_object *object;
-    double count;
-    bool ok;
+    double count; /* number of nodes so far */
+    bool ok;      /* false: out of memory */
 } cut_nodes;
 
 static bool take_cut(void *user, const ebpo_view_node *node)
@@ -151,8 +151,9 @@ int EBPO_JS(ebpo_js_view_cut)(ebpo_js_object *object)
     return cut.ok ? put_facts(object, EBPO_VIEW_NODE, cut.count) : EBPO_E_MEMORY;
 }
 
-/* Array 0: members of ebpo_view_stats as doubles: delivered nodes; white nodes, black nodes, leaves
- * and gray nodes of the cut; waiting nodes; pixels; bytes read. */
+/* Gets statistics. Array 0: members of ebpo_view_stats as doubles: number of delivered nodes;
+ * numbers of white nodes, black nodes, leaves and gray nodes of the cut; number of waiting nodes;
+ * pixels; bytes read. */
 int EBPO_JS(ebpo_js_view_stats)(ebpo_js_object *object)
 {
     ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
@@ -169,9 +170,10 @@ int EBPO_JS(ebpo_js_view_stats)(ebpo_js_object *object)
     return status == EBPO_OK ? ebpo_js_put(object, 0, out, sizeof out) : status;
 }
 
-/* Puts the mesh of ebpo_view_stream_surface. Arrays: 0: double [3], vertices; 1: float [3],
- * normals; 2: uint8 [4], colours, or none; 3: uint32 [3], triangles; 4: double [4]: error, pixels,
- * number of patches, number of faces of the model. */
+/* Gets the mesh of ebpo_view_stream_surface. Array 0: double [3] for each vertex. Array 1: float
+ * [3], normal of each vertex. Array 2: uint8 [4], colour of each vertex; empty if there are no
+ * colours. Array 3: uint32 [3] for each triangle. Array 4: double [4]: error, pixels, number of
+ * patches, number of triangles that are faces of the model. */
 int EBPO_JS(ebpo_js_view_surface)(ebpo_js_object *object)
 {
     ebpo_surface_mesh mesh;
