@@ -1,13 +1,14 @@
 /* Finds the boxes that contain a point, that may be near a point, or that a ray may intersect.
  *
- * Boxes are in a tree. Eight boxes that are neighbours along the Morton curve of their centres have
- * one box around them on the next level; the box of the highest level contains all boxes. A query
- * begins with the highest level and skips boxes that are not relevant. The tree is immutable, so
- * any number of threads may query it.
+ * Boxes are in a tree. Boxes are ordered along the Morton curve of their centres. Every eight
+ * consecutive boxes have a common box on the next level, which contains them; the box of the
+ * highest level contains all boxes. A query begins with the highest level and skips boxes that are
+ * not relevant. The tree is immutable, so any number of threads may query it.
  *
- * No relevant box is skipped: a length is rounded some ten times here, each time by a share of at
- * most 2^-53, and a box is skipped only if it is farther away by a share of 2^-40. A query may
- * return boxes that are not relevant; queries of the models in these boxes then return no face. */
+ * No relevant box is skipped. A length is rounded some ten times in this file, each time by at most
+ * 2^-53 of its value; a box is skipped only if its distance exceeds the limit by more than 2^-40 of
+ * its value. A query may return boxes that are not relevant; queries of the models in these boxes
+ * then return no face. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,14 +17,15 @@
 #include "catalogue/catalogue_boxes.h"
 #include "core/alloc.h"
 
-/* FAN: number of boxes in a box of the next level. BITS: bits of a Morton code for each axis. */
+/* FAN: number of boxes that have a common box on the next level. BITS: number of bits of a Morton
+ * code for each axis. */
 enum { FAN = 8, BITS = 21, LEVELS = EBPO_CATALOGUE_LEVELS };
 
 /* --- order --- */
 
 typedef struct coded {
-    uint64_t code;
-    uint32_t number;
+    uint64_t code;   /* Morton code of a point */
+    uint32_t number; /* index of the point */
 } coded;
 
 static int by_code(const void *a, const void *b)
@@ -132,14 +134,14 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
 typedef struct walk {
     const ebpo_catalogue_boxes *t; /* the tree of boxes */
     const double *p, *d;           /* the point, or the ray's origin and direction */
-    double reach;                  /* for the nearest face: boxes farther away are skipped */
-    double pad; /* for a ray: margin around each box, more than the rounding error */
-    uint32_t item;
-    ebpo_catalogue_pairs *out; /* NULL: only `reach` is computed */
-    /* returns false if the box, and all boxes below it, are skipped; otherwise may set
-     * *min_distance */
+    double reach;              /* for the nearest face: boxes at a larger distance are skipped */
+    double pad;                /* for a ray: margin around each box, more than the rounding error */
+    uint32_t item;             /* index of the point or ray, for the pairs */
+    ebpo_catalogue_pairs *out; /* receives the pairs; NULL: only `reach` is computed */
+    /* Returns false if the box, and all boxes in it, are to be skipped; otherwise may set
+     * *min_distance. */
     bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *min_distance);
-    bool failed; /* memory is short */
+    bool failed; /* true: out of memory */
 } walk;
 
 static void append_pair(walk *w, uint32_t box, double min_distance)
@@ -152,7 +154,7 @@ static void append_pair(walk *w, uint32_t box, double min_distance)
     o->pair[o->count++] = (ebpo_catalogue_pair){ box, w->item, min_distance };
 }
 
-/* Visits boxes recursively, at most LEVELS deep. */
+/* Visits a box and, recursively, the boxes in it. The recursion is at most LEVELS deep. */
 static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
 {
     double min_distance = 0;
@@ -169,7 +171,7 @@ static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-rec
         descend_boxes(w, level - 1, child);
 }
 
-/* Visits all boxes that w->keep accepts. Returns false when memory is short. */
+/* Visits all boxes that w->keep accepts. Returns false when out of memory. */
 static bool walk_boxes(walk *w)
 {
     if (w->t->levels)
@@ -198,6 +200,7 @@ bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[
 /* Returns the length of a vector, also when squares overflow. */
 static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
+/* Returns the distance of a point from the box; 0 within the box. */
 static double min_length(const ebpo_catalogue_box *b, const double p[3])
 {
     double v[3];
@@ -206,6 +209,7 @@ static double min_length(const ebpo_catalogue_box *b, const double p[3])
     return vector_length(v);
 }
 
+/* Returns the distance of a point from the farthest corner of the box. */
 static double max_length(const ebpo_catalogue_box *b, const double p[3])
 {
     double v[3];

@@ -7,12 +7,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Maximum number of levels. Each level has eight times as many boxes as the next higher level, so
- * this number of levels is sufficient for 2^33 boxes. */
+/* Maximum number of levels. A level has eight times as many boxes as the next higher level, so 12
+ * levels are sufficient for 2^33 boxes. */
 enum { EBPO_CATALOGUE_LEVELS = 12 };
 
-/* A box is skipped only if its distance is greater than the limit by at least this share, because
- * lengths are rounded some ten times. */
+/* A box is skipped only if its distance exceeds the limit by more than this share of the distance,
+ * because lengths are rounded some ten times. */
 #define EBPO_CATALOGUE_SLACK 0x1p-40
 
 /* A closed box. */
@@ -21,17 +21,19 @@ typedef struct ebpo_catalogue_box {
 } ebpo_catalogue_box;
 
 typedef struct ebpo_catalogue_boxes {
-    uint32_t *number; /* [count[0]] numbers of the boxes, along the Morton curve of their centres */
-    int levels;       /* 0: there is no box */
-    size_t count[EBPO_CATALOGUE_LEVELS];
-    /* level 0: the boxes; higher levels: boxes around eight boxes of the next lower level */
+    /* [count[0]] for each box of level 0, the number that identifies it in pairs */
+    uint32_t *number;
+    int levels;                          /* number of levels; 0: there is no box */
+    size_t count[EBPO_CATALOGUE_LEVELS]; /* number of boxes of each level */
+    /* level 0: the given boxes, along the Morton curve of their centres; higher levels: boxes
+     * around eight boxes of the next lower level */
     ebpo_catalogue_box *box[EBPO_CATALOGUE_LEVELS];
 } ebpo_catalogue_boxes;
 
 /* A box, and an item (a point or ray) for which it is relevant. */
 typedef struct ebpo_catalogue_pair {
-    uint32_t box, item;  /* box: its number in `numbers`; item: index of the point or ray */
-    double min_distance; /* rounded distance of the box, if set by ebpo_catalogue_boxes_near */
+    uint32_t box, item;  /* box: the box's number (from `numbers`); item: index of point or ray */
+    double min_distance; /* rounded distance of the box; only ebpo_catalogue_boxes_near sets it */
 } ebpo_catalogue_pair;
 
 typedef struct ebpo_catalogue_pairs {
@@ -40,13 +42,14 @@ typedef struct ebpo_catalogue_pairs {
 } ebpo_catalogue_pairs;
 
 /* Makes the tree of boxes[count]. numbers[count] identify the boxes in pairs. Returns false when
- * memory is short; call ebpo_catalogue_boxes_free in any case. */
+ * out of memory; call ebpo_catalogue_boxes_free in any case. */
 bool ebpo_catalogue_boxes_make(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
                                const uint32_t *numbers, size_t count);
 void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t);
 
-/* Appends a pair (box, item) for each box that contains the point. This and the next two functions
- * return false when memory is short. */
+/* The functions ebpo_catalogue_boxes_holding, _near and _on_ray return false when out of memory. */
+
+/* Appends a pair (box, item) for each box that contains the point. */
 bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[3], uint32_t item,
                                   ebpo_catalogue_pairs *out);
 /* Appends pairs for all boxes that may contain the face nearest to the point, if the distance of
@@ -58,7 +61,7 @@ bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out);
 
 /* Writes the indices of points[count][3] in the order of the Morton curve of a box. Points outside
- * the box have the position of the nearest point of the box. Returns false when memory is short. */
+ * the box have the position of the nearest point of the box. Returns false when out of memory. */
 bool ebpo_catalogue_morton_order(const double *points, size_t count, const double min[3],
                                  const double max[3], uint32_t *numbers);
 

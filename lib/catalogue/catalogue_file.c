@@ -29,8 +29,8 @@
 #include "core/hash.h"
 #include "core/os.h"
 
-/* Maximum length of a file in bytes, because reading needs many times as much memory. The length is
- * sufficient for some millions of models. */
+/* MAX_BYTES: maximum length of a file, sufficient for some millions of models. It limits the memory
+ * for reading, which is many times the length. DIGEST_LETTERS: length of a digest in letters. */
 enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
@@ -43,8 +43,8 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
 
 /* --- making --- */
 
-/* Returns a path by which a file is opened, from a path relative to a folder ("" or ending in '/').
- * Returns NULL when memory is short. */
+/* Returns the path by which a file is opened: `path` after `folder`, if `path` is relative. The
+ * folder is "" or ends in '/'. Returns NULL when out of memory. */
 static char *joined_path(const char *folder, const char *path)
 {
     bool whole = ebpo_path_is_absolute(path) || strstr(path, "://");
@@ -138,7 +138,7 @@ static ebpo_status end_making(ebpo_catalogue *c, ebpo_status status, ebpo_catalo
 
 /* --- checks of entries --- */
 
-/* Returns what is wrong with an entry, as the rest of a sentence; NULL if nothing is wrong. */
+/* Returns the fault of an entry, in words that follow "entry N"; NULL: the entry has no fault. */
 static const char *fault_of_entry(const ebpo_catalogue_entry *e)
 {
     if (!e->path || !*e->path)
@@ -329,7 +329,8 @@ static bool read_rule(const json_t *of, ebpo_rule *out)
     return found;
 }
 
-/* Returns a count that no query uses; 0 if it is missing or invalid. */
+/* Returns a count, or 0 if the count is missing or invalid. No query uses these counts, so they are
+ * not checked further. */
 static uint64_t read_count(const json_t *model, const char *key)
 {
     double count = json_number_value(json_object_get(model, key));
@@ -426,8 +427,8 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-/* Reads the file's text, of c->file_bytes bytes; the caller frees it. Does not wait for the writer
- * of a pipe. */
+/* Reads the text of the file, which the caller frees. Sets c->file_bytes to its length. If the file
+ * is a pipe, fails without waiting for a writer. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;

@@ -33,7 +33,8 @@ enum { DIRECTIONS = 64 };
 /* Result for a point from the models that were queried so far. */
 typedef struct point_result {
     int64_t winding; /* sum of the winding numbers */
-    bool in, on;     /* the point is inside a model; on a face of a model */
+    bool in;         /* true: the point is inside a model */
+    bool on;         /* true: the point is on a face of a model */
 } point_result;
 
 /* Adds the winding numbers of the points in one model to their results. */
@@ -62,11 +63,11 @@ static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_he
 /* Doubtful points whose results are not yet known. */
 typedef struct doubtful {
     uint32_t count;
-    uint32_t *number; /* [count] index among all points */
+    uint32_t *number; /* [count] index of the point among all points of the range */
     double *rows;     /* [count][7] rays from the points */
     bool *on_surface; /* [count] true: the point is on the surface of the whole model */
-    int64_t *sum;     /* [count] winding number by the last ray */
-    bool *decided;    /* [count] true: the last ray gives the winding number */
+    int64_t *sum;     /* [count] winding number that the last ray has given */
+    bool *decided;    /* [count] true: the last ray gives a valid winding number */
 } doubtful;
 
 /* Sets on_surface for the points on a face of one model. */
@@ -89,8 +90,9 @@ static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *m
     return status;
 }
 
-/* Writes the results of the points with known[i] to `all`, and keeps the other points in `d`. `on`
- * true: the known points are on the surface; `on` false: d->sum has their winding numbers. */
+/* Writes the results of those points i for which known[i] is true to `all`, and removes these
+ * points from `d`. If `on` is true, these points are on the surface; otherwise d->sum has their
+ * winding numbers. */
 static void keep_unknown(doubtful *d, const bool *known, bool on, point_result *all)
 {
     uint32_t kept = 0;
@@ -147,8 +149,8 @@ static ebpo_status cast_rays(const ebpo_catalogue_batch *a, doubtful *d, uint64_
                                     query_crossings, d, error);
 }
 
-/* Classifies the doubtful points: first points on the whole model's surface, then points on caps.
- */
+/* Classifies the doubtful points. First finds the points on the whole model's surface; the
+ * remaining points are on caps. */
 static ebpo_status classify_doubtful(const ebpo_catalogue_batch *a, doubtful *d, point_result *all,
                                      ebpo_error *error)
 {

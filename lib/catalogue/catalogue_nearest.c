@@ -1,15 +1,16 @@
 /* Finds the nearest face of all models to a point, and the first face that a ray hits.
  *
- * For a point, the models are queried in the order of the distance of their boxes, until no other
- * box may contain a face that is nearer than the nearest face so far. Many points are processed
- * together: in each step, the next model of each point is queried, and a model is queried for all
- * its points at once. If several models have the same rounded distance, the result is from the
- * first of these models in the catalogue, independent of the order of queries. Therefore a box is
- * skipped only if it is farther away by more than the rounding error (catalogue_boxes.c).
+ * For a point, the models are queried in the order of the distances of their boxes from the point,
+ * until no other box may contain a face that is nearer than the nearest face so far. Many points
+ * are processed together: in each step, the next model of each point is queried, and a model is
+ * queried once for all points whose next model it is. If several models have the same rounded
+ * distance, the result is from the first of these models in the catalogue, independent of the order
+ * of queries. So a box is skipped only if its distance exceeds the nearest distance by more than
+ * the rounding error (catalogue_boxes.c).
  *
- * For a ray, the models whose boxes it may intersect are queried in the order of the catalogue,
- * each only up to the nearest hit so far. If t overflows for several hits, a ray with an exactly
- * scaled, longer direction decides which hit is first. */
+ * For a ray, the models whose boxes the ray may intersect are queried in the order of the
+ * catalogue, each only up to the nearest hit so far. If t overflows for several hits, their t along
+ * a ray with a longer direction decide which hit is first; the direction is scaled exactly. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,8 +33,8 @@ typedef struct search {
     double max_distance;
     ebpo_distance_result *out;
     uint64_t *model;
-    ebpo_catalogue_pairs near;    /* boxes of each point, the nearest first */
-    ebpo_catalogue_pairs queries; /* boxes of this step, at most one for each point */
+    ebpo_catalogue_pairs near;    /* for each point, its boxes, the nearest box first */
+    ebpo_catalogue_pairs queries; /* the boxes to query in this step, at most one for each point */
 } search;
 
 static int nearest_first(const void *a, const void *b)
@@ -85,8 +86,8 @@ static ebpo_status query_distances(ebpo_context *context, const ebpo_catalogue_h
 }
 
 /* Queries the next box of each point, until no remaining box may contain a nearer face. `begin`:
- * index of each point's first box, and the end of the list. `next_box`: space for one number for
- * each point. */
+ * [points + 1] index in s->near of each point's first box, and at the end the number of all boxes.
+ * `next_box`: [points] memory for the index of each point's next box. */
 static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *next_box,
                                   uint32_t points, ebpo_error *error)
 {
@@ -112,8 +113,8 @@ static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *ne
     return status;
 }
 
-/* Processes points from *at on, as many as EBPO_CATALOGUE_PAIRS allows, and sets *at to the next
- * point. */
+/* Processes points from *at on, until they have EBPO_CATALOGUE_PAIRS boxes. Sets *at to the first
+ * point that is not processed. */
 static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *next_box,
                               ebpo_error *error)
 {
@@ -222,7 +223,9 @@ typedef struct ray_search {
  * hit is finite. */
 static ebpo_ray longer_ray(const ebpo_ray *ray)
 {
-    enum { ENOUGH = 3 }; /* coordinates are at most 2^1025 apart */
+    /* If the largest component of the direction is at least 2^2, every t is finite, because
+     * coordinates are at most 2^1025 apart. */
+    enum { ENOUGH = 3 };
     ebpo_ray out = *ray;
     int exponent;
     frexp(fmax(fmax(fabs(ray->direction[0]), fabs(ray->direction[1])), fabs(ray->direction[2])),
@@ -233,8 +236,8 @@ static ebpo_ray longer_ray(const ebpo_ray *ray)
     return out;
 }
 
-/* Sets *nearer to true if a hit comes before the hit that is kept so far. If t is INFINITY for
- * both, their t along the ray with a longer direction are compared. */
+/* Sets *nearer to true if `hit` comes before the hit of this item that is kept so far. If t is
+ * INFINITY for both hits, compares their t along the ray with a longer direction (longer_ray). */
 static ebpo_status is_nearer(const ray_search *s, ebpo_context *context, const ebpo_ray *ray,
                              const ebpo_ray_hit *hit, uint32_t item, bool *nearer,
                              ebpo_error *error)
@@ -275,8 +278,8 @@ static ebpo_status merge_hits(const ray_search *s, const ebpo_catalogue_run *run
     return status;
 }
 
-/* Queries one model, for faces that are not beyond the hits so far. Models are queried in the order
- * of the catalogue, so the hit of the first model is kept if others have an equal t. */
+/* Queries one model for hits that are not farther away than the hits so far. Models are queried in
+ * the order of the catalogue, so if hits have an equal t, the hit of the first model is kept. */
 static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                               ebpo_error *error)
 {

@@ -1,12 +1,12 @@
-/* Writes catalogues as JSON files for ebpo_catalogue_open. The boxes that ebpo_catalogue_open reads
- * are equal bit for bit, and counts below 2^53 are equal. Entries without `file_bytes` are written
- * without counts.
+/* Writes catalogues as JSON files for ebpo_catalogue_open. When ebpo_catalogue_open reads the file,
+ * it gets the same boxes, bit for bit, and the same counts, if they are below 2^53. Entries without
+ * `file_bytes` are written without counts.
  *
  * Paths that begin with the folder of the file become relative to this folder, so that a folder of
- * models and its catalogue can be moved together. Paths that would have another meaning without the
- * folder are not changed. Numbers have the fewest digits from which the same double is read, in any
- * locale. A path that is not UTF-8, which JSON cannot represent, is refused before anything is
- * written. The file is replaced atomically (io/publish.h).
+ * models and its catalogue can be moved together. A path that would have another meaning without
+ * the folder is not changed. Numbers have the fewest digits from which the same double is read, in
+ * any locale. JSON cannot represent a path that is not UTF-8, so such a path is refused before
+ * anything is written. The file is replaced atomically (io/publish.h).
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -39,7 +39,7 @@ static void write_text(FILE *to, const char *text)
 }
 
 /* Finds the fewest digits of |x| from which the same double is read, in any locale. Returns the
- * number of digits, and sets `digits` and the exponent of ten of the first digit. */
+ * number of digits. Sets `digits`, and *exponent to the power of ten of the first digit. */
 static int fewest_digits(double x, char digits[20], int *exponent)
 {
     char text[40];
@@ -95,8 +95,9 @@ static void write_digest(FILE *to, const char *key, const uint8_t digest[32])
     fputc('"', to);
 }
 
-/* Writes a path without the folder (ending in '/', or ""), if the path begins with the folder and
- * the rest is a relative path. */
+/* Writes a member with a path. If the path begins with `folder` (which ends in '/', or is "") and
+ * continues with a relative path, writes the path without the folder. `before`: text before the
+ * member. */
 static void write_path(FILE *to, const char *before, const char *key, const char *path,
                        const char *folder)
 {

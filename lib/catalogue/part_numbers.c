@@ -16,7 +16,7 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-/* Maximum length in bytes of a header with the bytes before it. */
+/* Maximum number of bytes of the header and of the bytes before the header. */
 enum { HEAD_MAX = 4096 };
 
 static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *error, const char *what)
@@ -87,8 +87,8 @@ ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *p
                                         ebpo_error *error)
 {
     struct stat st;
-    int fd =
-        open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* does not wait for a pipe */
+    /* O_NONBLOCK: does not wait for the writer of a pipe */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     *f = (ebpo_catalogue_numbers){ .path = path, .fd = fd };
     if (fd < 0)
         return ebpo_fail_file(error,
