@@ -5,7 +5,8 @@
  * centre, and from the face nearest to its centre. The largest distance found is the lower bound.
  *
  * The ebpo_tolerance functions decide for many nodes, with several threads, if the envelopes are
- * within max_error. They keep their results, and use them again for other values of max_error. */
+ * within max_error of the model. They keep the results, and use them again for other values of
+ * max_error. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -125,8 +126,8 @@ static void raise_lower_bound(ebpo_bounder *b, const double xi[3], double distan
 static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment,
                                     ebpo_fragment_measure *measure)
 {
-    double corner = 0; /* greatest distance of a corner from that face */
-    int farthest = 0;  /* this corner */
+    double corner = 0; /* greatest distance of a corner from the face nearest to the centre */
+    int farthest = 0;  /* index of the corner with this distance */
     find_centre(b, &fragment->p, measure);
     ebpo_status status = query_distance(b, measure->centre, &measure->distance);
     if (status != EBPO_OK)
@@ -160,8 +161,8 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
 
 /* --- the search --- */
 
-/* Sets the stack to one fragment, which is the whole envelope. For a black node, whose distance is
- * 0, the stack is empty. */
+/* Sets the stack to one fragment, which is the whole envelope. The envelope of a black node is in
+ * the solid, so for a black node the stack is empty, and the bounds stay 0. */
 static ebpo_status begin_search(ebpo_bounder *b)
 {
     ebpo_node node;
@@ -242,7 +243,7 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     return status;
 }
 
-/* Improves the known bounds by those of a further search. */
+/* Improves the known bounds by the bounds that a further search has found. */
 static void merge_bounds(ebpo_envelope_bound *known, const ebpo_envelope_bound *found)
 {
     known->hi = fmin(known->hi, found->hi);
@@ -297,20 +298,20 @@ enum { NODE_QUERIES = 4096 };
  * that an earlier search found is not kept: a search with this bound as max_error might use up its
  * queries first and fail, and the result of a test must not depend on earlier calls. */
 typedef struct earlier_results {
-    double enough; /* least max_error that was enough */
-    double failed; /* largest max_error that was not enough */
-    double lo;     /* a guaranteed lower bound of the distance */
+    double enough; /* least max_error for which the envelope was accepted; INFINITY: none */
+    double failed; /* largest max_error for which it was not accepted; -1: none */
+    double lo;     /* a guaranteed lower bound of the envelope's error */
 } earlier_results;
 
 struct ebpo_tolerance {
     ebpo_model *model;
     ebpo_lod_model tree;
-    bool planes; /* false: each envelope is the whole cell of its node */
+    bool planes; /* true: envelopes are bounded by planes; false: they are the nodes' whole cells */
     unsigned threads;
     ebpo_progress progress;
-    /* for each level, the results of its gray nodes and of its leaves, by rank */
+    /* for each level, the earlier results of its gray nodes, and of its leaves, by rank */
     earlier_results *gray[EBPO_LEVELS_MAX], *leaf[EBPO_LEVELS_MAX];
-    ebpo_bounder *bounders;     /* [threads] */
+    ebpo_bounder *bounders;     /* [threads] state of the searches of each thread */
     ebpo_tolerance_node *nodes; /* argument of the current call of ebpo_tolerance_judge */
     double max_error;           /* argument of the current call */
 };
@@ -442,9 +443,10 @@ ebpo_status ebpo_tolerance_max(ebpo_tolerance *n, double *out, ebpo_error *error
     if (stored.type == EBPO_LEAF || !n->planes)
         n->bounders[0].half_spaces.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
-    /* With found.hi as max_error, judge_node may fail, because it searches in another way. So
-     * max_error is increased until judge_node succeeds. The loop ends, because judge_node succeeds
-     * without queries when max_error is the root cell's diagonal. */
+    /* judge_node searches in another way, so it may not accept the root's envelope with found.hi as
+     * max_error. So max_error is increased until judge_node accepts it. The loop ends, because
+     * judge_node accepts the envelope without queries when max_error is the root cell's diagonal.
+     */
     ebpo_tolerance_node node = { root, true, false };
     double upper = found.hi > 0 ? found.hi : DBL_MIN;
     *out = upper;

@@ -20,7 +20,7 @@ typedef struct ebpo_bound_goal {
 
 /* The result of a search: bounds of the distance. */
 typedef struct ebpo_envelope_bound {
-    double lo, hi;      /* in the model's unit */
+    double lo, hi;      /* lower and upper bound, in the model's unit */
     double location[3]; /* a point of the envelope that is at least `lo` from the model; not set if
                            `lo` is 0 */
     uint64_t queries;   /* number of distance queries so far */
@@ -57,7 +57,8 @@ EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell,
 
 /* --- the decision which envelopes are close enough to the model --- */
 
-/* A model, and the results for its nodes so far, which are used again for other limits. */
+/* A model, and the results of the tests of its nodes so far. The results are used again for other
+ * values of max_error. */
 typedef struct ebpo_tolerance ebpo_tolerance;
 
 /* A node whose envelope is tested: a gray node with its stored envelope, or a leaf with the part of
@@ -65,7 +66,7 @@ typedef struct ebpo_tolerance ebpo_tolerance;
 typedef struct ebpo_tolerance_node {
     ebpo_cell cell;
     bool required; /* false: the node is not tested */
-    bool enough;   /* the result (ebpo_tolerance_judge); false if the node is not tested */
+    bool enough;   /* result of ebpo_tolerance_judge; false if the node is not tested */
 } ebpo_tolerance_node;
 
 /* Opens the model of a file. Fails with EBPO_E_ABSENT if the file has no mesh or is a subset. If

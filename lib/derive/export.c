@@ -83,7 +83,7 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
 static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *row,
                                 const ebpo_export_options *o, ebpo_error *error)
 {
-    /* the end of the range of levels that is checked: the first one, if it is wrong */
+    /* requested: the level that is checked: first_level if it is invalid, otherwise last_level */
     int blocks = ebpo_block_count(o),
         requested = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
                                                                               : o->last_level;

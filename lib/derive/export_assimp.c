@@ -29,7 +29,7 @@ typedef struct scene_file {
     const char *path; /* borrowed */
     ebpo_publish publish;
     FILE *stream;         /* NULL: assimp has not opened the file */
-    bool failed;          /* a write failed */
+    bool failed;          /* true: a write failed */
     int error_number;     /* errno of the first failure */
     char unexpected[128]; /* another name that assimp opened for writing; "": none */
 } scene_file;
@@ -130,8 +130,8 @@ static void scene_file_begin(scene_file *file, const char *path)
     *file = (scene_file){ .path = path, .publish = EBPO_PUBLISH_INIT };
 }
 
-/* Sets `io` to functions that give assimp access to this file only. assimp knows the file by the
- * last part of its path. `io` refers to `file`. */
+/* Sets `io` to functions that give assimp access to this file, and to no other file. assimp knows
+ * the file by the last part of its path. `io` refers to `file`. */
 static void scene_file_offer(scene_file *file, struct aiFileIO *io)
 {
     *io = (struct aiFileIO){ open_file, close_file, (aiUserData)(void *)file };
@@ -172,8 +172,9 @@ typedef struct scene {
     struct aiNode top, node[BLOCKS_MAX], *children[BLOCKS_MAX];
     struct aiMesh mesh[BLOCKS_MAX], *meshes[BLOCKS_MAX];
     struct aiMaterial material, *materials;
-    unsigned mesh_index[BLOCKS_MAX], count; /* mesh of each node; number of meshes */
-    double largest_change; /* largest rounding error of a coordinate (ebpo_mesh_floats) */
+    unsigned count; /* number of meshes, which is the number of nodes below `top` */
+    unsigned mesh_index[BLOCKS_MAX]; /* [count] index of the mesh of each node */
+    double largest_change;           /* largest rounding error of a coordinate (ebpo_mesh_floats) */
 } scene;
 
 static void set_name(struct aiString *to, const char *name)
@@ -278,7 +279,7 @@ static void scene_free(scene *s)
 static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(job->file);
-    /* The mesh can be checked before it is read. */
+    /* The size of the mesh is known and checked before the mesh is read. */
     ebpo_status status =
         job->options->mesh
             ? ebpo_export_check_assimp(job->path, info->vertex_count, info->face_count, error)

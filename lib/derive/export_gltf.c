@@ -34,14 +34,14 @@ enum {
 
 /* A block (a level or the mesh, export_job.h) with its coordinates. */
 typedef struct gltf_block {
-    ebpo_block block; /* block.mesh has no positions, which are in xyz */
-    float *xyz;       /* [vertex_count][3] positions minus the origin */
-    float low[3], high[3];
+    ebpo_block block;      /* block.mesh has no positions, which are in xyz */
+    float *xyz;            /* [vertex_count][3] positions minus the origin */
+    float low[3], high[3]; /* least and greatest coordinates of xyz */
 } gltf_block;
 
 typedef struct model {
     gltf_block blocks[BLOCKS_MAX];
-    int count; /* of blocks */
+    int count; /* number of blocks */
     /* origin: subtracted from all positions; largest_change: see ebpo_mesh_floats */
     double origin[3], largest_change;
     const char *bin_name; /* name of the file with the binary data; NULL: GLB, one file for all */
@@ -116,7 +116,7 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
     ebpo_status status = EBPO_OK;
     const ebpo_info *info = ebpo_file_info(job->file);
     choose_origin(m, info);
-    if (!m->bin_name && job->options->mesh) /* the mesh can be checked before it is read */
+    if (!m->bin_name && job->options->mesh) /* the size of the mesh is known before it is read */
         status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count),
                                        error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {

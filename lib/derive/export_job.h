@@ -15,7 +15,7 @@ typedef struct ebpo_block {
     ebpo_lod_nodes nodes; /* set for a level */
     ebpo_maps maps;       /* set for the mesh of a file with maps */
     ebpo_colours colours; /* set if there are colours; a level has colours of vertices */
-    double volume;        /* of the level's envelopes */
+    double volume;        /* volume of the level's envelopes */
 } ebpo_block;
 
 /* Returns the number of blocks; ebpo_block_level returns the level of block i. */
@@ -23,7 +23,7 @@ int ebpo_block_count(const ebpo_export_options *options);
 int ebpo_block_level(const ebpo_export_options *options, int i);
 
 /* Order of the faces and vertices in the block of the mesh. The source is the mesh file from which
- * the model was converted; source indices are positions in it (the part `maps` of a file). */
+ * the model was converted; source indices are positions in the source (part `maps` of a file). */
 typedef enum ebpo_block_order {
     EBPO_FILE_ORDER,  /* order of the .ebpo.h5 file; block.maps has the source indices, if any */
     EBPO_SOURCE_ORDER /* order of the source, if the file has source indices; block.maps is empty */
@@ -92,15 +92,16 @@ struct ebpo_export_job {
     ebpo_export_report *report;
 };
 
-/* Reads block i and adds it to the report. The caller frees it by ebpo_block_free, also after a
- * failure. Fails with EBPO_E_CANCELLED when the caller wants to stop. */
+/* Reads block i and adds it to the report. The caller frees the block by ebpo_block_free, also
+ * after a failure. Fails with EBPO_E_CANCELLED if the callback for progress requests an end. */
 EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i,
                                                  ebpo_block_order order, ebpo_block *out,
                                                  ebpo_error *error);
 
-/* These functions fail with EBPO_E_LIMIT for sizes that a format cannot represent. GLB files have
- * 32-bit sizes; `text` and `bin` are the sizes in bytes of the JSON text and of the binary data.
- * OBJ and STL files are written by assimp, which has 32-bit indices of corners. */
+/* ebpo_export_check_glb and ebpo_export_check_assimp fail with EBPO_E_LIMIT for sizes that a format
+ * cannot represent. GLB files have 32-bit sizes; `text` and `bin` are the sizes in bytes of the
+ * JSON text and of the binary data. OBJ and STL files are written by assimp, which has 32-bit
+ * indices of corners. */
 enum { EBPO_GLB_HEADS = 28 }; /* size in bytes of the header and of the heads of the two chunks */
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
                                                 ebpo_error *error);

@@ -24,14 +24,14 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
-    VERTEX_COLOURS, /* these two tables are made when the first block with such colours is written
-                     */
+    /* VERTEX_COLOURS, FACE_COLOURS: made when the first block with such colours is written */
+    VERTEX_COLOURS,
     FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
 };
 
-/* The tables before the columns. */
+/* The tables with indices below FIRST_COLUMN. */
 static const struct {
     const char *path;
     ebpo_h5_number number;
@@ -68,7 +68,7 @@ static ebpo_status make_group(writer *w, const char *path, ebpo_error *error)
     return status;
 }
 
-/* Makes all tables except those of colours. floats: positions are float32. */
+/* Makes all tables except those of colours. `floats`: true: positions are float32. */
 static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
 {
     static const char *const groups[] = { "/VTKHDF", "/VTKHDF/PointData", "/VTKHDF/CellData" };

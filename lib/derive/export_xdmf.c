@@ -68,8 +68,8 @@ static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char 
     return status;
 }
 
-/* Writes the envelopes of a level as polyhedra. A polyhedron is its XDMF type, the number of its
- * polygons, and then, for each polygon, the number of its corners and the corners. */
+/* Writes the envelopes of a level as polyhedra. A polyhedron is stored as its XDMF type, the number
+ * of its polygons, and then, for each polygon, the number of its corners and the corners. */
 static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_lod_nodes *nodes = &block->nodes;

@@ -18,7 +18,8 @@
 #include "format/reader.h"
 #include "geometry/distance.h"
 
-/* factor that exceeds the rounding errors of a sum of three squares and of its root */
+/* Factor by which a computed root of a sum of three squares is multiplied; the product is an upper
+ * bound despite rounding. */
 static const double rounding_factor = 1 + 0x1p-40;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell)
@@ -37,7 +38,8 @@ void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell c
     out->factor[1] = ldexp(1, -out->exponent - -out->exponent / 2);
     for (int k = 0; k < 3; k++)
         out->side[k] = out->size[k] * out->factor[0] * out->factor[1];
-    /* A few ulp of the largest coordinate, and of the least positive number. */
+    /* The rounding error is a few ulp of the largest coordinate, and of the least positive number.
+     */
     out->grain = 0x1p-49 * ebpo_cell_frame_length(out, largest) + 0x1p-50 +
                  ebpo_cell_frame_length(out, 0x1p-1070);
 }
@@ -384,7 +386,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
     return status;
 }
 
-/* Halves a fragment across its longest side. The halves get this kind. */
+/* Halves a fragment across its longest side, and pushes the halves. `kind`: kind of the halves. */
 static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
                                ebpo_fragment_kind kind)
 {
@@ -550,9 +552,10 @@ static bool is_flat(const ebpo_bounder *b)
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* Cuts a fragment within a leaf of a solid: along the plane of a listed face, if one cuts it. If
- * none does, the whole fragment is inside or outside the solid, except for thin outermost parts;
- * then its bound is computed, or it is cut until its bound is good enough. */
+/* Cuts a fragment within a leaf of a solid. If the plane of a listed face cuts the fragment, cuts
+ * it along this plane. If no such plane cuts the fragment, it is inside or outside the solid,
+ * except for thin outermost parts. Then the fragment's bound is computed, or the fragment is cut in
+ * another way if its bound is not good enough. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
                             const ebpo_fragment_measure *measure)
 {

@@ -1,7 +1,7 @@
 /* Declares what the searches for error bounds share (error_bound.c, level_error_bound.c). An error
- * bound is an upper bound of the distance by which an envelope extends beyond the model. Declared
- * are: a node's cell with a unit of length, fragments (the convex parts into which an envelope is
- * cut), the trees of files, and the state of a search. */
+ * bound is an upper bound of the distance by which an envelope extends beyond the model. This
+ * header declares the frame of a node (its cell with a unit of length), fragments (the convex parts
+ * into which an envelope is cut), the trees of files, and the state of a search. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 
@@ -51,8 +51,8 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
 /* Fragments of an envelope are convex polytopes in the cell coordinates of the node. Together they
  * cover the envelope. Every cut keeps a little too much on both sides. */
 
-/* Each part extends beyond its cut by this width, in cell coordinates. The width is more than the
- * tolerance of clipping, if the normal of the cut has a length of at least 1/sqrt(3). */
+/* Both parts of a cut extend beyond the cut by this width, in cell coordinates. The width is more
+ * than the tolerance of clipping, if the normal of the cut has a length of at least 1/sqrt(3). */
 #define EBPO_CUT_SLACK 4e-10
 
 /* The box of a polytope, in cell coordinates. */
@@ -62,8 +62,8 @@ typedef struct ebpo_extent {
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
-/* If one of the two parts of a cut would be at most this wide, the fragment is not cut. This width
- * is less than a quarter of the smallest fragment that is cut, and more than 1e-7, which
+/* If one of the two parts of a cut would be at most this wide, the fragment is not cut. The width
+ * is less than a quarter of the smallest fragment that is cut, and more than the width of 1e-7 that
  * ebpo_polytope_clip refuses. */
 #define EBPO_CUT_THIN 1.2e-7
 
@@ -106,16 +106,17 @@ typedef struct ebpo_bounder {
     /* a stack: the faces of the fragments within leaves, in the model's unit */
     double (*faces)[3][3];
     uint64_t face_capacity, face_count;
-    /* The search for the current node, with lengths in the frame's unit: */
+    /* The following members are for the search for the current node; lengths are in the frame's
+     * unit. */
     ebpo_cell_frame frame;
     double target;      /* fragments with an upper bound of at most this are not examined further */
-    double quit;        /* the search stops once `lo` is larger */
+    double quit;        /* the search stops when `lo` is larger than this */
     double ratio;       /* `target` is at least `ratio` times `lo` */
     double lo, hi;      /* bounds found so far */
     double location[3]; /* point of the envelope whose distance gave `lo`, in the model's
                            coordinates */
     double inner[3];    /* a point near the envelope's middle, in cell coordinates */
-    uint64_t queries;
+    uint64_t queries;   /* number of distance queries for the current node */
     ebpo_error *error;
 } ebpo_bounder;
 

@@ -33,13 +33,13 @@ typedef struct sampling {
     const ebpo_error_bound_options *o;
     int level;
     ebpo_box box;
-    ebpo_cell_frame frame;    /* of the root cell; areas and distances below are in its unit */
+    ebpo_cell_frame frame;    /* frame of the root cell; `distance` and areas are in its unit */
     ebpo_mesh mesh;           /* the level's polygons as triangles */
     ebpo_lod_nodes nodes;     /* the nodes with these polygons */
     uint64_t *first_triangle; /* [node_count + 1] first triangle of each node */
-    uint32_t *triangle;       /* [samples] triangle that has the sample */
-    double *distance;         /* [samples]; NAN: the sample does not count */
-    ebpo_context **contexts;  /* [threads] */
+    uint32_t *triangle;       /* [samples] index of the triangle that has the sample */
+    double *distance;        /* [samples] distance from the model; NAN: the sample does not count */
+    ebpo_context **contexts; /* [threads] */
     unsigned threads;
 } sampling;
 
@@ -283,9 +283,9 @@ static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, 
 
 /* --- bounds --- */
 
-/* BLOCK_MAX is the maximum number of nodes that are searched with the same goal. QUERIES_MAX limits
- * the queries for each node. Only nodes whose envelopes are flat and close to the model need more
- * queries. */
+/* BLOCK_MAX: maximum number of nodes that are searched with the same goal. QUERIES_MAX: maximum
+ * number of queries for each node. Only nodes whose envelopes are flat and close to the model would
+ * need more queries. */
 enum { BLOCK_MAX = 512, QUERIES_MAX = 1 << 16 };
 
 /* A node with an envelope of the level, and the bounds of its error. */
@@ -304,9 +304,9 @@ typedef struct survey {
     uint64_t *order;        /* [count] indices of the nodes in the order of the search */
     ebpo_bounder *bounders; /* [threads] */
     unsigned threads;
-    ebpo_bound_goal goal; /* for the nodes of the current block */
+    ebpo_bound_goal goal; /* goal of the searches in the current block */
     uint64_t first;       /* start of the current block in `order` */
-    bool queries_used_up; /* the queries were used up before the tolerance was reached */
+    bool queries_used_up; /* true: the queries were used up before the tolerance was reached */
     const ebpo_progress *progress;
     ebpo_error *error;
 } survey;
@@ -365,10 +365,10 @@ static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsig
     return status;
 }
 
-/* A node of the list, by its index, with its upper bound. */
+/* A node of the list, and its upper bound, for sorting. */
 typedef struct ranked {
-    double hi;
-    uint64_t node;
+    double hi;     /* upper bound of the node's error */
+    uint64_t node; /* index of the node */
 } ranked;
 
 /* Puts greater upper bounds first. */

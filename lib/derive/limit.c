@@ -135,7 +135,7 @@ typedef struct job {
     ebpo_lod_model model;
     ebpo_mesh mesh; /* all faces of the file */
     int level;
-    ebpo_level_nodes tree; /* `model` as cursors read it */
+    ebpo_level_nodes tree; /* the nodes of `model`, in the form that ebpo_level_child reads */
     ebpo_node *nodes;      /* [node_count] nodes whose hulls are computed */
     uint64_t node_count, node_capacity;
     double *volume; /* [node_count] volume of the hull, as a fraction of the volume of the node's

@@ -41,8 +41,9 @@ typedef struct counting {
     const ebpo_file *file;
     const ebpo_subset_options *options;
     ebpo_box box;
-    ebpo_chunks *top; /* chunks that are read to find subtrees */
-    /* a cache without chunks of the subtrees, so that all of their chunks are counted */
+    ebpo_chunks *top; /* cache of the chunks that are read to find subtrees */
+    /* a second cache, which has no chunks of the subtrees, so that all of these chunks are counted
+     */
     ebpo_chunks *subtree_chunks;
     ebpo_hints hints; /* collects the chunks that are needed, and counts their bytes */
     uint32_t needs;   /* the data that the subset needs (EBPO_NEEDS_...) */
@@ -124,7 +125,7 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     if (c.last_level < 0 || c.last_level > deepest || c.needs & EBPO_NEEDS_MESH)
         c.last_level = deepest;
     c.hints.counts_bytes = true;
-    /* true: only some subtrees are read */
+    /* true: the subset needs only some of the subtrees */
     bool divided = options->boxed && info->subtree_level && c.last_level > info->subtree_level;
     out->total_subtrees = info->subtree_level ? info->level[info->subtree_level].gray_count : 0;
     if (!divided && c.last_level > info->subtree_level)
@@ -225,8 +226,8 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     return resolve_box(c);
 }
 
-/* Sends prefetch hints for whole arrays. They are read completely if there is neither a box nor a
- * max_error. A remote source then fetches them in few requests. */
+/* Sends prefetch hints for whole arrays, so that a remote source fetches them in few requests. Does
+ * so only if there is neither a box nor a max_error, because only then are whole arrays read. */
 static void hint_cut(const ebpo_cutting *c)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -379,14 +380,15 @@ static ebpo_write_options subset_write_options(const ebpo_subset_options *option
 
 /* The search ends when fitting.fits is at most this multiple of fitting.too_large. */
 static const double size_precision = 1.01;
-/* No max_error below the coarsest max_error times this factor is tried. */
+/* bracket_size does not halve max_error below the coarsest max_error times this factor. */
 static const double least_share = 0x1p-40;
 
 /* The search for the smallest max_error whose file fits the target size. */
 typedef struct fitting {
     const ebpo_file *file;
     ebpo_subset_options *options;
-    ebpo_publish trial, best; /* files: of the current trial, of the finest trial that fits */
+    ebpo_publish trial; /* file of the current trial */
+    ebpo_publish best;  /* file of the finest trial that fits */
     ebpo_tolerance *tolerance;
     double fits;                     /* least max_error so far whose file fits */
     double too_large;                /* largest max_error so far whose file is too large; 0: none */
@@ -394,8 +396,8 @@ typedef struct fitting {
     ebpo_error *error;
 } fitting;
 
-/* Writes a trial file for a max_error and returns its size in *bytes. A trial that fits becomes
- * f->best, because it is finer than all earlier trials that fit. Sets *pruned to true if the file
+/* Writes a trial file for a max_error, and sets *bytes to its size. If the file fits, it becomes
+ * f->best, because it is finer than all earlier files that fit. Sets *pruned to true if the file
  * has pruned nodes. */
 static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool *pruned)
 {
@@ -475,8 +477,8 @@ static ebpo_status find_error(fitting *f)
     uint64_t bytes = 0;
     bool pruned = false;
     /* The subset with all nodes (max_error 0) is tried first, but only if the target is at least a
-     * quarter of the file's size; it would hardly fit a smaller target. With choose_parts, the
-     * caller has already tried it. */
+     * quarter of the file's size, because this subset would hardly fit a smaller target. With
+     * choose_parts, the caller has already tried this subset. */
     bool may_fit =
              !f->options->choose_parts && f->options->target_bytes >= f->file->info.file_bytes / 4,
          tried_all = f->options->choose_parts || may_fit;
@@ -557,9 +559,9 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
 
 uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
 {
-    /* Measured memory in bytes: for each face, OF_MESH for the mesh and its bounds, and OF_LEAVES /
-     * leaf_faces (at most OF_LEAVES_MAX) for the leaves, which are more if they are smaller; and
-     * ALWAYS for everything else. */
+    /* Measured memory in bytes. OF_MESH: for each face, memory of the mesh and the faces' bounds.
+     * OF_LEAVES / leaf_faces, but at most OF_LEAVES_MAX: for each face, memory of the leaves; the
+     * smaller the leaves, the more leaves there are. ALWAYS: memory for everything else. */
     enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MAX = 430, ALWAYS = 16 << 20 };
     double leaves = OF_LEAVES / (double)leaf_faces;
     return (uint64_t)((double)face_count *

@@ -1,5 +1,6 @@
-/* Declares what the files that make subsets share. A subset is a smaller file that is made from
- * another file: some gray nodes lose their children (pruned nodes), or parts are omitted. */
+/* Declares what the source files subset*.c share, which make subsets. A subset is a smaller file
+ * that is made from another file: some gray nodes lose their children (and become pruned nodes), or
+ * parts are omitted. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
@@ -18,8 +19,8 @@ typedef struct ebpo_cutting {
     /* decides which envelopes are close enough to the model; NULL without max_error */
     ebpo_tolerance *tolerance;
     ebpo_box box;   /* the root cell */
-    int last_level; /* deepest level that may be kept */
-    uint32_t parts; /* parts of the file that are kept (EBPO_PART_...) */
+    int last_level; /* deepest level that the subset may have */
+    uint32_t parts; /* parts of the file that the subset has (EBPO_PART_...) */
     ebpo_tree *out; /* the subset */
     ebpo_error *error;
 } ebpo_cutting;
@@ -48,8 +49,9 @@ typedef struct ebpo_subset_reads {
     uint64_t bytes;          /* bytes of the chunks that the subset needs, each counted once */
 } ebpo_subset_reads;
 
-/* Counts what a subset with these options must read of its file. Only the options parts, box and
- * last_level are used. If the parts include the mesh, all levels are counted. */
+/* Counts the subtrees and bytes of a file that a subset with these options must read. Only the
+ * options parts, box and last_level are used. If the parts include the mesh, all levels are
+ * counted. */
 EBPO_MUST_USE ebpo_status ebpo_subset_count_reads(const ebpo_file *file,
                                                   const ebpo_subset_options *options,
                                                   ebpo_subset_reads *out, ebpo_error *error);
