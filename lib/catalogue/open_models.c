@@ -11,9 +11,9 @@
  * The file is compared with its catalogue: the digest when the file is opened, and the box whenever
  * the model is lent, because two entries may describe one file differently.
  *
- * Locks: one lock protects the list of models and the sums over the models. It is held while a file
- * is closed, but never during a query or while a file is opened. Each model has a lock for opening
- * and a lock for queries. */
+ * Locks: one lock (ebpo_catalogue_models.lock) protects the list of models and the sums over the
+ * models. A thread may keep this lock while it closes a file, but never during a query or while it
+ * opens a file. Each model has a lock for opening and a lock for queries. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>

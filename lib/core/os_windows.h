@@ -4,7 +4,8 @@
  * where the name is that of a structure or a member. The headers in core/windows have the names of
  * POSIX headers and are empty.
  *
- * Paths are UTF-8 with '/' or '\' between names, and may be long. They are converted to UTF-16.
+ * Paths are UTF-8 with '/' or '\' between names, and may be long; the functions convert paths to
+ * UTF-16.
  * Errors are values of errno. Functions that are not provided on Windows (fork, sockets of haptics)
  * fail with ENOSYS. */
 #ifndef EBPO_CORE_OS_WINDOWS_H

@@ -9,7 +9,8 @@
 int main(int argc, char **argv);
 int wmain(int argc, wchar_t **argv);
 
-/* Replaces '\' by '/' in an argument if it is a path: if the folder before its last '\' exists. */
+/* Replaces '\' by '/' in an argument that is a path. An argument counts as a path if the folder
+ * before its last '\' exists. */
 static void use_slashes(const wchar_t *wide, char *text)
 {
     wchar_t folder[PATH_MAX];

@@ -229,7 +229,8 @@ int dladdr(const void *address, Dl_info *out)
 
 static char temporary_folder[PATH_MAX];
 
-/* Sets temporary_folder to TMPDIR, or to the folder that Windows names; "" if it is not known. */
+/* Sets temporary_folder to TMPDIR, or to the folder that Windows names, or to "" if no folder is
+ * known. */
 static void find_temporary_folder(void)
 {
     WCHAR wide[PATH_MAX];

@@ -1,8 +1,8 @@
 /* Runs independent pieces of work on several threads, which take the pieces in ascending order. The
  * calling thread is one of these threads, and only the calling thread reports progress. Which
  * thread runs a piece is not determined, so results must not depend on the thread. If several
- * pieces fail, the failure of the lowest piece is returned. All threads of the library are started
- * here, with a fixed stack size. They compute with the default floating-point environment
+ * pieces fail, the failure of the lowest piece is returned. This file starts all threads of the
+ * library, with a fixed stack size. The threads compute with the default floating-point environment
  * (fp_env.h). */
 #include "core/parallel.h"
 

@@ -17,7 +17,8 @@
 #error \
     "exact predicates need strict floating point: build without -funsafe-math-optimizations and its parts (-fassociative-math, -freciprocal-math, -fno-signed-zeros)"
 #endif
-/* 16 is as good as 0: it only changes how compilers treat _Float16, not double. */
+/* The value 16 is as good as 0, because 16 changes only the treatment of _Float16, not of double.
+ */
 #if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
 #error \
     "exact predicates need FLT_EVAL_METHOD 0, without excess precision: on x86 build with -msse2 -mfpmath=sse"

@@ -1,7 +1,7 @@
 /* Reads the data that all export formats share. A block is a level with its nodes and colours, or
- * the mesh with its source indices and colours. These functions read a block, make its columns
- * (arrays of values of its nodes, polygons or faces) and float32 coordinates for formats that need
- * them, add it to the report, and check the limits of formats. */
+ * the mesh with its source indices and colours. The functions of this file read a block, add the
+ * block to the report, make columns (arrays of values of the block's nodes, polygons or faces),
+ * make float32 coordinates for formats that need them, and check the limits of formats. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,14 +19,15 @@
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
     /* The values for a level; the mesh has -1 or 0. */
-    { "octcode", EBPO_H5_I64 },     /* locational code of the node; 0 for the mesh */
-    { "level", EBPO_H5_I32 },       /* level of the node in the octree; -1 for the mesh */
-    { "type", EBPO_H5_I32 },        /* type of the node (ebpo_node_type); -1 for the mesh */
-    { "winding", EBPO_H5_I32 },     /* winding number in a black node's cell, or at a leaf's lowest
-                                       corner; else 0 */
-    { "volume", EBPO_H5_F64 },      /* volume of the envelope; 0 for the mesh */
-    { "source_face", EBPO_H5_I64 }, /* for the mesh: source index, or -1 without maps; else -1 */
-    { "lod", EBPO_H5_I32 },         /* level of the block; -1 for the mesh */
+    { "octcode", EBPO_H5_I64 }, /* locational code of the node; 0 for the mesh */
+    { "level", EBPO_H5_I32 },   /* level of the node in the octree; -1 for the mesh */
+    { "type", EBPO_H5_I32 },    /* type of the node (ebpo_node_type); -1 for the mesh */
+    { "winding", EBPO_H5_I32 }, /* winding number in a black node's cell, or at a leaf's lowest
+                                   corner; else 0 */
+    { "volume", EBPO_H5_F64 },  /* volume of the envelope; 0 for the mesh */
+    { "source_face",
+      EBPO_H5_I64 },        /* source index of the mesh's face; -1 without maps; level: -1 */
+    { "lod", EBPO_H5_I32 }, /* level of the block; -1 for the mesh */
 };
 
 int ebpo_block_count(const ebpo_export_options *o)

@@ -16,7 +16,7 @@ enum { XDMF_POLYHEDRON = 16 }; /* XDMF's type of polyhedra in a mixed topology *
 typedef struct writer {
     ebpo_h5_out out;
     FILE *text;
-    const char *data_file; /* name of the HDF5 file, as the text refers to it */
+    const char *data_file; /* name by which the text refers to the HDF5 file */
 } writer;
 
 static void print_escaped(FILE *f, const char *s)
@@ -128,7 +128,7 @@ static ebpo_status put_colours(writer *w, const ebpo_block *block, const char *n
     return status;
 }
 
-/* Writes the colours of the block's vertices and faces, if it has any. */
+/* Writes the colours of the block's vertices, and of its faces, if the block has such colours. */
 static ebpo_status put_colours_of(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_colours *c = &block->colours;

@@ -136,8 +136,8 @@ static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    /* Clipping fails if almost nothing would remain, so a thin part cannot be cut off. It stays
-     * with the thick part. */
+    /* Clipping fails if almost nothing would remain. So a thin part cannot be cut off, and the thin
+     * part stays with the thick part. */
     bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
          low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
     if (side ? high_is_thin : low_is_thin)
@@ -219,7 +219,8 @@ ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
     return status;
 }
 
-/* A fragment with more faces than this is halved instead of cut along the planes of its faces. */
+/* A fragment with at most this number of faces is cut along the planes of its faces; a fragment
+ * with more faces is halved. */
 enum { CUT_FACES = 64 };
 /* A plane cuts a fragment only if the fragment extends to at least this distance (in cell
  * coordinates) on both sides of the plane. The distance is more than the width that

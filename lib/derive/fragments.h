@@ -126,11 +126,11 @@ typedef struct ebpo_bounder {
 #define EBPO_FRAGMENT_LEAST 1e-6
 
 typedef enum ebpo_fragment_kind {
-    EBPO_FRAGMENT_GRAY, /* in a gray node's cell: the whole part of the envelope in this cell */
-    /* in a leaf's cell; the fragment lists the leaf's faces that may intersect it */
+    EBPO_FRAGMENT_GRAY, /* the fragment is the whole part of the envelope in a gray node's cell */
+    /* the fragment is in a leaf's cell, and lists those faces of the leaf that may intersect it */
     EBPO_FRAGMENT_LEAF,
-    /* outside the solid: in a white cell, or cut off from all faces; for a surface, which has no
-     * inside, also other fragments without faces */
+    /* the fragment is outside the solid: in a white cell, or cut off from all faces. If the model
+     * is a surface, which has no inside, also any other fragment without faces */
     EBPO_FRAGMENT_OUTSIDE
 } ebpo_fragment_kind;
 
@@ -153,8 +153,9 @@ typedef struct ebpo_fragment_measure {
     double face[3][3];        /* the face nearest to the centre, in the model's unit */
 } ebpo_fragment_measure;
 
-/* Pushes a fragment onto the stack. It gets the bounds of `parent`, the fragment from which it was
- * cut (NULL: no bounds). *out is valid until the next call; its polytope is not set. */
+/* Pushes a fragment onto the stack. The fragment gets the bounds of `parent`, the fragment from
+ * which it was cut (NULL: no bounds). *out is valid until the next call; its polytope is not set.
+ */
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 

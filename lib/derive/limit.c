@@ -95,8 +95,8 @@ static double hull_volume(hull *h, double *points, uint64_t count)
         return 0;
     double volume = volume_by(h, points, (int)count, merged, &failed);
     /* qhull fails for some thin hulls, because it merges all their facets. With option QJ, qhull
-     * merges no facets, and moves the points by about 1e-11 instead. Then it returns the volume of
-     * a thin hull, and almost 0 for a flat hull. */
+     * merges no facets, but moves the points by about 1e-11. Then qhull returns the volume of a
+     * thin hull, and almost 0 for a flat hull. */
     return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
 }
 

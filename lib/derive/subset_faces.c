@@ -20,10 +20,10 @@ typedef struct numbering {
     uint32_t *new_plus_one; /* [faces of the original file] new index + 1; 0: none yet */
     uint32_t *old_index;    /* [count] old index of each new face */
     uint64_t count, capacity;
-    /* for each level: index of the next group and of the next leaf; number of references read and
-     * written so far */
-    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
-        written[EBPO_LEVELS_MAX];
+    /* for each level: index of the next group, and of the next leaf */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
+    /* for each level: number of references read so far, and written so far */
+    uint64_t read[EBPO_LEVELS_MAX], written[EBPO_LEVELS_MAX];
     bool no_memory; /* an allocation failed */
 } numbering;
 

@@ -91,8 +91,8 @@ static void record_column(kept_nodes *kept, int id, int type)
                        .default_value = ebpo_schema[id].default_value };
 }
 
-/* Returns the index in kept->of_type[].count of a list's counts; adds the counts if they are new.
- */
+/* Returns the index in kept->of_type[type].count of a list's counts. Adds the counts if they are
+ * not in this array. */
 static unsigned record_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
@@ -361,7 +361,7 @@ static bool is_close_enough(descent *d)
     return d->tolerance_nodes && d->tolerance_nodes[d->next_tolerance_node++].enough;
 }
 
-/* Copies the next gray node. It loses its children if they are not needed. */
+/* Copies the next gray node. The copy has no children if the children are not needed. */
 static void copy_gray(descent *d, ebpo_cell cell)
 {
     uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
@@ -565,7 +565,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
 /* The computation of volumes. The walk visits nodes in stored order. */
 typedef struct measuring {
     ebpo_cutting *c;
-    /* for each level: index of the next group, gray node and leaf, and of their next planes */
+    /* for each level: index of the next group, gray node, leaf, plane, and plane of a leaf */
     uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
         plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
 } measuring;

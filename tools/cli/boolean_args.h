@@ -27,8 +27,9 @@ bool boolean_read(const char *name, const char *text, uint32_t operands, boolean
 bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operands,
                         ebpo_pose *pose);
 
-/* Reads a plane, 'NX,NY,NZ,D' or 'x=V', as a row of ebpo_boolean_options.planes. Returns false
- * after an error, as boolean_read does. */
+/* Reads a plane in the form 'NX,NY,NZ,D' or 'x=V'. `plane`: receives the four numbers that
+ * ebpo_boolean_options.planes has for a plane. Returns false after an error, as boolean_read does.
+ */
 bool boolean_read_plane(const char *name, const char *text, double plane[4]);
 
 #endif

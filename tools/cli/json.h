@@ -34,7 +34,7 @@ int json_utf8_length(const char *text);
 void json_text(json *j, const char *key, const char *text);
 void json_uint(json *j, const char *key, uint64_t v);
 void json_int(json *j, const char *key, int64_t v);
-/* Writes the fewest digits that identify the double; null if it is not finite. */
+/* Writes the fewest digits that identify the double; null if the double is not finite. */
 void json_real(json *j, const char *key, double v);
 void json_bool(json *j, const char *key, bool v);
 void json_null(json *j, const char *key);

@@ -93,7 +93,7 @@ static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *e
 }
 
 /* Counts shells (closed components) that are cavities, inside out or nested. A 2-manifold of one
- * component needs no count: the sign of its volume shows if it is inside out. */
+ * component needs no count, because the sign of its volume shows if the component is inside out. */
 static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *options,
                                 ebpo_error *error)
 {

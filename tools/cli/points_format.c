@@ -49,7 +49,7 @@ static const char *find_npy_value(const char *head, const char *name)
     return at;
 }
 
-/* Reads a type such as '<f8'. Returns false if it is not float64 or float32. */
+/* Reads a type such as '<f8'. Returns false for a type other than float64 and float32. */
 static bool parse_npy_type(points *p, const char *descr)
 {
     if (strnlen(descr, 5) < 5)

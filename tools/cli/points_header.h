@@ -4,7 +4,7 @@
 
 #include "cli/points_input.h"
 
-/* Reads the line of names if it is in the block. The block then begins after this line, and
+/* Reads the line of names if this line is in the block. The block then begins after the line, and
  * p->field, p->fields and p->separator are set. Returns false after an error, which is in the
  * block. */
 bool points_take_header(points *p, points_block *b);

@@ -158,7 +158,7 @@ void results_inside(result_text *t, result_form form, const ebpo_inside_result *
 
 /* --- distance --- */
 
-/* Returns true if there is a nearest point. The distance may still be inf, if it is beyond the
+/* Returns true if there is a nearest point. Its distance may still be inf, if it is beyond the
  * range of doubles. */
 static bool has_point(const ebpo_distance_result *r)
 {

@@ -30,7 +30,7 @@ static span list_of(const textures *t, int which, uint64_t row)
                                        : (span){ "", 0 };
 }
 
-/* Returns the index in textures.list of an attribute; -1: it is not about images. */
+/* Returns the index of an attribute in textures.list; -1: the attribute is not about images. */
 static int which_of(const ebpo_attribute_facts *a)
 {
     static const char *const names[TEXTURE_ARRAYS] = { "name", "use", "sha256", "bytes" };
@@ -366,7 +366,7 @@ static bool is_repeated(const textures *t, uint64_t row)
     return repeated;
 }
 
-/* Writes an image, and counts it in *written if it is a new file. */
+/* Writes an image to a file. Increases *written if the file is new. */
 static ebpo_status write_one(const textures *t, uint64_t row, int top, uint64_t *written,
                              ebpo_error *error)
 {

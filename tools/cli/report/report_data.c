@@ -297,7 +297,7 @@ double quantile_of(double *values, uint64_t count, double share)
         return NAN;
     qsort(values, count, sizeof *values, compare_doubles);
     double exact_rank = ceil(share * (double)count);
-    uint64_t rank = exact_rank < 1 ? 1 : (uint64_t)exact_rank; /* from 1 */
+    uint64_t rank = exact_rank < 1 ? 1 : (uint64_t)exact_rank; /* the least value has rank 1 */
     return values[(rank < count ? rank : count) - 1];
 }
 

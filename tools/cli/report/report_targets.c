@@ -53,9 +53,9 @@ static ebpo_status measure_error(const comparison *c, ebpo_model *model, const c
     return status;
 }
 
-/* Sets *out to the error of the whole file, or 0 if it is not known. No subset has a smaller error,
- * because leaves cannot be refined. The error of the last level is the error of the file; it is
- * computed here if --levels omits that level. */
+/* Sets *out to the error of the whole file; 0: not known. No subset has a smaller error, because
+ * leaves cannot be refined. The error of the file is that of its last level. If --levels omits the
+ * last level, this function computes the error. */
 static ebpo_status find_file_error(const comparison *c, method *m, ebpo_file *file,
                                    ebpo_model *model, double *out, ebpo_error *error)
 {
