@@ -7,7 +7,7 @@
  * because each model sorts its rays itself.
  *
  * A result depends only on its point or ray: not on the range, the threads, or the models that are
- * open. A thread holds the results of one range and one model at a time. */
+ * open. A thread has the results of only one range and one model in memory at a time. */
 #include "core/strict_fp.h"
 
 #include <math.h>

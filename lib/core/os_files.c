@@ -14,7 +14,8 @@
 enum { PATH_BYTES = 4096 + 64 }; /* space for the longest path of a folder, and a file name in it */
 
 /* The path of the file that has a name at this moment, for ebpo_workspace_abandon in a signal
- * handler. The lock is held from before the file exists until its name is removed. */
+ * handler. A thread takes the lock before the file exists, and releases it after the name is
+ * removed. */
 static pthread_mutex_t named_lock = PTHREAD_MUTEX_INITIALIZER;
 static atomic_bool is_named;
 static char named[PATH_BYTES];

@@ -58,8 +58,8 @@ static inline uint32_t ebpo_polygon_corner(const uint32_t *triangle, unsigned i)
     return i < 2 ? triangle[i] : triangle[3 * (i - 2) + 2];
 }
 
-/* Returns the values of a column, to be freed by the caller; NULL when out of memory. `polygons`,
- * for a level: true: one value for each polygon, false: for each node. */
+/* Returns the values of a column, to be freed by the caller; NULL when out of memory. `polygons`:
+ * for a level, true: one value for each polygon; false: one value for each node. */
 void *ebpo_column_make(const ebpo_block *block, int column, bool polygons);
 /* Returns the source index of each vertex of the block's mesh as int64_t, to be freed by the
  * caller; NULL when out of memory. All values are -1 for a level, and if the file has no maps. */
@@ -76,8 +76,8 @@ typedef struct ebpo_export_row {
     /* true: second_ending replaces the ending of the first file's name; false: it is appended */
     bool replaces_ending;
     bool holds_vertex_colours, holds_face_colours;
-    bool takes_colours; /* supports colours of the caller (ebpo_export_options.vertex_colours) */
-    bool one_block;     /* a file holds only one block */
+    bool takes_colours; /* true: colours of the caller are written (options.vertex_colours) */
+    bool one_block;     /* true: a file can have only one block */
     /* Writes the files and fills in the report. NULL: the build lacks the library for the format.
      */
     ebpo_status (*write)(const ebpo_export_job *job, ebpo_error *error);

@@ -24,7 +24,7 @@ typedef struct numbering {
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
     /* for each level: number of references read so far, and written so far */
     uint64_t read[EBPO_LEVELS_MAX], written[EBPO_LEVELS_MAX];
-    bool no_memory; /* an allocation failed */
+    bool no_memory; /* true: an allocation failed */
 } numbering;
 
 /* Gives a face the next new index; returns false when out of memory. */
@@ -55,7 +55,8 @@ static ebpo_status number_leaf(numbering *n, int level)
     ebpo_level *l = &n->c->out->level[level];
     uint64_t i = n->leaf[level]++, begin = n->count, kept = 0;
     uint32_t *refs = l->leaf_refs + n->read[level], *to = l->leaf_refs + n->written[level];
-    bool is_sorted = true, valid = true; /* is_sorted: the references that were kept ascend */
+    /* is_sorted: the new indices of the references that stay references ascend */
+    bool is_sorted = true, valid = true;
     for (uint64_t k = 0; k < l->leaf_ref_count[i] && valid; k++) {
         uint32_t face = refs[k];
         if (n->new_plus_one[face] && n->new_plus_one[face] <= begin) {

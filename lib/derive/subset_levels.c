@@ -252,7 +252,7 @@ typedef struct descent {
     uint64_t next_tolerance_node; /* index in tolerance_nodes of the next gray node or leaf */
     uint64_t group; /* current group of the result, which is the index of its parent in `parent` */
     uint64_t nonempty_groups; /* number of groups of this level of the result that have nodes */
-    bool has_next_level;      /* some gray node of this level has children in the result */
+    bool has_next_level;      /* true: some gray node of this level has children in the result */
 } descent;
 
 static bool intersects_box(const ebpo_cutting *c, ebpo_cell cell)

@@ -17,7 +17,8 @@
 
 /* --- opening --- */
 
-/* Reports an error of the input. number: errno; 0: none. Returns false. */
+/* Reports an error of the input. `number`: errno, whose text follows `what`; 0: none. Returns
+ * false. */
 static bool fail_input(points *p, const char *what, int number)
 {
     fprintf(stderr, "ebpo %s: %s: %s%s%s\n", p->command, p->name, what, number ? ": " : "",

@@ -39,8 +39,8 @@ typedef struct points_block {
     double *space;          /* memory for `rows`; not used if `rows` points into `bytes` */
     uint64_t capacity_rows; /* capacity of `space` in rows */
     uint64_t lines;         /* number of lines of text, including lines before `begin` */
-    bool first;             /* true for the first block of the input */
-    bool failed;            /* there is an error after the last row of the block */
+    bool first;             /* true: this is the first block of the input */
+    bool failed;            /* true: there is an error after the last row of the block */
     uint64_t fault_at;      /* line or row of the error, from 1 in this block; 0: no position */
     char fault[200];        /* message of the error */
 } points_block;

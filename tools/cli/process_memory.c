@@ -51,7 +51,7 @@ static void set_limit(uint64_t bytes, int64_t threads, bool given)
         return;
     if (!given)
         inherited_limit = limit.rlim_cur;
-    bool ours = bytes && all <= inherited_limit; /* RLIM_INFINITY is the greatest */
+    bool ours = bytes && all <= inherited_limit; /* RLIM_INFINITY is the greatest value */
     limit.rlim_cur = ours ? all : inherited_limit;
     if (setrlimit(RLIMIT_DATA, &limit) != 0)
         return;

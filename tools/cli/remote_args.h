@@ -12,7 +12,7 @@
 typedef struct remote_values {
     bool stats, unversioned;
     int64_t max_expansion; /* as in ebpo_open_options */
-    bool compat;           /* also open files that other programs have rewritten (--compat) */
+    bool compat;           /* true: also open files that other programs have rewritten (--compat) */
     const char *cache, *cache_size, *user, *ca_file;
     unsigned cache_block; /* bytes; 0: default */
     double timeout, stall;

@@ -84,7 +84,7 @@ static char *put_attributes(char *at, result_form form, const ebpo_sampler *samp
     double values[EBPO_SAMPLER_MAX];
     ebpo_error error = EBPO_ERROR_INIT;
     unsigned count = sampler ? ebpo_sampler_columns(sampler) : 0;
-    bool none = face == EBPO_NO_FACE; /* the values are missing */
+    bool none = face == EBPO_NO_FACE; /* true: the values are written as missing */
     if (count && ebpo_sample(sampler, point, &face, 1, values, &error) != EBPO_OK)
         none = true;
     if (count && form == RESULTS_JSON)
