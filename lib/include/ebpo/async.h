@@ -2,7 +2,7 @@
  * Reads files whose bytes arrive asynchronously: in browsers, and in programs with an event loop.
  *
  * No function waits for bytes. A function that needs bytes which are not available returns
- * EBPO_E_PENDING. The caller gets the ranges of the needed bytes, fetches all of them at the same
+ * EBPO_E_PENDING. The caller gets the ranges of the needed bytes, fetches all ranges at the same
  * time, supplies the bytes, and repeats the call with the same arguments:
  *
  *     ebpo_async *async = NULL;
@@ -21,25 +21,26 @@
  *     }
  *     ebpo_async_end(async, operation);
  *
- * Every function that reads can return EBPO_E_PENDING if its file has such a source. Then:
- * - A function that makes an object makes no object. ebpo_open_source closes its source: get
- *   another one from ebpo_async_source.
+ * Every function that reads can return EBPO_E_PENDING if its file has such a source. Rules:
+ * - A function that returns EBPO_E_PENDING makes no object. If this function is ebpo_open_source,
+ *   it has closed the source: get a new source from ebpo_async_source for the repeated call.
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
- * - Batches of points and rays keep their completed results if options.done is given (query.h).
- *   Also begin an operation before each repetition; two operations then run. After
+ * - Batches of points and rays keep their completed results if options.done is given (query.h). For
+ *   a batch, also begin an operation before each repetition, so that two operations run. After
  *   ebpo_async_needed, end the older operation if the repetition has completed items, so that bytes
  *   that only earlier repetitions used may be removed. If the repetition has completed no items,
  *   end the newer operation.
  * - ebpo_ray_all_many keeps no completed results: its hits are one array in the order of the rays,
- *   whose positions depend on all earlier rays. Each call evaluates all rays, so pass few rays at a
- *   time.
- * - Catalogues open such files by ebpo_catalogue_options.open_file. Scenes open files by path.
- * - Haptic rendering does not support such files, as its thread loads data in the background.
+ *   so the position of a hit depends on all earlier rays. Each call evaluates all rays, so pass few
+ *   rays at a time.
+ * - Catalogues support such files if ebpo_catalogue_options.open_file opens them. Scenes do not
+ *   support them, because a scene opens its files by path.
+ * - Haptic rendering does not support such files, because its thread loads data in the background.
  *
- * The number of repetitions is limited, for any memory budget: bytes that were supplied or read
- * since the operation began stay available until it ends, so each repetition completes or needs
- * bytes that no earlier one needed.
+ * The number of repetitions is finite for any memory budget. Bytes that were supplied or read since
+ * the operation began stay available until it ends, so each repetition either completes, or needs
+ * bytes that no earlier repetition needed.
  */
 #ifndef EBPO_ASYNC_H
 #define EBPO_ASYNC_H
@@ -50,17 +51,17 @@
 extern "C" {
 #endif
 
-/* The available bytes of one file, and the ranges that are needed. */
+/* The available bytes of one file, and the ranges of the needed bytes. */
 typedef struct ebpo_async ebpo_async;
 
 /*
  * Makes an object without bytes.
  *
- * size      of the file in bytes
- * name      for messages; copied
- * version   text that changes when the file does, such as an ETag; copied. "": not known.
- * memory    Limit in bytes for supplied bytes. When an operation ends, the least recently used
- *           bytes are removed until the limit is met. The first 128 KiB of the file always stay.
+ * size      size of the file in bytes
+ * name      name of the file for messages; copied
+ * version   text that changes when the file changes, such as an ETag; copied. "": not known
+ * memory    maximum number of supplied bytes in memory. When an operation ends, the least recently
+ *           used bytes are removed until this number is met. The first 128 KiB of the file stay
  *
  * Threads: any.
  */
@@ -76,7 +77,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_new(uint64_t size, const char *nam
 EBPO_API void ebpo_async_free(ebpo_async *async);
 
 /*
- * Makes a source for ebpo_open_source. Any number of files may be opened, one source for each.
+ * Makes a source for ebpo_open_source. The same bytes may be opened any number of times, each time
+ * with a new source.
  * Initialize `out` with EBPO_SOURCE_INIT. Reading can return EBPO_E_PENDING, and EBPO_E_IO after
  * the file has changed.
  *
@@ -115,10 +117,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_needed(ebpo_async *async, const eb
                                                      size_t *count, ebpo_error *error);
 
 /*
- * Supplies bytes [offset, offset + size) of the file. They are copied. Any ranges may be supplied,
+ * Supplies bytes [offset, offset + size) of the file, which are copied. Any ranges may be supplied,
  * in any order, also before they are needed.
  *
- * version   of the file from which the bytes come; NULL: not known
+ * version   version of the file from which the bytes come; NULL: not known
  *
  * EBPO_E_IO: the version differs from that of ebpo_async_new, or the bytes differ from those that
  * are available. The file has changed: all later calls and reads fail. EBPO_E_ARGUMENT: the range

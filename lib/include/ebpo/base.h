@@ -12,14 +12,15 @@
  * These rules hold for every function. Other headers do not repeat them.
  *
  * Arguments: first the object, then other inputs, options and outputs; the error is last. Options
- * may be NULL, which selects the default values. The error may be NULL, and so may an output whose
- * comment says so. Indices begin at 0. `[n][3]` gives the shape of an array in row-major order.
+ * may be NULL, which selects the default values. The error may be NULL. An output may be NULL only
+ * if its comment says so. Indices begin at 0. `[n][3]` gives the shape of an array in row-major
+ * order.
  *
  * Ownership: ebpo_..._free frees what ebpo_..._new made, and ebpo_..._close closes what
  * ebpo_..._open opened. Both accept NULL. "Lent" memory belongs to the library. "Borrowed" memory
  * belongs to the caller and must stay unchanged for the stated time.
  *
- * Failure: a function that fails makes no object. Its output for a new object is NULL.
+ * Failure: a function that fails makes no object, and sets its output for a new object to NULL.
  *
  * A callback that receives results returns false to stop the call. The callback is then not called
  * again, and the call succeeds.
@@ -28,8 +29,10 @@
  * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
  * range or not initialized with its macro. A function with a progress callback can return
  * EBPO_E_CANCELLED. "The errors of reading" are EBPO_E_IO and EBPO_E_FORMAT, and EBPO_E_PENDING for
- * files with a source of async.h. "Also if ..." after a status adds a case to the meaning
- * that ebpo_status gives, or to the cases of the functions that the comment names.
+ * files with a source of async.h. "Also if ..." after a status gives a further case, in which the
+ * status is returned besides its meaning in ebpo_status. If the comment also refers to the errors
+ * of another function, the status is returned in the cases of that function and in the further
+ * case.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
  * on this number. Member `progress`: callback that reports progress; by default none. Parameter
@@ -40,15 +43,15 @@
  *                 the arguments
  *   one at a time per X   one thread at a time for each object X; different objects are
  *                 independent
- * The last thread that uses an object frees it. A function may start other threads; they end before
- * it returns, unless its comment says otherwise.
+ * The caller frees an object after all threads have ended their use of the object. A function may
+ * start threads. They end before the function returns, unless its comment says otherwise.
  *
- * Stack: a query (query.h) uses less than 64 KiB of the calling thread's stack, building and
- * verifying less than 256 KiB, all other functions less than 1 MiB. The library's own threads have
- * stacks of 4 MiB, independent of the process limit.
+ * Stack: of the calling thread's stack, a query (query.h) uses less than 64 KiB, building and
+ * verifying use less than 256 KiB, and all other functions less than 1 MiB. The threads that the
+ * library starts have stacks of 4 MiB, independent of the process limit.
  *
- * Floating-point environment: a function saves the rounding mode, flushing of denormals and traps
- * of the caller, computes in the default environment, and restores them. Callbacks run in the
+ * Floating-point environment: a function saves the caller's rounding mode, traps and treatment of
+ * denormals, computes in the default environment, and restores what it saved. Callbacks run in the
  * default environment.
  */
 #ifndef EBPO_BASE_H
@@ -68,10 +71,10 @@
  *     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
  *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
  *
- * From version 1.0 on, a program then runs with every later library of the same major version:
- * members that the program's structs lack keep their default values or are not filled in. The
- * program also runs with an earlier library, unless it sets a member that the earlier library does
- * not know (EBPO_E_UNSUPPORTED). A wrong struct_size is EBPO_E_ARGUMENT.
+ * From version 1.0 on, a program that uses these macros runs with every later library of the same
+ * major version: members that the program's structs lack keep their default values, or are not
+ * filled in. The program also runs with an earlier library, unless the program sets a member that
+ * the earlier library does not know (EBPO_E_UNSUPPORTED). A wrong struct_size is EBPO_E_ARGUMENT.
  *
  * All other structs keep their layout within a major version. Their reserved members are 0.
  */
@@ -175,7 +178,7 @@ typedef struct ebpo_error {
      */
     char message[480];
 
-    /* File, URL or mesh that caused the error, as messages name it; "" if none. */
+    /* Name of the file, URL or mesh that caused the error, as in messages; "" if none. */
     char file[256];
 
     /* Path inside an .ebpo.h5 file, such as "/levels/03/planes"; "" if none. */
@@ -185,8 +188,8 @@ typedef struct ebpo_error {
     int64_t offset;
 
     /*
-     * errno of the system call that failed, such as ENOENT; 0 if none, or not recorded. ENOENT is
-     * also set when a web server has no such file.
+     * errno of the system call that failed, such as ENOENT; 0 if no call failed, or if errno was
+     * not recorded. ENOENT is also set when a web server has no such file.
      */
     int64_t system_error;
 
@@ -249,12 +252,14 @@ typedef struct ebpo_output ebpo_output;
 
 /*
  * Begins a file that is too large for memory. The file appears at `path` when ebpo_output_end is
- * called. Temporary files of killed programs for the same path are removed.
+ * called. Temporary files that killed programs left for the same path are removed.
  *
  * out          ended by ebpo_output_end or ebpo_output_abandon
- * descriptor   for writing, and for reading data that was written; closed with the output
+ * descriptor   file descriptor for writing, and for reading the written data; ending the output
+ *              closes it
  *
- * EBPO_E_IO: as ebpo_check_output. EBPO_E_LIMIT: more than 32 outputs at the same time.
+ * EBPO_E_IO: the conditions of ebpo_check_output are not met. EBPO_E_LIMIT: more than 32 outputs at
+ * the same time.
  *
  * Threads: any.
  */
@@ -286,8 +291,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_check_output(const char *path, ebpo_erro
 
 /*
  * Removes the temporary files of all outputs that this process is writing. These outputs cannot be
- * completed afterwards. For signal handlers just before the process ends: the function calls only
- * unlink.
+ * completed afterwards. A signal handler may call this function just before the process ends,
+ * because the function calls only unlink.
  *
  * Threads: any.
  */
@@ -296,7 +301,7 @@ EBPO_API void ebpo_abandon_outputs(void);
 /*
  * Makes a temporary folder beside `folder`. The caller fills it, and ebpo_folder_publish renames it
  * to `folder`. If the caller does not publish the temporary folder, the caller removes it and its
- * contents. Temporary folders of killed programs for the same `folder` are removed.
+ * contents. Temporary folders that killed programs left for the same `folder` are removed.
  *
  * making   path of the temporary folder; freed by free()
  *

@@ -22,27 +22,28 @@ extern "C" {
 #endif
 
 /*
- * Selection of the planes of an envelope. With every selection, offsets are set so that the
- * envelope contains the solid.
+ * Selection of the planes of an envelope. With every selection, the offsets of the planes are set
+ * so that the envelope contains the part of the solid in the cell.
  */
 typedef enum ebpo_selection {
     /*
-     * From the root down. Candidates are the directions of the hull of the solid in the cell. A
-     * node starts with its parent's envelope. The plane that removes the greatest volume is added,
-     * again and again, while this volume is at least a share of the cell (`epsilon` of
-     * ebpo_build_options). Then planes are added that cut off needles: here, long, thin portions of
-     * the envelope with little volume.
+     * From the root down. Candidates are the facet normals of the convex hull of the solid in the
+     * cell. A node starts with its parent's envelope. The plane that removes the greatest volume is
+     * added, again and again, while this volume is at least a share of the cell (`epsilon` of
+     * ebpo_build_options). Then planes are added that cut off needles. A needle is a long, thin
+     * portion of the envelope that has little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 
     /*
-     * The other three selections are from the theses. Candidates are the normals of the faces below
-     * the node. These selections go from the leaves up: each plane of a node is moved outwards
-     * until it contains its children's envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
+     * EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET and EBPO_SELECT_RANDOM are from the theses.
+     * Candidates are the normals of the faces below the node. These selections go from the leaves
+     * up: each plane of a node is moved outwards until its half-space contains the children's
+     * envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
-    EBPO_SELECT_OFFSET = 2,   /* planes that were moved outwards by the smallest distance */
-    EBPO_SELECT_RANDOM = 3,   /* consecutive candidates, from a random one on */
+    EBPO_SELECT_OFFSET = 2,   /* candidates whose planes are moved outwards least */
+    EBPO_SELECT_RANDOM = 3,   /* consecutive candidates, beginning with a random candidate */
 
     /* Number of selections. */
     EBPO_SELECTION_COUNT
@@ -59,7 +60,7 @@ typedef struct ebpo_selection_traits {
      */
     bool from_leaves;
 
-    /* True: uses a distance of normals (ebpo_normal_distance). */
+    /* True: uses a distance between normals (`normals` of ebpo_build_options). */
     bool uses_normal_distance;
 
     /* True: uses `seed` of ebpo_build_options. */
@@ -73,7 +74,7 @@ typedef struct ebpo_selection_traits {
  */
 EBPO_API const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection);
 
-/* Distance of two normals for k-medoids. */
+/* Definition of the distance between two normals, for k-medoids. */
 typedef enum ebpo_normal_distance {
     /*
      * Sum of squared differences of the two spherical coordinates (EBP 2017, equation 4). Near the
@@ -86,16 +87,16 @@ typedef enum ebpo_normal_distance {
 } ebpo_normal_distance;
 
 /*
- * Seconds of two steps, summed over all threads. `progress` does not separate the steps, because
- * each piece (subtree) of the tree passes through both steps in turn.
+ * Durations of the two steps of building, in seconds, summed over all threads. `progress` does not
+ * separate the steps, because each piece (subtree) of the tree passes through both steps in turn.
  */
 typedef struct ebpo_build_times {
     size_t struct_size;
 
-    /* Assigning faces to cells, winding numbers of corners, indices of faces. */
+    /* Time to assign faces to cells, and to compute winding numbers and the order of faces. */
     double cells;
 
-    /* Planes and envelopes. */
+    /* Time to compute planes and envelopes. */
     double envelopes;
 } ebpo_build_times;
 
@@ -118,16 +119,17 @@ typedef struct ebpo_build_options {
     uint32_t leaf_faces;
 
     /*
-     * Limit of EBPO_SELECT_INHERIT, from 0 to 1; with this selection also for the planes of leaves
-     * (EBPO_PART_LEAF_PLANES). A plane is kept if it removes at least this share of the cell, or if
+     * For EBPO_SELECT_INHERIT: least share of the cell, from 0 to 1, that a plane must remove, for
+     * gray nodes and for leaves (EBPO_PART_LEAF_PLANES). A plane that removes less is also kept if
      * it cuts off a portion of the envelope that extends beyond the plane by a tenth of the cell.
-     * In levels 0 to 4 the share is epsilon / 10, or less where the solid is thin.
+     * For gray nodes of levels 0 to 4, the share is epsilon / 10 times the square root of the part
+     * of the cell that the parent's envelope fills.
      */
     double epsilon;
 
     /*
-     * ebpo_part bits: parts of the file to make. Planes of leaves are made only on request. Colours
-     * are stored only if the mesh has colours, and only with EBPO_PART_MESH.
+     * ebpo_part bits: parts of the file to make. By default, planes of leaves are not made. Colours
+     * are stored if EBPO_PART_MESH is set too and the mesh has colours.
      */
     uint32_t parts;
 
@@ -144,19 +146,19 @@ typedef struct ebpo_build_options {
 
     /*
      * For the selections of the theses: share of the candidates that is selected, in percent, above
-     * 0 and at most 100. The number is rounded up (EBP 2017, equation 5). At most 255 planes are
-     * stored, also with k_root.
+     * 0 and at most 100. The number of planes is rounded up (EBP 2017, equation 5). A node has at
+     * most 255 planes, also with k_root.
      */
     double percent;
 
     /*
-     * If not 0, used instead of percent: number of planes at the root. Each next level has half as
-     * many planes. In a node, the number is halved until it is less than the number of candidates
-     * (BP 2008, 3.5.1).
+     * For the selections of the theses: number of planes at the root; 0: `percent` decides. The
+     * number for a level is half the number for the level above. In a node, it is halved further
+     * until it is less than the number of candidates (BP 2008, 3.5.1).
      */
     double k_root;
 
-    /* Distance of normals for EBPO_SELECT_KMEDOIDS. */
+    /* Definition of the distance between normals, for EBPO_SELECT_KMEDOIDS. */
     ebpo_normal_distance normals;
 
     /* Seed for EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM; equal seeds give equal files. */
@@ -187,11 +189,11 @@ typedef struct ebpo_build_options {
  * Builds the tree of a checked mesh. The arrays of the mesh are moved into `out` and reordered: the
  * mesh is empty afterwards, also on failure. `out` is freed by ebpo_tree_free.
  *
- * report          from ebpo_mesh_check or ebpo_mesh_prepare; copied into the file's metadata
- * repair_record   repairs that were made; copied as well. NULL: none
+ * report          result of ebpo_mesh_check or ebpo_mesh_prepare; copied to out->info
+ * repair_record   repairs that were made; copied to out->info. NULL: none
  *
  * EBPO_E_ARGUMENT: an option is out of range. EBPO_E_NOT_SOLID: see require_solid. EBPO_E_FORMAT,
- * EBPO_E_LIMIT: as ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no disk space for the
+ * EBPO_E_LIMIT: see ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no disk space for the
  * workspace.
  *
  * Threads: one at a time per mesh.
@@ -202,8 +204,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_r
                                               ebpo_error *error);
 
 /*
- * Repacks a file as ebpo_file_repack does. Adds EBPO_PART_BORDER (border loops, ebpo_part) to a
- * surface that has a mesh but no border. Subsets are only repacked.
+ * Repacks a file as ebpo_file_repack does. Adds the part EBPO_PART_BORDER (border loops) if the
+ * model is a surface, and the file has a mesh without this part and is not a subset.
  *
  * EBPO_E_LIMIT: the border has 2^31 edges or more. Other errors are those of ebpo_file_repack.
  *
@@ -226,29 +228,31 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_add_surface(const ebpo_file *file, 
                                                          const ebpo_write_options *write,
                                                          ebpo_error *error);
 
-/* Criterion by which leaves with few faces become one leaf (BP 2008, 3.3.1). */
+/* Criterion by which nodes with few faces become one leaf (BP 2008, 3.3.1). */
 typedef enum ebpo_coalescing {
     /* A node with at most leaf_faces different faces is a leaf. */
     EBPO_COALESCE_DISTINCT = 0,
 
     /*
-     * Eight siblings become one leaf while their lists have fewer than leaf_faces entries together:
-     * a face in several lists counts several times (criterion 1, algorithm 4).
+     * Eight siblings become one leaf if their lists of faces together have fewer than leaf_faces
+     * entries. A face in several lists counts several times (criterion 1, algorithm 4).
      */
     EBPO_COALESCE_SUM = 1,
 
     /*
-     * Siblings become one leaf while their lists have, on average, fewer than leaf_faces entries
+     * Eight siblings become one leaf if their lists have, on average, fewer than leaf_faces entries
      * (criterion 2).
      */
     EBPO_COALESCE_MEAN = 2
 } ebpo_coalescing;
 
-/* The nodes of one level, and the volumes of their envelopes, in the model's unit cubed. */
+/* Statistics of one level: numbers of nodes and planes, and volumes in cubic units of the model. */
 typedef struct ebpo_thesis_level {
     uint64_t gray_count, leaf_count, black_count;
-    uint64_t leaf_faces; /* entries of the leaves' lists of faces */
-    uint64_t plane_count, leaf_plane_count;
+    uint64_t leaf_faces;                    /* number of entries in the leaves' lists of faces */
+    uint64_t plane_count, leaf_plane_count; /* number of planes of gray nodes, and of leaves */
+
+    /* Volume of the envelopes of gray nodes and of leaves, and of the cells of black nodes. */
     double gray_volume, leaf_volume, black_volume;
 } ebpo_thesis_level;
 
@@ -264,11 +268,10 @@ typedef struct ebpo_thesis_levels {
 /*
  * Computes the levels of a mesh as the theses do, for comparison; the result cannot be stored. The
  * limits of files do not apply: a node may have more than 255 planes, and candidates with equal
- * normals all count. The selection must be one of the theses. The mesh is empty afterwards, also on
- * failure.
+ * normals all count. The mesh is empty afterwards, also on failure.
  *
  * report    as for ebpo_build
- * options   as for ebpo_build; parts are ignored
+ * options   as for ebpo_build, with a selection of the theses; `parts` is ignored
  *
  * EBPO_E_ARGUMENT: an option is out of range, or the selection is not one of the theses. Other
  * errors are those of ebpo_build.

@@ -13,14 +13,17 @@
  *     ebpo_catalogue_models_new(NULL, &models, &error);
  *     ebpo_catalogue_inside(catalogue, models, points, count, NULL, out, &error);
  *
- * A *catalogue* is a list of models with boxes and digests. *Parts* are files of one model that was
- * cut; *caps* are faces that close a part where it was cut. A query opens only the models whose
- * boxes can contribute to the result. An opened model must have the digest of its entry and must be
- * within the entry's box. Distances and rays use the entry's model at `surface`, or at `path` if
- * `surface` is NULL. If the entry names a file of face indices (`numbers`), this file must have one
- * index for each face of that model. If one of these conditions is not met, the query returns
- * EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on the budget.
- * docs/guide/clusters.md describes the file format and the results of parts.
+ * A *catalogue* is a list of entries, each with the path, the box and the digest of a model.
+ * *Parts* are files of one model that was cut; *caps* are faces that close a part where it was cut.
+ * A query opens only the models whose boxes can contribute to the result. Distances and rays use
+ * the entry's model at `surface`, or at `path` if `surface` is NULL. Results are those of the
+ * models (query.h) and do not depend on the budget. docs/guide/clusters.md describes the file
+ * format and the results of parts.
+ *
+ * A query returns EBPO_E_FORMAT if an opened model does not have the digest of its entry or is not
+ * within the entry's box. It also returns EBPO_E_FORMAT if the entry names a file of face indices
+ * (`numbers`), and this file does not have one index for each face of the model that distances and
+ * rays use.
  */
 #ifndef EBPO_CATALOGUE_H
 #define EBPO_CATALOGUE_H
@@ -39,21 +42,21 @@ typedef struct ebpo_catalogue ebpo_catalogue;
 /* Description of a model in a catalogue. */
 typedef struct ebpo_catalogue_entry {
     /*
-     * Path or URL of the model. For a part with `surface`: of the model with caps, which gives
-     * winding numbers. Not NULL, not empty.
+     * Path or URL of the model. If `surface` is not NULL: path or URL of the part with caps, which
+     * is used for winding numbers. Not NULL, not empty.
      */
     const char *path;
 
     /*
-     * For a part: path or URL of the model without caps, for distances and rays. NULL: distances
-     * and rays use the model at `path`.
+     * For a part: path or URL of the part without caps, which is used for distances and rays. NULL:
+     * distances and rays use the model at `path`.
      */
     const char *surface;
 
     /*
-     * For a part: path of an .npy file of face indices. For each face of the model that is used for
+     * For a part: path of an .npy file of face indices. For each face of the part that is used for
      * distances and rays, the file has the face's index in the whole model. Not an empty string.
-     * NULL: faces keep their indices.
+     * NULL: results give the indices of faces in the part.
      */
     const char *numbers;
 
@@ -64,10 +67,11 @@ typedef struct ebpo_catalogue_entry {
     double min[3], max[3];
 
     /*
-     * Data from the header of the file, for programs that read the catalogue: size of the file,
-     * numbers of faces and vertices, rule for winding numbers; mesh: the file has a mesh; pruned:
-     * the file is a subset. Queries do not use this data. If file_bytes is 0, these six members are
-     * unknown and not written.
+     * Data from the header of the file at `path`, for programs that read the catalogue. file_bytes:
+     * size of the file. face_count, vertex_count: number of faces and vertices. rule: rule for
+     * winding numbers. mesh: true if the file has a mesh. pruned: true if the file is a subset.
+     * Queries do not use this data. If file_bytes is 0, these six members are unknown and not
+     * written.
      */
     uint64_t file_bytes, face_count, vertex_count;
     ebpo_rule rule;
@@ -86,15 +90,17 @@ typedef struct ebpo_catalogue_entry {
 } ebpo_catalogue_entry;
 
 /*
- * Opens a file for a query, by a path or URL that the catalogue contains. If this function fails,
- * the query returns the function's error. Called from any thread, including threads of the library.
+ * Function that opens a file for a query, by a path or URL that the catalogue contains. If this
+ * function fails, the query returns its error. Any thread may call it, including threads of the
+ * library.
  */
 typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo_file **out,
                                               ebpo_error *error);
 
 /*
- * Closes the file, in any thread. This function must not call functions of the same
- * ebpo_catalogue_models, because the lock of that object is held.
+ * Function that closes a file that ebpo_catalogue_open_fn opened. Any thread may call it. It must
+ * not call functions of the ebpo_catalogue_models whose query opened the file, because the library
+ * has locked this object.
  */
 typedef void (*ebpo_catalogue_close_fn)(void *user, ebpo_file *file);
 
@@ -126,10 +132,10 @@ typedef struct ebpo_catalogue_options {
 
 /*
  * Reads and checks a catalogue written by `ebpo catalogue` or ebpo_catalogue_save; opens no model.
- * Relative paths are based on the file's folder. Unknown members are ignored.
+ * Relative paths are based on the file's folder. Unknown JSON members are ignored.
  *
- * EBPO_E_FORMAT: not a catalogue; the message gives the location. EBPO_E_VERSION: another version.
- * EBPO_E_LIMIT: the file has more than 1 GiB. EBPO_E_IO.
+ * EBPO_E_FORMAT: not a catalogue; the message gives the location. EBPO_E_VERSION: the file has an
+ * unknown version. EBPO_E_LIMIT: the file has more than 1 GiB. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -140,7 +146,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_open(const char *path,
 /*
  * Makes a catalogue of entries[count], in their order. All data is copied.
  *
- * EBPO_E_ARGUMENT: no entry, or 2^32 - 1 or more; an entry without a path or a box.
+ * EBPO_E_ARGUMENT: there is no entry, or there are 2^32 - 1 entries or more; or an entry has no
+ * path or no valid box.
  *
  * Threads: any.
  */
@@ -169,8 +176,8 @@ EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
 /*
  * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin with the same
- * bytes as the folder of `path` become relative; others are unchanged. When the catalogue is read
- * again, relative paths are based on that folder.
+ * bytes as the folder of `path` become relative; other paths are unchanged. When the catalogue is
+ * read again, relative paths are based on that folder.
  *
  * EBPO_E_ARGUMENT: a path is not UTF-8. EBPO_E_IO.
  *
@@ -214,8 +221,8 @@ EBPO_API ebpo_status ebpo_catalogue_get_facts(const ebpo_catalogue *catalogue,
                                               ebpo_catalogue_facts *out);
 
 /*
- * Returns entry `number`, from 0. Relative paths in the entry are already joined with their base
- * folder. The entry is valid until the catalogue is freed. NULL: `number` is out of range.
+ * Returns the entry with index `number`, or NULL if `number` is out of range. Relative paths in the
+ * entry are already joined with their base folder. The entry is valid until the catalogue is freed.
  *
  * Threads: any.
  */
@@ -225,8 +232,8 @@ EBPO_API const ebpo_catalogue_entry *ebpo_catalogue_get_entry(const ebpo_catalog
 /* ---- open models ---- */
 
 /*
- * Open models of any number of catalogues. The first query that needs a model opens it. If memory
- * is needed, the least recently queried model is closed. Threads may share this object.
+ * Open models of any number of catalogues. The first query that needs a model opens the model. If
+ * memory is needed, the least recently queried model is closed. Threads may share this object.
  */
 typedef struct ebpo_catalogue_models ebpo_catalogue_models;
 
@@ -235,8 +242,8 @@ typedef struct ebpo_catalogue_models_options {
     size_t struct_size;
 
     /*
-     * Total memory limit in bytes. Each open model may use one n-th of the limit; n is the number
-     * of models of its catalogue, but at most 8. 0: no limit.
+     * Maximum memory of all open models together, in bytes. Each open model may use one n-th of it;
+     * n is the number of models of its catalogue, but at most 8. 0: no limit.
      */
     uint64_t memory;
 
@@ -264,7 +271,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_models_new(
 EBPO_API void ebpo_catalogue_models_free(ebpo_catalogue_models *models);
 
 /*
- * Sets another memory limit, from the next query on. Idle models are closed when memory is needed.
+ * Changes the memory limit, from the next query on. Models that no query uses are closed when
+ * memory is needed.
  *
  * Threads: any.
  */
@@ -281,7 +289,10 @@ EBPO_API void ebpo_catalogue_models_close_idle(ebpo_catalogue_models *models);
 typedef struct ebpo_catalogue_models_stats {
     size_t struct_size;
 
-    /* Numbers of models: opened since the object was made, closed since then, and open now. */
+    /*
+     * opened, closed: number of models that were opened and closed since the object was made. open:
+     * number of models that are open now.
+     */
     uint64_t opened, closed, open;
 } ebpo_catalogue_models_stats;
 
@@ -290,8 +301,8 @@ typedef struct ebpo_catalogue_models_stats {
 /*
  * Gets statistics.
  *
- * sums   sums over all models, including closed ones; but `memory` is the current use, and `budget`
- *        is the total budget. May be NULL
+ * sums   sums over all models, including closed models; only `memory` is the current use, and
+ *        `budget` is the budget of all models together. May be NULL
  *
  * Threads: any.
  */
@@ -302,11 +313,11 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
 /* ---- queries ---- */
 
 /*
- * query.h gives the valid values of points and rays. For other values, queries return
- * EBPO_E_ARGUMENT, and the message gives the index of the point or ray. Points are processed along
- * a curve, so that models and subtrees are loaded few times. On failure the results are
- * unspecified. Errors are those of opening and querying models. EBPO_E_LIMIT: a model does not fit
- * in its share of the budget.
+ * Rules for the queries of a catalogue. query.h gives the valid values of points and rays. For
+ * other values, queries return EBPO_E_ARGUMENT, and the message gives the index of the point or
+ * ray. Points are processed along a curve, so that each model and subtree is loaded only a few
+ * times. On failure the results are unspecified. Errors are those of opening and querying models.
+ * EBPO_E_LIMIT: a model does not fit in its share of the budget.
  *
  * A query waits while other queries use the budget. Therefore a callback of a query, such as the
  * one that opens files, must not query the same ebpo_catalogue_models.
@@ -316,19 +327,19 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
 typedef struct ebpo_catalogue_query_options {
     size_t struct_size;
 
-    /* Counts completed points or rays, in any order. */
+    /* Reports the number of completed points or rays, which are completed in any order. */
     ebpo_progress progress;
 
-    /* Distances: as in ebpo_distance_options. */
+    /* For distances: as in ebpo_distance_options. */
     double max_distance;
 
-    /* Rays: as in ebpo_ray_options. */
+    /* For rays: as in ebpo_ray_options. */
     ebpo_ray_sides sides;
 
-    /* Threads for this call. 0: all cores. */
+    /* Number of threads for this call. 0: all cores. */
     unsigned threads;
 
-    /* Distances: as in ebpo_distance_options. */
+    /* For distances: as in ebpo_distance_options. */
     bool unsigned_distance;
 
     uint8_t reserved[7];
@@ -343,13 +354,13 @@ typedef struct ebpo_catalogue_query_options {
         }                                                                                        \
     }
 
-/* Index of no model. */
+/* Value of a model's index if there is no model. */
 #define EBPO_CATALOGUE_NO_MODEL UINT64_MAX
 
 /*
- * Classifies points[count][3] into out[count]. The winding number is the sum over the models; a
- * model with the point on a face adds 0. A point is inside if it is inside any model; else it is on
- * a face if it is on a face of any model.
+ * Classifies points[count][3] into out[count]. The winding number is the sum over the models, to
+ * which a model adds 0 if the point is on one of its faces. A point is inside if it is inside any
+ * model. Otherwise it is on a face if it is on a face of any model.
  *
  * For parts, the rule is applied to the sum. The result is exactly the result for the whole model,
  * also for points on caps. EBPO_E_LIMIT: each of 64 rays from a point on a cap hits an edge or runs
@@ -370,7 +381,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
  * solids, distances of points inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both
  * the unsigned distance, or 0 if no face is found.
  *
- * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no face is found
+ * model   [count] index of the entry that has the face; EBPO_CATALOGUE_NO_MODEL: no face is found
  *
  * EBPO_E_ABSENT: all entries are parts with only caps (`only_caps`).
  *
@@ -383,9 +394,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
- * have the same rounded t, the first of them in the catalogue is used. Exception: if t is too large
- * for a double (t is INFINITY, but there is a face), t is computed again for the direction
- * multiplied by a power of two, and these values are compared (see ebpo_ray_hit).
+ * have the same rounded t, the first of them in the catalogue is used. Exception: if t is INFINITY
+ * although a face is hit (ebpo_ray_hit), t is computed again for the direction multiplied by a
+ * power of two. The values of t computed in this way are compared.
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -17,7 +17,8 @@
  * Results do not depend on the order of the models or on the machine. Results do not depend on
  * budgets either, with two exceptions: the pair of intersecting faces that ebpo_collide_first and
  * ebpo_collide_distance return, and distances within a tolerance. Every query supports partly
- * loaded models: a budget or a cut level (query.h) keeps only some subtrees in memory.
+ * loaded models, of which only some subtrees are in memory, because of a budget or a cut level
+ * (query.h).
  * docs/develop/collision.md explains the kinds of pairs.
  */
 #ifndef EBPO_COLLIDE_H
@@ -55,7 +56,7 @@ typedef struct ebpo_collider_options {
         sizeof(ebpo_collider_options), 0, 0 \
     }
 
-/* Two models (or the same model twice) and scratch memory, for queries of one thread. */
+/* Two models (or one model, used twice) and scratch memory. One thread at a time may query it. */
 typedef struct ebpo_collider ebpo_collider;
 
 /*
@@ -80,8 +81,8 @@ EBPO_API void ebpo_collider_free(ebpo_collider *collider);
  * Checks that a model can be queried at a pose.
  *
  * EBPO_E_ARGUMENT: the matrix is not a rotation, a value is not finite, or the scale or the posed
- * model is out of range. For a matrix, the message gives the difference of its columns from length
- * 1 or from right angles (2^-20 is allowed), or reports a mirror image.
+ * model is out of range. If the matrix is not a rotation, the message gives the difference of its
+ * columns from length 1 or from right angles (2^-20 is allowed), or reports a mirror image.
  *
  * Threads: any.
  */
@@ -89,8 +90,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_check(const ebpo_model *model, cons
                                                    ebpo_error *error);
 
 /*
- * Options of all queries of a collider. NULL: no poses (both models as in their files), and no
- * deadline.
+ * Options of all queries of a collider. NULL: identity poses (both models as in their files), and
+ * no deadline.
  */
 typedef struct ebpo_collide_options {
     size_t struct_size;
@@ -103,7 +104,7 @@ typedef struct ebpo_collide_options {
 
     ebpo_progress progress;
 
-    /* Only for ebpo_collide_levels: levels 0 to `level` are used. -1: all levels in memory. */
+    /* For ebpo_collide_levels: deepest level that is used. -1: all levels in memory are used. */
     int32_t level;
 
     int32_t reserved;
@@ -117,25 +118,28 @@ typedef struct ebpo_collide_options {
 /* ---- any contact ---- */
 
 /*
- * Two faces, one of model A and one of model B. face_a, face_b: source indices (indices in the file
- * if it has no source indices). file_face_a, file_face_b: indices in the files.
+ * Two faces, one of model A and one of model B. face_a, face_b: source indices (if a file has no
+ * source indices: indices in the file). file_face_a, file_face_b: indices in the files.
  */
 typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
 
-    /* ebpo_pair_kind; EBPO_PAIR_APART if no pair was found, or for a nearest pair. */
+    /*
+     * ebpo_pair_kind of the faces. EBPO_PAIR_APART: no pair was found, or the pair is the nearest
+     * one and its faces do not intersect.
+     */
     int32_t kind;
 
     int32_t reserved;
 } ebpo_face_pair;
 
 /*
- * Finds a pair of intersecting faces. *found: 1: a pair was found; 0: no faces intersect; -1:
- * undecided at the deadline. Only faces count: for a solid inside another solid without
- * intersecting faces, *found is 0.
+ * Finds a pair of intersecting faces. Sets *found to 1 if a pair was found, to 0 if no faces
+ * intersect, and to -1 if this is undecided at the deadline. Only faces count: if one solid is
+ * inside another solid and their faces do not intersect, *found is 0.
  *
- * For the same files and poses, the pair is the same on every machine, but it is not the first pair
- * of ebpo_collide_all. For partly loaded models it also depends on the subtrees in memory.
+ * For the same files and poses, the pair is the same on every machine. It need not be the first
+ * pair of ebpo_collide_all. For partly loaded models, it also depends on the subtrees in memory.
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: the budget is too small
  * (ebpo_model_new). Also the errors of reading (base.h).
@@ -151,10 +155,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
 
 /*
  * Relation of two point sets at their poses. The set of a solid is the closure of the points that
- * are inside by its rule. The set of a surface is only its faces, because no faces close its holes.
- * This is also true with EBPO_PART_BORDER, the part of a file with which ebpo_inside decides for a
- * surface. Faces without area are ignored. Exactly one relation applies: EBPO_A_INSIDE_B,
- * EBPO_B_INSIDE_A and EBPO_EQUAL take precedence over EBPO_TOUCHING and EBPO_INTERSECTING.
+ * are inside by its rule. The set of a surface consists of its faces. The part EBPO_PART_BORDER
+ * gives a surface an inside for ebpo_inside, but not for relations. Faces without area are ignored.
+ * Exactly one relation applies: EBPO_A_INSIDE_B, EBPO_B_INSIDE_A and EBPO_EQUAL take precedence
+ * over EBPO_TOUCHING and EBPO_INTERSECTING.
  */
 typedef enum ebpo_relation {
     EBPO_DISJOINT = 0,     /* no common point */
@@ -172,25 +176,27 @@ typedef struct ebpo_relation_result {
     int32_t relation;
 
     /*
-     * Intersecting faces, as in ebpo_collide_first: 1: some intersect; 0: none; -1: unknown. A
-     * solid inside another may touch the other from inside.
+     * 1: some faces of A and B intersect (for example, if a solid inside another solid touches it
+     * from inside). 0: no faces intersect. -1: unknown.
      */
     int32_t contact;
 } ebpo_relation_result;
 
 /*
- * Computes the exact relation of the models. Usually one pair of crossing faces decides; without
- * contacts, one face of each shell decides. If models only touch, every face in contact is tested.
+ * Computes the exact relation of the models. Usually one pair of crossing faces decides. If no
+ * faces intersect, one face of each shell decides. If models only touch, every face that intersects
+ * the other model is tested.
  *
- * Memory: a model entirely in memory takes 4 bytes per face in the collider, and about 60 during
- * the call. A partly loaded model takes half a byte per face, and about 60 per face of a subtree. A
- * subtree of a partly loaded model is loaded if it has faces in contact. It is also loaded if it
- * may decide that a model is partly inside the other one: if a face inside the other model was
- * found, and the subtree may have a face outside the other model; or if a face outside was found,
- * and the subtree may have a face inside.
+ * Memory: for a model entirely in memory, the collider takes 4 bytes per face, and about 60 bytes
+ * more per face during the call. For a partly loaded model, it takes half a byte per face, and
+ * about 60 bytes per face of a subtree.
  *
- * Errors are those of ebpo_collide_first; after the deadline the call succeeds. EBPO_E_ABSENT: as
- * for ebpo_inside.
+ * A subtree of a partly loaded model is loaded if some of its faces intersect the other model. It
+ * is also loaded if its model is known to have a face inside the other model and the subtree may
+ * have a face outside, or the reverse: the model is then partly inside the other one.
+ *
+ * Errors are those of ebpo_collide_first; at the deadline the call succeeds with
+ * EBPO_RELATION_UNDECIDED. EBPO_E_ABSENT: as for ebpo_inside.
  *
  * Threads: one at a time per collider.
  */
@@ -202,21 +208,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_relation(ebpo_collider *collider
 /* ---- all pairs of faces ---- */
 
 /*
- * Callback that gets pairs, which are valid until it returns. It returns false to stop the call.
- * Calls are sequential.
+ * Callback that gets pairs, which are valid until the callback returns. It returns false to stop
+ * the call. It is never called by two threads at the same time.
  */
 typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t count);
 
 /*
- * Finds every pair of intersecting faces once. Pairs are sorted by the index in the file of the
- * first model, then by the index in the file of the other model. The first model is the model with
- * the lower content_sha256; if these are equal, the model with the lower pose, compared bit by bit.
- * Partly loaded models give the same pairs in the same order. Subtrees whose envelopes may
- * intersect are loaded; each about once if `memory` holds all pairs and the budgets hold about a
- * hundred subtrees.
+ * Finds every pair of intersecting faces once. Pairs are sorted by the index of the face in the
+ * file of the first model, then by the index in the file of the other model. The first model is the
+ * model with the lower content_sha256, or, if the models have the same content_sha256, the model
+ * with the lower pose, compared bit by bit.
  *
- * EBPO_E_CANCELLED: also if the deadline has passed. The pairs passed so far are then the first
- * pairs in this order. Other errors are those of ebpo_collide_first.
+ * Partly loaded models give the same pairs in the same order. Subtrees whose envelopes may
+ * intersect are loaded. Each is loaded about once if all pairs fit in `memory` of the options, and
+ * about a hundred subtrees fit in the budgets.
+ *
+ * EBPO_E_CANCELLED: also if the deadline has passed. `take` has then received the first pairs of
+ * the complete list. Other errors are those of ebpo_collide_first.
  *
  * Threads: one at a time per collider.
  */
@@ -227,9 +235,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_all(ebpo_collider *collider,
 
 /*
  * Finds the self-intersections of one model without a pose: pairs of faces that have common points
- * besides a common corner or edge; face_a is before face_b in the file. Common points of two faces
- * at equal corners, or along the edge between two equal corners, do not count. EBPO_PAIR_COPLANAR
- * counts, for example a fold or a repeated face. The collider must contain one model, twice.
+ * besides a common corner or edge. face_a is before face_b in the file. Common points of two faces
+ * at equal corners, or along the edge between two equal corners, do not count. Pairs of kind
+ * EBPO_PAIR_COPLANAR always count, for example a fold or a repeated face. Both models of the
+ * collider must be the same model.
  *
  * EBPO_E_ARGUMENT: two different models. Other errors are those of ebpo_collide_all.
  *
@@ -243,9 +252,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
 /* ---- intersection lines ---- */
 
 /*
- * Intersection of two crossing faces, from point[0] to point[1] in the direction of the cross
- * product of A's normal and B's normal. The error of a coordinate is at most 0.51 units in the last
- * place plus 2^-60 of the greatest coordinate of the edge on which the point is. face_a,
+ * Intersection of two crossing faces: a segment from point[0] to point[1], in the direction of the
+ * cross product of A's normal and B's normal. The error of a coordinate is at most 0.51 units in
+ * the last place plus 2^-60 of the greatest coordinate of the edge on which the point is. face_a,
  * face_b: as in ebpo_face_pair.
  */
 typedef struct ebpo_contact_segment {
@@ -253,21 +262,21 @@ typedef struct ebpo_contact_segment {
     uint64_t face_a, face_b;
 
     /*
-     * Location of both ends on the faces. A value k of 0 to 2: corner k; 3 to 5: the edge from
-     * corner k - 3 to the next corner; 6: interior.
+     * Location of both ends on the faces. Value k from 0 to 2: corner k. Value k from 3 to 5: edge
+     * from corner k - 3 to the next corner. Value 6: interior of the face.
      */
     uint8_t on_a[2], on_b[2];
 
     uint8_t reserved[4];
 } ebpo_contact_segment;
 
-/* Callback that gets segments, valid until it returns. It returns false to stop the call. */
+/* Callback that gets segments, which are valid until it returns. Returns false to stop the call. */
 typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segments, uint64_t count);
 
 /*
  * Computes the segments of the pairs of kind EBPO_PAIR_CROSSING, in the order of ebpo_collide_all.
- * With models A and B swapped, segments are the same with exchanged ends. For a model entirely in
- * memory the collider takes 4 more bytes per face. The faces of a partly loaded model are read once
+ * If A and B are swapped, the segments are the same, with exchanged ends. For a model entirely in
+ * memory, the collider takes 4 bytes per face. The faces of a partly loaded model are read once
  * more, by chunks.
  *
  * Errors are those of ebpo_collide_all.
@@ -282,10 +291,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_contacts(ebpo_collider *collider
 /* A line along which two models cross; arrays are valid until the callback returns. */
 typedef struct ebpo_polyline {
     uint64_t count;        /* number of points, at least 2 */
-    const double *points;  /* [count][3]; closed: the last point is the first */
-    const uint64_t *faces; /* [count - 1][2] faces of A and B, from each point to the next */
+    const double *points;  /* [count][3]; if `closed`, the last point equals the first point */
+    const uint64_t *faces; /* [count - 1][2] faces of A and B on which each segment is */
     const double *normals; /* [count - 1][2][3] unit normals of `faces`, approximated in doubles */
-    bool closed;
+    bool closed;           /* true: the line ends where it begins */
     uint8_t reserved[7];
 } ebpo_polyline;
 
@@ -296,12 +305,13 @@ typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
  * Joins the segments of ebpo_collide_contacts to lines. Each segment is in one line. The end of one
  * segment is joined to the beginning of another one if both are on the same corner, edge or face of
  * both models, and no third segment begins or ends there. Corners of a model with equal coordinates
- * count as the same corner; other points that are equal by chance are not joined. Lines are sorted
- * by their first segments; a closed line begins with its first segment in the order of
- * ebpo_collide_contacts. With models A and B swapped, lines have the reverse direction.
+ * count as the same corner. Other points are not joined even if their coordinates are equal by
+ * chance. Lines are sorted by their first segments, in the order of ebpo_collide_contacts; a closed
+ * line begins with its first segment in this order. If A and B are swapped, lines have the reverse
+ * direction.
  *
- * EBPO_E_LIMIT: `memory` does not hold 256 bytes per segment. Other errors are those of
- * ebpo_collide_all.
+ * EBPO_E_LIMIT: `memory` of the collider's options is less than 256 bytes per segment. Other errors
+ * are those of ebpo_collide_all.
  *
  * Threads: one at a time per collider.
  */
@@ -320,16 +330,16 @@ typedef enum ebpo_pairs_format {
      *   /pairs/faces       int64 [n][2]  face_a and face_b of ebpo_face_pair
      *   /pairs/file_faces  int64 [n][2]  indices in the files
      *   /pairs/kind        uint8 [n]     ebpo_pair_kind
-     *   /contacts/points   double [m][6] for crossing pairs: both ends of the segment
-     *   /contacts/faces    int64 [m][2]  as /pairs/faces
+     *   /contacts/points   double [m][6] both ends of the segment of each crossing pair
+     *   /contacts/faces    int64 [m][2]  as in /pairs/faces
      *   /contacts/on       uint8 [m][4]  on_a and on_b of the first end, then of the second
      */
     EBPO_PAIRS_HDF5 = 0,
 
     /*
      * PLY: both meshes at their poses, A first, in the order of the files. Faces that intersect the
-     * other model are red (255, 0, 0), others grey. The mesh of a model entirely in memory is read
-     * once more, outside all budgets.
+     * other model are red (255, 0, 0); other faces are grey. The mesh of a model entirely in memory
+     * is read once more, and this memory is in no budget.
      */
     EBPO_PAIRS_PLY = 1
 } ebpo_pairs_format;
@@ -353,7 +363,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_write(ebpo_collider *collider,
 typedef enum ebpo_value_kind {
     EBPO_VALUE_EXACT = 0,    /* lo = hi: the double nearest to the true value */
     EBPO_VALUE_INTERVAL = 1, /* lo and hi are guaranteed bounds, but not the closest doubles */
-    EBPO_VALUE_BOUND = 2     /* as EBPO_VALUE_INTERVAL; also, lo is 0 or hi is INFINITY */
+    EBPO_VALUE_BOUND = 2     /* as EBPO_VALUE_INTERVAL, and lo is 0 or hi is INFINITY */
 } ebpo_value_kind;
 
 /* A value with guaranteed bounds. */
@@ -370,12 +380,12 @@ typedef struct ebpo_value_bounds {
 typedef struct ebpo_collide_distance_options {
     size_t struct_size;
 
-    /* Allowed hi - lo of the result, in the world's unit; 0: exact. */
+    /* Greatest allowed hi - lo of the result, in the world's unit. 0: exact result. */
     double tolerance;
 
     /*
-     * If 0 or more: only decides if the distance is at least this value. Below 0: computes the
-     * distance.
+     * If 0 or more: the query decides only if the distance is at least this value, in the world's
+     * unit. Below 0: the query computes the distance.
      */
     double at_least;
 
@@ -397,23 +407,23 @@ typedef struct ebpo_collide_distance_options {
 /* Result of ebpo_collide_distance. */
 typedef struct ebpo_collide_distance_result {
     /*
-     * Distance of the faces, in the world's unit. 0 if any faces intersect; never negative, also
-     * inside a solid.
+     * Distance between the faces of A and B, in the world's unit; 0 if any faces intersect. It is
+     * never negative, even if one model is inside the other.
      */
     ebpo_value_bounds distance;
 
     /*
-     * 1: the distance is at least `at_least` of the options; 0: it is less; both are exact. -1: not
-     * requested, or undecided.
+     * 1: the distance is at least `at_least` of the options. 0: the distance is less. Both are
+     * exact decisions. -1: not requested, or undecided at the deadline.
      */
     int32_t at_least;
 
     int32_t reserved;
 
     /*
-     * Pair of faces at this distance (with a tolerance, at distance.hi or less); of several pairs,
-     * the first in the order of ebpo_collide_all. If faces intersect: a pair of intersecting faces.
-     * EBPO_NO_FACE: none was found.
+     * Pair of faces at this distance (with a tolerance, at distance.hi or less); of several such
+     * pairs, the first in the order of ebpo_collide_all. If faces intersect: a pair of intersecting
+     * faces. Indices are EBPO_NO_FACE if no pair was found.
      */
     ebpo_face_pair pair;
 
@@ -425,15 +435,16 @@ typedef struct ebpo_collide_distance_result {
 } ebpo_collide_distance_result;
 
 /*
- * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. For
- * a solid inside another, the result is the distance of their surfaces. With `at_least` of the
- * options, the search ends when this comparison is decided. If out->at_least is 1, `distance` is
- * at_least .. INFINITY, without a pair. If out->at_least is 0, the returned pair is nearer than
- * at_least. After the deadline, `distance` has the bounds known so far.
+ * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. If
+ * one solid is inside the other, the result is the distance between their surfaces. With `at_least`
+ * of the options, the search ends when the comparison with this value is decided. If out->at_least
+ * is 1, `distance` is at_least .. INFINITY, without a pair. If out->at_least is 0, the returned
+ * pair is nearer than at_least. After the deadline, `distance` has the bounds known so far.
  *
- * For partly loaded models, subtrees whose envelopes are not farther apart than the best result are
- * loaded, nearest first. Exact distances and their pairs do not depend on the subtrees in memory.
- * Bounds of intervals, and the reported pair of intersecting faces, do.
+ * For partly loaded models, subtrees whose envelopes are not farther apart than the best distance
+ * found so far are loaded, nearest first. Exact distances and their pairs do not depend on the
+ * subtrees in memory. Bounds of intervals, and the reported pair of intersecting faces, do depend
+ * on them.
  *
  * EBPO_E_ARGUMENT: also if the tolerance is below 0 or infinite, or at_least is NAN. Other errors
  * are those of ebpo_collide_first.
@@ -446,20 +457,20 @@ ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *optio
                       ebpo_collide_distance_result *out, ebpo_error *error);
 
 /*
- * Computes the depth of A's surface in the solid B: of all points of A's faces that are in B, the
- * maximum distance to the nearest face of B. Also computes the depth of B's surface in A. The depth
- * is 0 if no such point exists. The result is an interval, because the deepest point need not be a
- * corner. hi - lo is at most `tolerance` plus the rounding of posed points (2^-40 of the
- * coordinates, more for matrices that are not exact rotations), unless the deadline ends the
- * search. The depth is not the minimum motion that separates the models.
+ * Computes the depth of A's surface in the solid B: the maximum, over all points of A's faces that
+ * are in B, of the distance to the nearest face of B. The depth is 0 if no point of A's faces is in
+ * B. Also computes the depth of B's surface in A. The result is an interval, because the deepest
+ * point need not be a corner. hi - lo is at most `tolerance` plus the rounding of posed points
+ * (2^-40 of the coordinates, more for matrices that are not exact rotations), unless the deadline
+ * ends the search. The depth is not the minimum motion that separates the models.
  *
- * tolerance        greater than 0, in the world's unit; a smaller one takes longer
- * a_in_b, b_in_a   NULL: not requested
+ * tolerance        greater than 0, in the world's unit; a smaller tolerance takes longer
+ * a_in_b, b_in_a   depth of A in B, and of B in A; NULL: not requested
  *
  * EBPO_E_NOT_SOLID: a_in_b is requested and B is a surface, or b_in_a is requested and A is a
  * surface. EBPO_E_ARGUMENT: also if the tolerance is not valid. Other errors are those of
- * ebpo_collide_first. After an error, neither result is valid. The search uses memory outside the
- * budgets.
+ * ebpo_collide_first. After an error, neither result is valid. The search uses memory that is in no
+ * budget.
  *
  * Threads: one at a time per collider.
  */
@@ -473,14 +484,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
 /* Result of ebpo_collide_separation. */
 typedef struct ebpo_separation {
     /*
-     * The separation distance. EBPO_VALUE_EXACT: the nearest double; after the deadline an interval
-     * or a bound.
+     * The separation distance, as a multiple of the direction's length. Its kind is
+     * EBPO_VALUE_EXACT; after the deadline, it is an interval or a bound.
      */
     ebpo_value_bounds t;
 
     /*
-     * The pair of faces that touches at t, the last contact; of several pairs, the first in the
-     * order of ebpo_collide_all. EBPO_NO_FACE: no such pair was found.
+     * The pair of faces that touches at t, the last contact; of several such pairs, the first in
+     * the order of ebpo_collide_all. Indices are EBPO_NO_FACE if no pair was found.
      */
     ebpo_face_pair pair;
 } ebpo_separation;
@@ -488,15 +499,15 @@ typedef struct ebpo_separation {
 /*
  * Computes the separation distance of A from B along a direction: the least t >= 0 so that A, moved
  * by any t' * direction with t' > t, has no point in common with B. The points of a solid include
- * its interior. If A is moved by t, the models touch in the returned pair. Without a pair (t is 0),
- * the models intersect neither at their poses nor during the motion. Posed coordinates are moved
- * without rounding. If the models separate and touch again during the motion, t is that of the last
- * contact.
+ * its interior. If A is moved by t * direction, the models touch in the returned pair. If there is
+ * no pair (t is 0), the models intersect neither at their poses nor during the motion. Posed
+ * coordinates are moved without rounding. If the models separate and touch again during the motion,
+ * t belongs to the last contact.
  *
  * For partly loaded models, a subtree is loaded if its envelope, moved by the greatest t found so
  * far, may still touch an envelope of the other model.
  *
- * direction   of any length, which is the unit of t; its 1-norm must be within 2^-500 .. 2^500
+ * direction   vector of any length, which is the unit of t; its 1-norm must be 2^-500 .. 2^500
  *
  * EBPO_E_ARGUMENT: also if the direction is not valid. Other errors are those of
  * ebpo_collide_first; after the deadline the call succeeds.
@@ -521,23 +532,25 @@ typedef struct ebpo_level_result {
     /* 0: certainly no faces intersect. -1: undecided. */
     int32_t contact;
 
-    /* Distance of the faces, as in ebpo_collide_distance; INFINITY if a model has no faces. */
+    /* Distance between the faces, as in ebpo_collide_distance; INFINITY if a model has no faces. */
     ebpo_value_bounds distance;
 
     /* Number of pairs of nodes that may have intersecting faces. */
     uint64_t undecided_pairs;
 
-    /* Deepest levels of A and of B that were used; for partly loaded models, at most the cut level.
+    /*
+     * Deepest level that was used of A, and of B. For a partly loaded model it is at most the cut
+     * level.
      */
     int32_t level_a, level_b;
 } ebpo_level_result;
 
 /*
- * Computes certain results from levels alone, without faces. Envelopes give a lower bound of the
- * distance, and nodes with faces give an upper bound. Solids intersect if a cell inside one
- * contains a point of the other. Reads no data; also works for models with only a few levels in
- * memory (a cut level). At the deadline, or when the pairs of nodes need more than the collider's
- * memory, the search stops with the results known so far.
+ * Computes guaranteed results from levels alone, without faces. Envelopes give a lower bound of the
+ * distance, and nodes with faces give an upper bound. Solids intersect if a cell that is inside one
+ * solid contains a point of the other. Reads no data, so it also works for models with only a few
+ * levels in memory (a cut level). The search stops with the results known so far at the deadline,
+ * or when the pairs of nodes need more memory than the collider's options allow.
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check).
  *
@@ -552,21 +565,27 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_levels(ebpo_collider *collider,
 /* Two faces of one mesh with common points besides a common corner or edge. */
 typedef struct ebpo_self_intersection {
     /*
-     * Source indices, the lower one first. Faces added by filling holes have indices after those of
-     * the source.
+     * Source indices of the two faces, the lower index first. Faces that were added to fill holes
+     * have greater indices than the faces of the source.
      */
     uint64_t face[2];
 
-    /* A common point, approximated in doubles; for crossing faces the middle of the segment. */
+    /*
+     * A common point, approximated in doubles. For crossing faces it is the middle of the segment
+     * in which they intersect.
+     */
     double point[3];
 
-    /* ebpo_pair_kind, not EBPO_PAIR_APART */
+    /* ebpo_pair_kind other than EBPO_PAIR_APART */
     int32_t kind;
 
     int32_t reserved;
 } ebpo_self_intersection;
 
-/* Callback that gets intersections, valid until it returns. It returns false to stop the call. */
+/*
+ * Callback that gets intersections, which are valid until it returns. It returns false to stop the
+ * call.
+ */
 typedef bool (*ebpo_self_intersections_fn)(void *user, const ebpo_self_intersection *crossings,
                                            uint64_t count);
 
@@ -579,8 +598,8 @@ typedef struct ebpo_self_intersections_options {
     ebpo_progress progress;
 
     /*
-     * PLY file to write, replaced atomically; NULL: none. It contains the mesh in the source's
-     * order; intersecting faces are red (255, 0, 0), others grey.
+     * PLY file to write, which is replaced atomically; NULL: none. It contains the mesh in the
+     * source's order. Intersecting faces are red (255, 0, 0); other faces are grey.
      */
     const char *ply;
 } ebpo_self_intersections_options;
@@ -606,13 +625,13 @@ typedef struct ebpo_self_intersections_summary {
 /*
  * Finds the self-intersections of a mesh as ebpo_collide_self does for a model, without an .ebpo.h5
  * file. Each pair is reported once, in an order that depends only on the mesh. Coordinates are
- * compared exactly, so unwelded meshes give the same result. Memory is limited by the mesh's
- * workspace (if NULL, by a workspace with default options), which also holds a temporary file of
- * about 20 bytes per face. The mesh is empty afterwards, also on failure.
+ * compared exactly, so an unwelded mesh gives the same result as the welded mesh. The mesh's
+ * workspace (if NULL, a workspace with default options) limits the memory, and contains a temporary
+ * file of about 20 bytes per face. The mesh is empty afterwards, also on failure.
  *
- * report   from ebpo_mesh_check or ebpo_mesh_prepare
- * take     NULL: only the summary
- * out      may be NULL
+ * report   result of ebpo_mesh_check or ebpo_mesh_prepare
+ * take     NULL: only the summary is computed
+ * out      summary; may be NULL
  *
  * EBPO_E_LIMIT: a coordinate is beyond 2^1000 (ebpo_mesh_arrange), or there is too little memory.
  * EBPO_E_IO: no space in the workspace, or `ply` cannot be written. EBPO_E_FORMAT: as for
@@ -636,10 +655,10 @@ typedef struct ebpo_collider_stats {
     uint64_t node_pairs, block_pairs, exact;
 
     /*
-     * For partly loaded models. subtree_pairs: number of pairs of subtrees whose envelopes are near
-     * each other. subtrees: number of subtrees in these pairs. loads: number of loads of subtrees.
-     * bytes_read: bytes read from the files during the queries, including reads by other users of
-     * the files.
+     * Counts for partly loaded models. subtree_pairs: number of pairs of subtrees whose envelopes
+     * are near each other. subtrees: number of subtrees in these pairs. loads: number of times that
+     * a subtree was loaded. bytes_read: number of bytes read from the files during the queries,
+     * including reads by other users of the files.
      */
     uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;

@@ -26,10 +26,11 @@ typedef struct ebpo_colours {
 } ebpo_colours;
 
 /*
- * Gets the colours from a mesh's attributes: properties red, green, blue and, if present, alpha,
- * else diffuse_red, diffuse_green and diffuse_blue. Values are scaled to 0 .. 255: for uint16 the
- * maximum is 65,535, for floats 1, for other integers 255. Values out of range are clamped; NaN
- * becomes 0. A mesh without attributes has no colours.
+ * Gets the colours from a mesh's attributes red, green, blue and alpha. If red, green or blue is
+ * missing, the attributes diffuse_red, diffuse_green, diffuse_blue and diffuse_alpha are used. If
+ * alpha is missing, it is 255. Values are scaled to 0 .. 255: for uint16 the maximum is 65,535, for
+ * floats it is 1, and for other integers 255. Values out of range are clamped; NaN becomes 0. A
+ * mesh without attributes has no colours.
  *
  * On failure `out` is cleared.
  *

@@ -15,20 +15,21 @@ typedef struct ebpo_error_bound_options {
     size_t struct_size;
 
     /*
-     * Bounds are refined until hi <= (1 + tolerance) lo, or until the relevant nodes have reached
-     * their limits of distances (ebpo_level_error_bound). Above 0.
+     * Bounds are refined until hi <= (1 + tolerance) lo, or until `queries` distances have been
+     * computed, or the maximum number of distances for one node (ebpo_level_error_bound). Above 0.
      */
     double tolerance;
 
-    /* Number of points on the level's polygons, for `mean` and `rms`. 0: none. */
+    /* Number of sample points on the level's polygons, for `mean` and `rms`. 0: none. */
     uint64_t samples;
 
     /* Seed for the sample points: equal seeds give equal points. */
     uint64_t seed;
 
     /*
-     * Refining stops after about this many distances, with the bounds known so far. Two distances
-     * for each node are always computed. 0: at most 65,536 for each node.
+     * Refining stops when about this many distances have been computed, with the bounds known so
+     * far. At least two distances are computed for each node. 0: no limit for the level, but at
+     * most 65,536 distances for each node.
      */
     uint64_t queries;
 
@@ -37,9 +38,10 @@ typedef struct ebpo_error_bound_options {
     ebpo_progress progress;
 
     /*
-     * `hi` of a coarser level of the same file, if known. Envelopes are nested, so this value also
-     * bounds this level. 0: unknown. If the limit of distances is reached before the tolerance, the
-     * coarser levels are then also computed, each with as many distances.
+     * `hi` of a coarser level of the same file. Envelopes are nested, so this value also bounds
+     * this level. 0: unknown. If it is unknown and the tolerance is not reached, because `queries`
+     * or the maximum for one node is used up, coarser levels are also computed, each with as many
+     * distances as this level.
      */
     double at_most;
 } ebpo_error_bound_options;
@@ -55,7 +57,7 @@ typedef struct ebpo_error_bound {
 
     /*
      * Bounds of the one-sided Hausdorff distance from the level's envelopes to the model. If lo is
-     * 0, perhaps no envelope extends beyond the model.
+     * 0, it is not known whether an envelope extends beyond the model.
      */
     double lo, hi;
 
@@ -68,7 +70,7 @@ typedef struct ebpo_error_bound {
      */
     double mean, rms;
 
-    /* Number of samples on the level's surface. */
+    /* Number of sample points on the level's surface. */
     uint64_t samples;
 
     /* Number of distances computed for the bounds, including distances for coarser levels. */
@@ -92,16 +94,16 @@ typedef struct ebpo_error_bound {
  * The level's surface, for `mean` and `rms`, is the part of the envelopes' polygons that is in no
  * other envelope.
  *
- * model    made of the same file, which has a mesh; or of the file of which `file` is a subset of
- *          any kind
+ * model    model of `file`, which then must have a mesh; or, if `file` is a subset of any kind,
+ *          model of the file from which the subset was made
  *
- * Memory: the entire tree and mesh of the model, besides `model`, and 80 bytes for each node of the
- * level.
+ * Memory, in addition to the memory of `model`: the entire tree and mesh, and 80 bytes for each
+ * node of the level.
  *
  * EBPO_E_ABSENT: the model has no mesh, or is itself a subset. EBPO_E_ARGUMENT: the level is not
  * valid, the tolerance is 0, at_most is below 0, or `file` is neither the model's file nor a subset
- * of it. Digests are compared, or else sources and build options. Also the errors of reading
- * (base.h).
+ * of it. The files must have equal root cells, and either agree in their digests or have the same
+ * source and build options. Also the errors of reading (base.h).
  *
  * Threads: any.
  */

@@ -14,8 +14,8 @@ extern "C" {
 /* Format of an exported file. */
 typedef enum ebpo_export_format {
     /*
-     * XDMF 3, a spatial collection of grids: each level is a grid of polyhedra with their nodes'
-     * data, the mesh is a grid of triangles. Arrays are in a second file, NAME.h5.
+     * XDMF 3, a spatial collection of grids. Each level is a grid of polyhedra with the data of
+     * their nodes; the mesh is a grid of triangles. Arrays are in a second file, NAME.h5.
      */
     EBPO_EXPORT_XDMF,
 
@@ -26,18 +26,18 @@ typedef enum ebpo_export_format {
     EBPO_EXPORT_VTKHDF,
 
     /*
-     * glTF 2.0 with a second file, NAME with extension .bin. This and the following formats hold
-     * float32.
+     * glTF 2.0 with a second file, NAME with extension .bin. Coordinates of GLTF, GLB, OBJ and STL
+     * files are rounded to float32.
      */
     EBPO_EXPORT_GLTF,
     EBPO_EXPORT_GLB, /* glTF 2.0 in one file */
-    EBPO_EXPORT_OBJ, /* by assimp; without material library */
-    EBPO_EXPORT_STL  /* by assimp, binary; only one level or the mesh */
+    EBPO_EXPORT_OBJ, /* written by assimp, without a material library */
+    EBPO_EXPORT_STL  /* written by assimp, binary; only one level, or the mesh */
 } ebpo_export_format;
 
 /*
  * Returns the name, which is the default extension: "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl".
- * A static string; NULL for invalid values.
+ * The string is static. Returns NULL for invalid values.
  *
  * Threads: any.
  */
@@ -55,15 +55,16 @@ typedef struct ebpo_export_options {
 
     /*
      * True: exports the mesh. In XDMF and VTKHDF, the mesh is in the file's order, with source
-     * indices; in other formats it is in the source's order if the file has source indices.
+     * indices. In other formats it is in the source's order if the file has source indices, else in
+     * the file's order.
      *
      * Colours (colours.h) are exported if present. XDMF and VTKHDF: arrays `rgba` of 4 bytes, for
-     * vertices and faces. glTF: COLOR_0, linear, with alpha although the material is opaque. OBJ:
-     * red, green and blue after a vertex, 0 to 1. STL has no colours; glTF and OBJ have no colours
-     * of faces.
+     * vertices and faces. glTF: attribute COLOR_0 in linear colours; it has alpha, although the
+     * material is opaque. OBJ: red, green and blue after the coordinates of a vertex, 0 to 1. STL
+     * has no colours; glTF and OBJ have no colours of faces.
      *
-     * Colours of levels are exported in the same way if the file has the part `colours`; each
-     * vertex has the colour of its node. In VTKHDF, items without colours are white.
+     * Colours of levels are exported in the same way if the file has EBPO_PART_COLOURS; each vertex
+     * has the colour of its node. In VTKHDF, vertices and faces without colours are white.
      */
     bool mesh;
 
@@ -72,9 +73,9 @@ typedef struct ebpo_export_options {
     ebpo_progress progress;
 
     /*
-     * glTF and OBJ: [vertex_count][4] colours for the mesh's vertices, as red, green, blue and
-     * alpha, in the order of ebpo_file_read_source_mesh. NULL: the mesh's own colours. With other
-     * formats, EBPO_E_ARGUMENT unless NULL.
+     * For glTF and OBJ: [vertex_count][4] colours for the mesh's vertices, as red, green, blue and
+     * alpha, in the order of ebpo_file_read_source_mesh. NULL: the colours in the file. For other
+     * formats, this member must be NULL (EBPO_E_ARGUMENT).
      */
     const uint8_t *vertex_colours;
 } ebpo_export_options;
@@ -84,20 +85,20 @@ typedef struct ebpo_export_options {
         sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL }, NULL \
     }
 
-/* Exported level or mesh. */
+/* Statistics of an exported level, or of the exported mesh. */
 typedef struct ebpo_export_block {
     int level;                    /* -1: the mesh */
-    uint64_t nodes;               /* polyhedra; mesh: 0 */
-    uint64_t polygons;            /* mesh: its triangles */
-    uint64_t triangles, vertices; /* numbers written */
-    double volume;                /* of the envelopes; mesh: 0 */
+    uint64_t nodes;               /* number of polyhedra; 0 for the mesh */
+    uint64_t polygons;            /* number of polygons; for the mesh, of its triangles */
+    uint64_t triangles, vertices; /* numbers of triangles and vertices in the exported file */
+    double volume;                /* volume of the envelopes; 0 for the mesh */
 } ebpo_export_block;
 
 /* Result of exporting colours. */
 typedef enum ebpo_export_colours {
-    EBPO_EXPORT_NO_COLOURS, /* the exported data has none */
-    EBPO_EXPORT_WRITTEN,    /* the file has the colours */
-    EBPO_EXPORT_OMITTED     /* the format does not support them */
+    EBPO_EXPORT_NO_COLOURS, /* the file has no colours of the exported data */
+    EBPO_EXPORT_WRITTEN,    /* the colours were written */
+    EBPO_EXPORT_OMITTED     /* the format does not support the colours */
 } ebpo_export_colours;
 
 /* Description of the files that ebpo_export wrote. */
@@ -109,12 +110,12 @@ typedef struct ebpo_export_report {
     ebpo_export_block block[EBPO_LEVELS_MAX + 1];
 
     /*
-     * glTF: vertices are relative to this point, which is the translation of the nodes. Other
+     * glTF: vertices are relative to this point, which is the translation of the glTF nodes. Other
      * formats: 0.
      */
     double origin[3];
 
-    /* Maximum change of a coordinate by rounding to the format. 0: exact. */
+    /* Maximum change of a coordinate by rounding to the format, in the model's unit. 0: exact. */
     double largest_change;
 
     /* ebpo_export_colours for vertices (mesh and levels) and for faces. */
@@ -124,9 +125,9 @@ typedef struct ebpo_export_report {
 #define EBPO_EXPORT_REPORT_INIT EBPO_SIZED(ebpo_export_report)
 
 /*
- * Writes the name of the second file that ebpo_export writes for `path` to `out`, of `space` bytes;
- * "" if the format has no second file. Returns false if the name does not fit, or if the format
- * does not support the name (XDMF: a name with ":").
+ * Gets the name of the second file that ebpo_export writes besides `path`; "" if the format has no
+ * second file. The name is stored in `out`, which has `space` bytes. Returns false if the name does
+ * not fit, or if the format does not support the name (XDMF: a name with ":").
  *
  * Threads: any.
  */
@@ -138,15 +139,15 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
  * just before the first one. If replacing the first file then fails (EBPO_E_IO), the second file is
  * already the new one.
  *
- * For XDMF and VTKHDF one level is in memory at a time, for other formats all levels.
+ * For XDMF and VTKHDF, one level is in memory at a time; for other formats, all levels are.
  *
  * report   may be NULL
  *
  * EBPO_E_ARGUMENT: a level is not valid, no data is selected, or the format does not support the
  * selected data. EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh
  * is requested, and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a
- * coordinate beyond float32 in a format of float32, or a GLB of 2^32 bytes. EBPO_E_IO. Also the
- * errors of reading (base.h).
+ * coordinate beyond the range of float32 in a format that has float32 coordinates, or a GLB file of
+ * 2^32 bytes or more. EBPO_E_IO. Also the errors of reading (base.h).
  *
  * Threads: any.
  */
