@@ -9,12 +9,12 @@
  *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
  * The *result* is the solid that an expression of solids describes. Queries of the result are
- * evaluated by queries of the models, without its mesh. Decisions equal those of arithmetic without
- * rounding on posed coordinates (pose.h).
+ * evaluated by queries of the models, without a mesh of the result. Decisions equal those of
+ * arithmetic without rounding on posed coordinates (pose.h).
  *
  * The result is *regularised*: an operand is the closure of the points that are inside by its rule,
- * and the result is the closure of its own interior. So the union of two boxes with a common side
- * is one box, and a box minus an equal box is empty.
+ * and the result is the closure of its interior. So the union of two boxes with a common side is
+ * one box, and a box minus an equal box is empty.
  */
 #ifndef EBPO_BOOLEAN_H
 #define EBPO_BOOLEAN_H
@@ -51,7 +51,7 @@ typedef struct ebpo_boolean_operand {
     ebpo_pose pose;
 } ebpo_boolean_operand;
 
-/* Maximum numbers of operands, a box and half-spaces included, and of nodes. */
+/* Maximum number of operands (including a box and half-spaces), and maximum number of nodes. */
 #define EBPO_BOOLEAN_OPERANDS_MAX 64
 #define EBPO_BOOLEAN_NODES_MAX    256
 
@@ -62,40 +62,42 @@ typedef struct ebpo_boolean_options {
     /* Number of threads for ebpo_boolean_inside_many and for cells. 0: all cores. */
     unsigned threads;
 
-    /* Number of planes. */
+    /* Number of half-spaces in `planes`. */
     uint32_t plane_count;
 
     /*
-     * Box to which the result is cut, low[3], then high[3]; NULL: none. The box is one more
-     * operand, after those of the caller, and the result is its intersection with the expression.
+     * Box to which the result is cut: low[3], then high[3]. NULL: no box. The box is an additional
+     * operand after the caller's operands. The result is the intersection of the box and the
+     * expression.
      */
     const double *box;
 
     /*
-     * [plane_count][4] half-spaces to which the result is cut: the points p with row[0] p[0] +
-     * row[1] p[1] + row[2] p[2] <= row[3]. They are operands after the box. Each is a
-     * tetrahedron that contains its part of the result. The three corners of its face in the plane
-     * are rounded to doubles, and so is the plane through them; for an axis-parallel plane this is
-     * one rounding of row[3] / row[k].
+     * [plane_count][4] half-spaces to which the result is cut. A half-space contains the points p
+     * with row[0] p[0] + row[1] p[1] + row[2] p[2] <= row[3]. The half-spaces are additional
+     * operands after the box. Each is a tetrahedron that contains the part of the result in the
+     * half-space. One face of the tetrahedron is in the plane; its three corners are rounded to
+     * doubles, which moves the plane slightly. For an axis-parallel plane, only row[3] / row[k] is
+     * rounded.
      */
     const double *planes;
 } ebpo_boolean_options;
 
 #define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
 
-/* An expression. It contains a context (query.h) of each operand for each thread. */
+/* An expression. For each thread, it contains a context (query.h) of each operand. */
 typedef struct ebpo_boolean ebpo_boolean;
 
 /*
- * Makes an expression over operands[operand_count]: nodes[node_count], the last of which is the
- * root. Several nodes may share a node or an operand. Both arrays are copied; the models must
+ * Makes an expression of operands[operand_count] and nodes[node_count]. The last node is the root.
+ * Several nodes may refer to the same node or operand. Both arrays are copied; the models must
  * outlive the expression.
  *
  * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node, an operation is not valid,
  * a complement has no box, a box or plane is not valid, or a pose is not valid (ebpo_pose_check).
- * EBPO_E_LIMIT: no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a surface.
- * EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or the number
- * of the operand (from 1 on) and its file.
+ * EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
+ * surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or
+ * the number of the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
@@ -107,7 +109,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *
                                                     ebpo_boolean **out, ebpo_error *error);
 
 /*
- * Frees an expression. Free its models after this call.
+ * Frees an expression. Free its models only after this call.
  *
  * Threads: one at a time per expression.
  */
@@ -118,16 +120,16 @@ EBPO_API void ebpo_boolean_free(ebpo_boolean *boolean);
 /* Classification of a point (ebpo_boolean_inside). */
 typedef struct ebpo_boolean_result {
     /*
-     * ebpo_where. EBPO_IN: certainly an interior point of the result. EBPO_OUT: certainly an
-     * interior point of the complement of the result. EBPO_ON: the point is on a posed face of an
-     * operand, and the other operands do not decide.
+     * ebpo_where. EBPO_IN: the point is certainly in the interior of the result. EBPO_OUT: the
+     * point is certainly in the interior of the complement of the result. EBPO_ON: the point is on
+     * a posed face of an operand, and the other operands do not decide.
      */
     int32_t where;
 
     /*
-     * 1: `where` is certain; with EBPO_ON, the point is a boundary point of the result. 0 (only
-     * with EBPO_ON): faces in different planes intersect at the point, as on edges and at vertices;
-     * the point may or may not be a boundary point.
+     * 1: `where` is certain; EBPO_ON then means that the point is a boundary point of the result.
+     * 0, which is possible only with EBPO_ON: the point may or may not be a boundary point, because
+     * faces in different planes intersect at the point, as on edges and at vertices.
      */
     int32_t certain;
 } ebpo_boolean_result;
@@ -145,8 +147,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, co
                                                        ebpo_boolean_result *out, ebpo_error *error);
 
 /*
- * Classifies points[count][3] into out[count]. If queries of several points fail, the error is that
- * of the first of these points, and the message has the index of the point.
+ * Classifies points[count][3] into out[count]. If queries of several points fail, the error of the
+ * first of these points is returned. The message gives the index of the point.
  *
  * Threads: one at a time per expression.
  */
@@ -161,12 +163,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolea
 typedef struct ebpo_boundary_options {
     size_t struct_size;
 
-    /* The search stops when hi - lo <= tolerance * hi. At least 0. */
+    /* The search stops when hi - lo <= tolerance * hi. The tolerance is at least 0. */
     double tolerance;
 
     /*
-     * The search stops after about this many cells of an octree around the result
-     * (ebpo_boolean_cells), with the bounds known so far. 0: 100,000.
+     * The search stops, with the bounds known so far, after it has visited about this many cells of
+     * an octree around the result (ebpo_boolean_cells). 0: 100,000.
      */
     uint64_t cells;
 } ebpo_boundary_options;
@@ -179,9 +181,9 @@ typedef struct ebpo_boundary_options {
 /* Result of ebpo_boolean_distance. */
 typedef struct ebpo_boundary_distance {
     /*
-     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. Both 0:
-     * the point is on the boundary. Both INFINITY: the result is empty. Only hi is INFINITY: the
-     * result may be empty.
+     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. Both are
+     * 0: the point is on the boundary. Both are INFINITY: the result is empty. Only hi is INFINITY:
+     * the result may be empty.
      */
     double lo, hi;
 
@@ -194,9 +196,9 @@ typedef struct ebpo_boundary_distance {
 
 /*
  * Computes the distance from a point of the world (three finite doubles) to the boundary of the
- * result. If the face that is nearest among all operands is part of that boundary, no search is
- * necessary, and `lo` and `hi` differ only by rounding. Otherwise cells of an octree around the
- * result are searched, nearest first.
+ * result. If the nearest face of all operands is part of that boundary, no search is necessary, and
+ * `lo` and `hi` differ only by rounding. Otherwise the cells of an octree around the result are
+ * searched, nearest first.
  *
  * EBPO_E_ARGUMENT: the point or the tolerance is not valid. EBPO_E_LIMIT: as for
  * ebpo_boolean_cells_new with level 0. Other errors are those of ebpo_boolean_inside.
@@ -222,10 +224,10 @@ typedef struct ebpo_volume_options {
 /* Reason why a volume is not exact. */
 typedef enum ebpo_volume_doubt {
     EBPO_VOLUME_CERTAIN = 0,            /* the volume is exact */
-    EBPO_VOLUME_OPERANDS_INTERSECT = 1, /* a face of operand[0] intersects one of operand[1] */
-    EBPO_VOLUME_FACES_INTERSECT = 2,    /* faces of operand[0] intersect each other */
-    EBPO_VOLUME_IN_PARTS = 3,           /* the model of operand[0] is not entirely in memory */
-    EBPO_VOLUME_SUBSET = 4              /* the file of operand[0] is a subset */
+    EBPO_VOLUME_OPERANDS_INTERSECT = 1, /* faces of two operands intersect */
+    EBPO_VOLUME_FACES_INTERSECT = 2,    /* faces of one operand intersect each other */
+    EBPO_VOLUME_IN_PARTS = 3,           /* the model of an operand is not entirely in memory */
+    EBPO_VOLUME_SUBSET = 4              /* the file of an operand is a subset */
 } ebpo_volume_doubt;
 
 /* Result of ebpo_boolean_exact_volume. */
@@ -233,38 +235,45 @@ typedef struct ebpo_exact_volume {
     size_t struct_size;
 
     /*
-     * Volume of the result, in the cube of the world's unit. EBPO_VALUE_EXACT: lo and hi are the
-     * double nearest to the exact volume for posed coordinates, ties to even; INFINITY or 0 if the
-     * volume is out of the range of doubles. The result is empty if `scaled` is 0.
-     * EBPO_VALUE_BOUND: from 0 to the volume of a box around the result; ebpo_boolean_cells_volume
-     * gives better bounds.
+     * Volume of the result, in the cube of the world's unit.
+     *
+     * Kind EBPO_VALUE_EXACT: lo and hi are the double nearest to the exact volume for posed
+     * coordinates, ties to even; INFINITY or 0 if the volume is out of the range of doubles. The
+     * result is empty if `scaled` is 0.
+     *
+     * Kind EBPO_VALUE_BOUND: lo is 0, and hi is the volume of a box around the result;
+     * ebpo_boolean_cells_volume gives better bounds.
      */
     ebpo_value_bounds volume;
 
-    /* ebpo_volume_doubt: the first reason found, and its operands. */
+    /*
+     * doubt: ebpo_volume_doubt, the first reason found. operand: indices of the two operands of
+     * this reason; if the reason has one operand, this is operand[0].
+     */
     int32_t doubt;
     uint32_t operand[2];
 
     uint32_t reserved;
 
     /*
-     * Two intersecting faces, as indices in the files. EBPO_VOLUME_OPERANDS_INTERSECT: one of each
-     * operand. EBPO_VOLUME_FACES_INTERSECT: both of operand[0]. Else EBPO_NO_FACE.
+     * Two intersecting faces, as indices in the files. EBPO_VOLUME_OPERANDS_INTERSECT: a face of
+     * operand[0] and a face of operand[1]. EBPO_VOLUME_FACES_INTERSECT: two faces of operand[0]. In
+     * all other cases: EBPO_NO_FACE.
      */
     uint64_t file_face[2];
 
     /*
-     * For an exact volume: number of parts of the operands' surfaces that were tested, and of parts
-     * that bound the result.
+     * For an exact volume. patches: number of parts of the operands' surfaces that were tested.
+     * bounding: number of these parts that bound the result.
      */
     uint64_t patches, bounding;
 
-    /* The two faces of `file_face`, with indices as in ebpo_face_pair. */
+    /* The two faces of `file_face`, with indices as face_a and face_b of ebpo_face_pair. */
     uint64_t face[2];
 
     /*
-     * The exact volume is scaled * 2^exponent, rounded in the same way, without the limited range
-     * of doubles.
+     * Exact volume as scaled * 2^exponent, for volumes out of the range of doubles. `scaled` is
+     * rounded to the nearest double, ties to even.
      */
     double scaled;
     int64_t exponent;
@@ -273,14 +282,14 @@ typedef struct ebpo_exact_volume {
 #define EBPO_EXACT_VOLUME_INIT EBPO_SIZED(ebpo_exact_volume)
 
 /*
- * Computes the exact volume of the result if the operands' faces meet the following condition. No
- * face may intersect a face of another operand, not even in a point. Faces of one operand, except
- * those without area, may intersect only as neighbours (ebpo_collide_self, at their poses). Shells
- * may be apart, nested or inverted, with any winding numbers. Equal operands (models of equal
- * content at bitwise equal poses) count as one, and unused operands are not tested. If the
- * condition is not met, the call succeeds and `doubt` gives the reason.
+ * Computes the exact volume of the result if the operands' faces meet two conditions. First, no
+ * face intersects a face of another operand, not even in a point. Second, faces of one operand
+ * intersect only in common corners and edges (as ebpo_collide_self tests, but at the pose); faces
+ * without area are not tested. Shells may be apart, nested or inverted, with any winding numbers.
+ * Equal operands (models of equal content at bitwise equal poses) count as one, and unused operands
+ * are not tested. If a condition is not met, the call succeeds, and `doubt` gives the reason.
  *
- * Takes about 80 bytes for each face of one operand at a time.
+ * Memory: about 80 bytes for each face of one operand; operands are processed one after the other.
  *
  * EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of reading (base.h). On
  * failure `out` is unspecified.
@@ -301,14 +310,14 @@ typedef struct ebpo_boolean_mesh_options {
     ebpo_progress progress;
 
     /*
-     * True: coordinates of the mesh are doubles. False: floats if the coordinates of all operands
-     * are floats and the result is in the range of floats; else doubles.
+     * True: coordinates of the mesh are doubles. False: coordinates are floats if the coordinates
+     * of all operands are floats and the result is in the range of floats; else they are doubles.
      */
     bool doubles;
 
     /*
-     * True: faces of the mesh have the attributes `operand` (uint8, from 0) and `operand_face`
-     * (uint32): the operand from which the face comes, and the source index of the face of this
+     * True: each face of the mesh has the attributes `operand` (uint8) and `operand_face` (uint32):
+     * the index of the operand from which the face comes, and the source index of the face of this
      * operand.
      */
     bool origins;
@@ -317,35 +326,36 @@ typedef struct ebpo_boolean_mesh_options {
     bool volume;
 
     /*
-     * True: the mesh has only the faces of the result that are not unchanged faces of operand 0.
-     * Its attribute `removed` (first count) has the ranges of the other faces of operand 0, in the
-     * order of its file, which ebpo_mesh_write_ply writes as an element. All other faces of operand
-     * 0, with the mesh, are the result. Other faces of operand 0 stay as
-     * they are, also if they intersect each other. Only the part of operand 0 in the box of the
-     * other operands is read, and its faces there must fit in memory. Excludes `volume` and
-     * `attributes`.
+     * True: the mesh omits the faces of operand 0 that are unchanged in the result. Its attribute
+     * `removed` (columns `first` and `count`) has the ranges of the faces of operand 0, in the
+     * order of its file, that are not faces of the result; ebpo_mesh_write_ply writes `removed` as
+     * an element. The mesh and the faces of operand 0 outside these ranges together are the result.
+     * Faces of operand 0 outside the box of the other operands are unchanged, even if they
+     * intersect each other. Only the part of operand 0 in this box is read, and its faces must fit
+     * in memory. `volume` and `attributes` must be false.
      */
     bool changed_only;
 
     /*
      * True: the mesh has the attributes of vertices and faces of the operands. Values at new
-     * vertices are interpolated. Normals (nx ny nz) are turned with their operand, and reversed
-     * with their face. Faces and vertices of operands without an attribute get 0, or white.
-     * ebpo_mesh_attributes_lost names the attributes that cannot be carried over.
+     * vertices are interpolated. Normals (nx ny nz) are rotated with their operand, and reversed if
+     * their face is reversed. If an operand does not have an attribute, its faces or vertices get
+     * the value 0, or white for colours. ebpo_mesh_attributes_lost names the attributes that cannot
+     * be carried over.
      */
     bool attributes;
 
     /*
-     * True: faces have a colour (attributes red, green and blue) for each operand; colours of
-     * operands are then not carried over.
+     * True: each operand has one colour, which its faces get as the attributes red, green and blue.
+     * The operands' own colours are then not carried over.
      */
     bool colours;
 
     uint8_t reserved[2];
 
     /*
-     * Holds the arrays of the mesh, and the arrays that grow with the operands; free it after the
-     * mesh. NULL: no limit of memory.
+     * Workspace for the arrays of the mesh, and for arrays whose size grows with the operands. Free
+     * it after the mesh. NULL: the memory is not limited.
      */
     ebpo_workspace *workspace;
 } ebpo_boolean_mesh_options;
@@ -360,13 +370,13 @@ typedef struct ebpo_boolean_mesh_options {
 typedef struct ebpo_boolean_mesh_report {
     size_t struct_size;
 
-    /* Number of faces of the operands that were cut. */
+    /* Number of the operands' faces that were cut along intersections. */
     uint64_t faces_cut;
 
-    /* Number of vertices of the result that no operand has. */
+    /* Number of vertices of the result that are not vertices of an operand. */
     uint64_t new_vertices;
 
-    /* Number of parts of the operands' surfaces that were classified, each by one point. */
+    /* Number of parts of the operands' surfaces, each of which was classified by one point. */
     uint64_t patches;
 
     /*
@@ -376,13 +386,13 @@ typedef struct ebpo_boolean_mesh_report {
     double displacement;
 
     /*
-     * If requested: volume of the exact result, before vertices are rounded, in the cube of the
-     * world's unit. EBPO_VALUE_EXACT: the nearest double, ties to even. EBPO_VALUE_INTERVAL: two or
-     * three neighbouring doubles, between which the volume is.
+     * If requested: volume of the result before its vertices are rounded, in the cube of the
+     * world's unit. Kind EBPO_VALUE_EXACT: the double nearest to this volume, ties to even. Kind
+     * EBPO_VALUE_INTERVAL: lo and hi contain the volume, and at most one double is between them.
      */
     ebpo_value_bounds volume;
 
-    /* If only changes were requested: number of removed faces of operand 0. */
+    /* With `changed_only`: number of faces of operand 0 in the ranges of `removed`. */
     uint64_t removed_faces;
 } ebpo_boolean_mesh_report;
 
@@ -391,27 +401,27 @@ typedef struct ebpo_boolean_mesh_report {
 /*
  * Makes the mesh of the result. Faces of operands are cut exactly along their intersections with
  * all other faces, including coplanar faces and faces of the same operand. The parts that bound the
- * result are kept, where needed with the reverse orientation. Faces that are not cut keep their
- * corners, at their poses. Other vertices are the exact vertices of the result, rounded to the
- * nearest coordinates. The mesh is closed: each edge is used equally often in both directions.
+ * result are kept, and reversed where necessary. Faces that are not cut keep their posed corners.
+ * All other vertices are the exact vertices of the result, rounded to the nearest coordinates. The
+ * mesh is closed: each edge is used equally often in both directions.
  * Rounding may create small intersections of faces (ebpo_mesh_self_intersections). Vertices of cut
  * faces that become equal by rounding are merged, and faces that lose a corner in this way are
  * omitted. Winding numbers of the mesh are 1 in the result and 0 elsewhere, except near rounded
  * vertices. The mesh is the same for any number of threads.
  *
- * Takes about 40 bytes for each face of one operand at a time and 25 bytes for each face of the
- * mesh, both of which a workspace may hold. In addition, takes 1,500 bytes for each face that is
- * cut.
+ * Memory, which a workspace may limit: about 40 bytes for each face of one operand (operands are
+ * processed one after the other), and 25 bytes for each face of the mesh. Memory that no workspace
+ * limits: 1,500 bytes for each face that is cut.
  *
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
  *
- * EBPO_E_ARGUMENT: operands have different units; or changes are requested of an unused operand 0,
- * or with the volume. EBPO_E_ABSENT: an operand is a subset.
- * EBPO_E_LIMIT: more than 2^31 - 1 faces, or 2^31 vertices. EBPO_E_FORMAT: an operand is not
- * closed, although its file states so. EBPO_E_UNSUPPORTED: only changes are requested, but near the
- * other operands, operand 0 has faces that intersect each other or have no area, or winding numbers
- * other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
+ * EBPO_E_ARGUMENT: operands have different units; or `changed_only` is true, and operand 0 is
+ * unused, or `volume` or `attributes` is true too. EBPO_E_ABSENT: an operand is a subset.
+ * EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices. EBPO_E_FORMAT: an operand is not closed,
+ * although its file says that it is a solid. EBPO_E_UNSUPPORTED: `changed_only` is true, and in the
+ * box of the other operands, operand 0 has faces that intersect each other or have no area, or has
+ * winding numbers other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
  *
  * Threads: one at a time per expression.
  */
@@ -427,14 +437,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean,
 typedef struct ebpo_cells_options {
     size_t struct_size;
 
-    /* Finest cells: 2^-level of the root's edge; 0 to EBPO_BOOLEAN_LEVEL_MAX. */
+    /*
+     * Level of the finest cells, 0 to EBPO_BOOLEAN_LEVEL_MAX. The edge of these cells is 2^-level
+     * of the edge of the root cell.
+     */
     int level;
 
     uint32_t reserved;
 
     /*
-     * Maximum number of mixed cells of a level; with more, EBPO_E_LIMIT. A mixed cell takes 32
-     * bytes while the next level is made. 0: 2^25.
+     * Maximum number of mixed cells of a level; if there are more, EBPO_E_LIMIT is returned. A
+     * mixed cell takes 32 bytes while the next level is made. 0: 2^25.
      */
     uint64_t most;
 
@@ -450,24 +463,26 @@ typedef struct ebpo_cells_options {
     }
 
 /*
- * Cells of an octree of the world, whose root is a cube around the result's box. A cell is *in* if
- * the closed cell is certainly in the interior of the result, *out* if certainly no point belongs
- * to the result, else *mixed*. Mixed cells are subdivided down to the level.
+ * Cells of an octree in the world. The root cell is a cube around the result's box. A cell is *in*
+ * if the closed cell is certainly in the interior of the result. A cell is *out* if certainly no
+ * point of the cell belongs to the result. All other cells are *mixed*, and are subdivided down to
+ * the level of the options.
  */
 typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 
 /*
- * Makes the cells. Each operand is tested in a ball around the cell: first by the white and black
- * nodes of its tree, which usually decide while cells are larger than leaves, then by its faces. An
- * operand that cannot change the result in a cell is not tested in the cell's children. An operand
- * that is used twice counts as two operands, so cells at its boundary are mixed.
+ * Makes the cells. Each operand is tested in a ball around the cell. White and black nodes of the
+ * operand's tree are tested first, and usually decide if cells are larger than leaves; otherwise
+ * the operand's faces are tested. An operand that cannot change the result in a cell is not tested
+ * in the cell's children. An operand that is used twice counts as two operands, so cells at its
+ * boundary are mixed.
  *
  * The cells stay valid after the expression is freed.
  *
- * EBPO_E_ARGUMENT: the level is not valid. EBPO_E_LIMIT: too many cells (`most`); the result is too
- * small or too far from the origin for corners of cells in doubles; or it is larger than 2^300 or
- * smaller than 2^-300, so that volumes are out of range. Other errors are those of
- * ebpo_boolean_inside.
+ * EBPO_E_ARGUMENT: the level is not valid. EBPO_E_LIMIT: there are too many cells (`most`); or
+ * doubles cannot represent the corners of the cells, because the result is too small or too far
+ * from the origin; or the result is larger than 2^300 or smaller than 2^-300, so that volumes are
+ * out of range. Other errors are those of ebpo_boolean_inside.
  *
  * Threads: one at a time per expression.
  */
@@ -489,29 +504,30 @@ typedef struct ebpo_boolean_volume {
 
     /*
      * Bounds of the result's volume, in the cube of the world's unit: lo is the volume of all
-     * in-cells, hi the volume of all in-cells and mixed cells. Exact on posed coordinates. Both 0:
-     * the result is empty.
+     * in-cells, and hi is the volume of all in-cells and mixed cells. Both hold exactly for posed
+     * coordinates. Both are 0: the result is empty.
      */
     double lo, hi;
 
     /*
-     * Lowest corner of the root cell, and length of its edge, which is a power of two. 0: the
-     * result is empty.
+     * Lowest corner of the root cell, and length of its edge, which is a power of two. If the
+     * result is empty, both are 0.
      */
     double origin[3], edge;
 
-    /* Number of in-cells of all levels, and of mixed cells of the finest level. */
+    /* Number of in-cells of all levels, and number of mixed cells of the finest level. */
     uint64_t in_cells, mixed_cells;
 
     /*
-     * Number of tests of an operand against a cell. by_box: tests that the operand's box decided.
-     * by_nodes: that its white and black nodes decided. by_faces: that its faces decided.
+     * Number of tests of an operand in a cell. by_box: tests that the operand's box decided.
+     * by_nodes: tests that the white and black nodes of its tree decided. by_faces: tests that its
+     * faces decided.
      */
     uint64_t by_box, by_nodes, by_faces;
 
     /*
-     * Accuracy of lo and hi, an ebpo_value_kind: EBPO_VALUE_INTERVAL; EBPO_VALUE_BOUND if no cell
-     * is in; EBPO_VALUE_EXACT for an empty result.
+     * ebpo_value_kind of lo and hi: EBPO_VALUE_EXACT if the result is empty, EBPO_VALUE_BOUND if
+     * there are no in-cells, EBPO_VALUE_INTERVAL in other cases.
      */
     int32_t kind;
 
@@ -535,10 +551,11 @@ typedef enum ebpo_boolean_side {
 } ebpo_boolean_side;
 
 /*
- * Makes the surface of these cells: squares of the finest level, two triangles each, in doubles.
- * The mesh is closed (ebpo_mesh_report.balanced), with winding numbers 0 and 1. Where cells touch
- * only along an edge or at a corner, the mesh is not a 2-manifold. The mesh may be written or
- * converted: an .ebpo.h5 file of the outer cells, and its envelopes, contain the result.
+ * Makes the surface of the cells that `side` selects. It consists of squares of the finest level,
+ * each as two triangles, with coordinates in doubles. The mesh is closed
+ * (ebpo_mesh_report.balanced), with winding numbers 0 and 1. Where cells touch only along an edge
+ * or at a corner, the mesh is not a 2-manifold. The mesh may be written or converted. If it is that
+ * of EBPO_BOOLEAN_OUTER, the model and the envelopes of its .ebpo.h5 file contain the result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells
  *

@@ -30,12 +30,12 @@ extern "C" {
 /* Type of a node: two bits in `types` of ebpo_level. The cell of a node includes its boundary. */
 typedef enum ebpo_node_type {
     /*
-     * No face intersects the cell. The cell is outside the solid. In a file of a surface, all cells
-     * without faces have this type.
+     * No face intersects the cell, and the cell is outside the solid. In a file of a surface, all
+     * cells without faces have this type.
      */
     EBPO_WHITE = 0,
 
-    /* No face intersects the cell. The cell is inside the solid. */
+    /* No face intersects the cell, and the cell is inside the solid. */
     EBPO_BLACK = 1,
 
     /* The node lists its faces and has no children. */
@@ -58,8 +58,8 @@ typedef enum ebpo_part {
     EBPO_PART_MESH = 2,        /* vertices, faces, and the leaves' lists of faces */
     EBPO_PART_MAPS = 4,        /* source indices of vertices and faces */
     EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
-    EBPO_PART_ATTRIBUTES = 16, /* other data of the source for vertices and faces */
-    EBPO_PART_COLOURS = 32,    /* mean colours of the faces of gray nodes */
+    EBPO_PART_ATTRIBUTES = 16, /* attributes of vertices, faces and other elements of the source */
+    EBPO_PART_COLOURS = 32,    /* mean colour of the faces below each gray node */
     EBPO_PART_BORDER = 64,     /* border of a surface, and winding numbers that decide its inside */
     EBPO_PART_SURFACE = 128    /* simplified faces of nodes, with certified errors, for pictures */
 } ebpo_part;
@@ -74,28 +74,29 @@ typedef enum ebpo_codec {
 /* Coding of the vertex indices of faces (format-spec/README.md, section 9). */
 typedef enum ebpo_face_coding {
     /*
-     * EBPO_FACES_GATES if the tree is from a file with this coding and the new file's codec is not
-     * EBPO_CODEC_NONE. In all other cases EBPO_FACES_HIGH_WATER.
+     * Same as EBPO_FACES_GATES if the tree was read from a file with this coding and the new file's
+     * codec is not EBPO_CODEC_NONE. In all other cases the same as EBPO_FACES_HIGH_WATER.
      */
     EBPO_FACES_DEFAULT = 0,
 
     /*
-     * Coding `gates`: each face is relative to an edge of a preceding face. Whole files are 7 to
-     * 11 % smaller; decoding takes longer (docs/develop/codings.md). Since format 1.1.
+     * Coding `gates`: each face is coded relative to an edge (gate) of a preceding face. Whole
+     * files are 7 to 11 % smaller than with EBPO_FACES_HIGH_WATER; decoding takes longer
+     * (docs/develop/codings.md). Since format 1.1.
      */
     EBPO_FACES_GATES = 1,
 
     /*
-     * Coding `high-water`: vertex indices, relative to the number of vertices used so far. The
-     * only coding of format 1.0.
+     * Coding `high-water`: vertex indices are coded relative to the number of vertices that
+     * preceding faces use. It is the only coding of format 1.0.
      */
     EBPO_FACES_HIGH_WATER = 2
 } ebpo_face_coding;
 
 /*
  * One level: all its nodes in the order of their octcodes. The eight children of the i-th gray node
- * of a level are the i-th group of the next level. An array is NULL if its count is 0 or the file
- * does not have its part.
+ * of a level are the i-th group of the next level. An array is NULL if its count is 0, or if the
+ * file does not have the part that contains the array.
  */
 typedef struct ebpo_level {
     /*
@@ -111,20 +112,21 @@ typedef struct ebpo_level {
     uint16_t *types;
 
     /*
-     * [gray_count] number of planes that bound the envelope of this node, without the planes of all
-     * ancestors
+     * [gray_count] number of planes that a node adds to the planes of its ancestors; all these
+     * planes bound the node's envelope
      */
     uint8_t *plane_counts;
 
-    /* [plane_count] plane codes (ebpo_plane_decode), in the order of the nodes */
+    /* [plane_count] plane codes (ebpo_plane_decode) of gray nodes, in the order of the nodes */
     uint32_t *planes;
 
+    /* Sum of plane_counts. */
     uint64_t plane_count;
 
     /*
-     * [leaf_count] winding number at the leaf's lowest corner, after the corner was shifted by
-     * infinitely small positive numbers (format-spec/README.md, section 10); solids, and surfaces
-     * with EBPO_PART_BORDER
+     * [leaf_count] for solids, and for surfaces with EBPO_PART_BORDER: winding number at the leaf's
+     * lowest corner, after the corner was shifted by infinitely small positive numbers
+     * (format-spec/README.md, section 10)
      */
     int32_t *leaf_winding;
 
@@ -141,43 +143,45 @@ typedef struct ebpo_level {
     uint64_t *leaf_first;
 
     /*
-     * [leaf_count] number of new faces: faces leaf_first .. leaf_first + leaf_new - 1 intersect
-     * this leaf and no earlier leaf
+     * [leaf_count] number of new faces of the leaf. A new face intersects this leaf and no earlier
+     * leaf. The new faces are leaf_first .. leaf_first + leaf_new - 1
      */
     uint32_t *leaf_new;
 
     /*
-     * [leaf_count] number of other faces that intersect this leaf; their indices are below
-     * leaf_first
+     * [leaf_count] number of faces that intersect this leaf and an earlier leaf; their indices are
+     * below leaf_first
      */
     uint32_t *leaf_ref_count;
 
     /*
-     * [ref_count] indices of these other faces, in the order of the leaves, ascending within each
-     * leaf
+     * [ref_count] indices of the faces that leaf_ref_count counts, in the order of the leaves,
+     * ascending within each leaf
      */
     uint32_t *leaf_refs;
 
+    /* Sum of leaf_ref_count. */
     uint64_t ref_count;
 
     /* Sum of leaf_new. */
     uint64_t new_count;
 
-    /* [leaf_count] number of planes of each leaf; part EBPO_PART_LEAF_PLANES */
+    /* [leaf_count] number of stored planes of each leaf; part EBPO_PART_LEAF_PLANES */
     uint8_t *leaf_plane_counts;
 
-    /* [leaf_plane_count] plane codes, in the order of the leaves */
+    /* [leaf_plane_count] plane codes of leaves, in the order of the leaves */
     uint32_t *leaf_planes;
 
+    /* Sum of leaf_plane_counts. */
     uint64_t leaf_plane_count;
 
     /* Volume of the envelopes of this level's gray nodes, in cubic units of the model. */
     double gray_volume;
 
     /*
-     * Volume of the envelopes of this level's leaves. The envelopes are cut by the stored planes of
-     * the leaves, or only by the planes of the leaves' ancestors if no planes of leaves are stored.
-     * With planes that readers derive from faces, the envelopes are smaller.
+     * Volume of the envelopes of this level's leaves, in cubic units of the model. The envelopes
+     * are bounded by the planes of the leaves' ancestors, and by the planes of the leaves if these
+     * are stored. With planes that readers derive from faces, the envelopes are smaller.
      */
     double leaf_volume;
 
@@ -192,8 +196,8 @@ typedef struct ebpo_level {
     ebpo_workspace *workspace;
 
     /*
-     * [gray_count] mean colour below the node, sRGB: red + 256 green + 65,536 blue; part
-     * EBPO_PART_COLOURS
+     * [gray_count] mean colour of the faces below the node, sRGB: red + 256 green + 65,536 blue;
+     * part EBPO_PART_COLOURS
      */
     uint32_t *gray_colours;
 } ebpo_level;
@@ -217,14 +221,16 @@ EBPO_API bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d);
 
 /* Summary of a level, from the header of the file. */
 typedef struct ebpo_level_summary {
-    /* Number of nodes of each type, of planes of gray nodes, and of stored planes of leaves. */
+    /* Number of nodes of each type. */
     uint64_t gray_count, leaf_count, white_count, black_count;
+
+    /* Number of planes of gray nodes, and of stored planes of leaves. */
     uint64_t plane_count, leaf_plane_count;
 
-    /* Sum of leaf_new: each face counts in the first leaf that it intersects. */
+    /* Number of new faces of this level's leaves, as in ebpo_level. */
     uint64_t new_count;
 
-    /* Number of references of this level's leaves to other faces, as in ebpo_level. */
+    /* Number of faces in this level's leaves that an earlier leaf also has, as in ebpo_level. */
     uint64_t ref_count;
 
     /* As in ebpo_level. */
@@ -261,10 +267,10 @@ typedef struct ebpo_info {
     /* True for a solid, false for a surface. */
     bool solid;
 
-    /*
-     * Rule that decides which points are inside. double_coordinates: true: doubles; false: floats.
-     */
+    /* Rule that decides which points are inside. */
     ebpo_rule rule;
+
+    /* True: coordinates of vertices are doubles. False: they are floats. */
     bool double_coordinates;
 
     /* Number of vertices and faces of the mesh in the file. */
@@ -276,13 +282,13 @@ typedef struct ebpo_info {
     /* Lowest corner and size of the root cell, in the model's unit. */
     double box_origin[3], box_size[3];
 
-    /* Deepest level for which the coordinates of cells are exact. */
+    /* Deepest level for which the coordinates of cells are exact doubles. */
     int grid_level;
 
-    /* Upper limit for the levels when the tree was built. */
+    /* Deepest level that was allowed when the tree was built (ebpo_build_options, build.h). */
     int max_level;
 
-    /* Levels 0 .. level_count - 1 are present. */
+    /* Number of levels in the file: levels 0 .. level_count - 1. */
     int level_count;
 
     /* As in ebpo_build_options (build.h). */
@@ -293,12 +299,12 @@ typedef struct ebpo_info {
     int selection;
 
     /*
-     * As in ebpo_build_options (build.h). One of the two is set if `selection` is
+     * As in ebpo_build_options (build.h). One of the two is not 0 if `selection` is
      * EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET or EBPO_SELECT_RANDOM; else both are 0.
      */
     double percent, k_root;
 
-    /* ebpo_normal_distance, for EBPO_SELECT_KMEDOIDS. */
+    /* ebpo_normal_distance (build.h), for EBPO_SELECT_KMEDOIDS. */
     int normals;
 
     /* Seed of EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM; else 0. */
@@ -308,106 +314,116 @@ typedef struct ebpo_info {
     ebpo_repair_record repair_record;
 
     /*
-     * Counts of the findings of the mesh check, and measures. The locations of findings are not
-     * stored.
+     * Result of the mesh check: counts of findings, area, volume and so on. The locations of
+     * findings are not stored.
      */
     ebpo_mesh_report report;
 
     /* ebpo_part bits */
     uint32_t parts;
 
-    /* Compression of the chunks, and content checksum (format-spec/README.md). */
+    /* Compression of the chunks. */
     ebpo_codec codec;
+
+    /* Checksum of the decoded arrays (format-spec/README.md). */
     uint8_t content_sha256[32];
 
     /*
-     * Location of HDF5's chunk indexes, which are stored after the data of the first levels. Only
-     * arrays with several chunks have a chunk index. The location is used for prefetching. 0: no
-     * chunk indexes, or not recorded.
+     * Byte offset and size of HDF5's chunk indexes, for prefetching. They are stored after the data
+     * of the first levels. Arrays of one chunk have no chunk index. Both are 0 if the file has no
+     * chunk indexes, or does not record their location.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
     /*
      * Level whose gray nodes are the roots of subtrees. The data of each subtree is contiguous in
-     * the file, and a table contains the locations of the subtrees. 0: no table.
+     * the file, and a table contains the locations of the subtrees. 0: the file has no table of
+     * subtrees.
      */
     int subtree_level;
 
     /*
-     * With a table of subtrees: the first `top_bytes` bytes of the file contain all data that is
-     * needed to locate a subtree. 0: not recorded.
+     * For a file with a table of subtrees: number of bytes at the beginning of the file that
+     * contain all data that is needed to locate a subtree. 0: not recorded.
      */
     uint64_t top_bytes;
 
     /*
-     * True for a subset: children of some gray nodes were omitted (ebpo_subset). The next members,
-     * up to kept_error, are the options with which the subset was made.
+     * True for a subset: children of some gray nodes were omitted (ebpo_subset). `cut_levels`,
+     * `boxed`, `kept_box` and `kept_error` are options with which the subset was made.
      */
     bool pruned;
 
-    /* Levels 0 .. cut_levels - 1 were kept; 0: all. */
+    /* Levels 0 .. cut_levels - 1 were kept. 0: all levels were kept. */
     int cut_levels;
 
-    /* True: nodes that do not intersect kept_box (min, then max) were omitted. */
+    /* boxed: true if nodes that do not intersect kept_box (min, then max) were omitted. */
     bool boxed;
     double kept_box[6];
 
     /*
-     * Requested error bound: nodes whose envelopes have at most this error bound were pruned. 0:
-     * not requested.
+     * Requested error bound: nodes whose envelopes have at most this error bound were pruned. In
+     * the model's unit. 0: not requested.
      */
     double kept_error;
 
-    /* content_sha256 of the original file; for a subset of a subset, of the first file. */
+    /*
+     * content_sha256 of the file from which the subset was made. For a subset of a subset: of the
+     * file that is not a subset.
+     */
     uint8_t subset_of[32];
 
     /* Summaries of levels 0 .. level_count - 1. */
     ebpo_level_summary level[EBPO_LEVELS_MAX];
 
-    /* Size of the file, and number of bytes before the first level. Set when a file is opened. */
+    /*
+     * Size of the file, and number of bytes before the data of level 0. Both are set when a file is
+     * opened.
+     */
     uint64_t file_bytes, head_bytes;
 
     /*
-     * First level whose reading needs HDF5's chunk indexes. level_count: no level needs them. Set
-     * when a file is opened.
+     * First level that can be read only with HDF5's chunk indexes; level_count if there is no such
+     * level. It is set when a file is opened.
      */
     int index_level;
 
-    /* Checksum of the colours, with EBPO_PART_COLOURS. */
+    /* Checksum of the colours; for files with EBPO_PART_COLOURS. */
     uint8_t colours_sha256[32];
 
     /* True if the corners of faces are stored with coding `gates`. */
     bool gates;
 
     /*
-     * The border of a surface, with EBPO_PART_BORDER: number of loops, number of points in all
-     * loops, number of points in the longest loop; area of the triangles that close the loops;
-     * checksum.
+     * For files with EBPO_PART_BORDER: number of loops of the border, number of points in all
+     * loops, number of points in the longest loop; area of the triangles that close the loops, in
+     * square units of the model; checksum of the border.
      */
     uint64_t border_loops, border_points, border_longest;
     double border_area;
     uint8_t border_sha256[32];
 
     /*
-     * The simplified surface, with EBPO_PART_SURFACE: number of patches; of triangles and vertices
-     * of all patches; bytes of their triangle codes; vertices with colours, 0 or all; checksum.
+     * For files with EBPO_PART_SURFACE, the simplified surface: number of patches, of triangles and
+     * of vertices; number of bytes of the triangle codes; number of vertices with colours (no
+     * vertices or all vertices); checksum of the simplified surface.
      */
     uint64_t surface_patches, surface_triangles, surface_vertices, surface_code_bytes,
         surface_colours;
     uint8_t surface_sha256[32];
 } ebpo_info;
 
-/* Closed loops: the border of a surface (format-spec/border.md). */
+/* The border of a surface, as closed loops of points (format-spec/border.md). */
 typedef struct ebpo_border_loops {
     uint64_t loop_count, point_count;
 
     /*
-     * [loop_count][2] of each loop: number of points, at least 3; weight (format-spec/border.md),
-     * at least 1
+     * [loop_count][2] number of points of each loop, at least 3, and weight of the loop, at least 1:
+     * number of times that the loop counts
      */
     uint32_t *loop;
 
-    /* [point_count][3] coordinates, loop after loop */
+    /* [point_count][3] coordinates of the points, loop after loop, in the model's unit */
     double *point;
 } ebpo_border_loops;
 
@@ -424,16 +440,16 @@ enum {
 };
 
 /*
- * Simplified surfaces of nodes, as they are stored: patches of coarse levels first, and within a
- * level in the order of octcodes. ebpo_surface_decode decodes a patch.
+ * Simplified surfaces of nodes (patches), as they are stored. Patches are sorted by level, and
+ * within a level by octcode. ebpo_surface_decode decodes a patch.
  */
 typedef struct ebpo_surface {
     uint64_t patch_count, triangle_count, vertex_count, code_bytes, colour_count;
-    uint64_t *patch; /* [patch_count][EBPO_PATCH_COLUMNS] */
-    uint8_t *code;   /* [code_bytes] triangles, patch after patch */
-    uint16_t *point; /* [vertex_count][3] coordinates, coded */
-    uint8_t *normal; /* [vertex_count][2] unit normals, coded */
-    uint8_t *colour; /* [colour_count][3] red, green and blue; or NULL */
+    uint64_t *patch; /* [patch_count][EBPO_PATCH_COLUMNS] values of each patch */
+    uint8_t *code;   /* [code_bytes] coded triangles, patch after patch */
+    uint16_t *point; /* [vertex_count][3] coded coordinates */
+    uint8_t *normal; /* [vertex_count][2] coded unit normals */
+    uint8_t *colour; /* [colour_count][3] red, green and blue; NULL: no colours */
 } ebpo_surface;
 
 /*
@@ -446,12 +462,12 @@ typedef struct ebpo_tree {
     ebpo_level level[EBPO_LEVELS_MAX];
     ebpo_mesh mesh;
 
-    /* [vertex_count] source index, or NULL */
+    /* [vertex_count] source index of each vertex; NULL: no source indices */
     uint32_t *vertex_source;
 
     /*
-     * [face_count] source index, or NULL. An index of source_face_count or more: the face was added
-     * when holes were filled.
+     * [face_count] source index of each face; NULL: no source indices. If the index is
+     * source_face_count or more, the face was added when holes were filled
      */
     uint32_t *face_source;
 
@@ -461,10 +477,10 @@ typedef struct ebpo_tree {
      */
     ebpo_workspace *workspace;
 
-    /* With EBPO_PART_BORDER; the arrays were allocated with malloc. */
+    /* The border, if the tree has EBPO_PART_BORDER. Its arrays are allocated with malloc. */
     ebpo_border_loops border;
 
-    /* With EBPO_PART_SURFACE; the arrays were allocated with malloc. */
+    /* The simplified surface, if the tree has EBPO_PART_SURFACE; allocated in the same way. */
     ebpo_surface surface;
 } ebpo_tree;
 
@@ -478,13 +494,13 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 /* ---- writing ---- */
 
 /*
- * Chunk checksums. Each chunk ends with a checksum; this list has a copy of the checksums of all
- * chunks (format-spec/checksums.md). With the list, readers detect a chunk that was
- * replaced by another chunk or by another version of the same chunk.
+ * Writing of the list of chunk checksums. Each chunk ends with a checksum, and the list has a copy
+ * of the checksums of all chunks (format-spec/checksums.md). With the list, readers detect a chunk
+ * that was replaced by another chunk or by another version of the same chunk.
  */
 typedef enum ebpo_chunk_checksums {
-    EBPO_CHECKSUMS_DEFAULT = 0, /* written */
-    EBPO_CHECKSUMS_NONE = 1     /* not written, as in format 1.0 */
+    EBPO_CHECKSUMS_DEFAULT = 0, /* the list is written */
+    EBPO_CHECKSUMS_NONE = 1     /* the list is not written, as in format 1.0 */
 } ebpo_chunk_checksums;
 
 /* Options for writing a file (ebpo_tree_write, ebpo_file_repack). */
@@ -494,32 +510,34 @@ typedef struct ebpo_write_options {
     ebpo_codec codec;
 
     /*
-     * Compression level. 0: the default, which is 6 for deflate; for zstd, 3 for chunks of less
-     * than 4 KiB, and 7 for larger chunks, with a minimum match length of six bytes.
+     * Compression level. 0: the default. For deflate, the default is 6. For zstd, it is 3 for
+     * chunks of less than 4 KiB; for larger chunks, it is 7 with a minimum match length of six
+     * bytes.
      */
     int codec_level;
 
     unsigned threads;
 
-    /* ebpo_part bits: parts to write, of those that the tree has. */
+    /* ebpo_part bits: parts to write. Parts that the tree does not have are ignored. */
     uint32_t parts;
 
     ebpo_progress progress;
 
     /*
-     * Selects the level whose gray nodes are the roots of subtrees (format-spec/subtrees.md): the
-     * deepest level whose gray nodes have, on average, at least this number of faces; level 1 if
-     * there is no such level. The data of a subtree is contiguous, so that one read loads it.
+     * Least mean number of faces of a subtree. The roots of subtrees (format-spec/subtrees.md) are
+     * the gray nodes of the deepest level whose gray nodes have, on average, at least this number
+     * of faces; of level 1 if there is no such level. The data of a subtree is contiguous, so that
+     * one read loads it.
      *
-     * 0 (default): as 1,024, but the file has no subtrees if no level reaches this number, or if
-     * the mesh has fewer than 131,072 faces.
+     * 0 (default): the number is 1,024, but the file has no table of subtrees if no level reaches
+     * this number, or if the mesh has fewer than 131,072 faces.
      *
-     * EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer than three levels never have
-     * subtrees.
+     * EBPO_NO_SUBTREES: no table of subtrees is written, as in format 1.0. Files of fewer than
+     * three levels never have such a table.
      */
     uint64_t subtree_faces;
 
-    /* Coding of the faces, if the mesh is written. */
+    /* Coding of the faces; used if the mesh is written. */
     ebpo_face_coding face_coding;
 
     ebpo_chunk_checksums chunk_checksums;
@@ -554,16 +572,16 @@ typedef struct ebpo_range {
 } ebpo_range;
 
 /*
- * Source of bytes. Initialize it with EBPO_SOURCE_INIT. The library may call its functions from
- * several threads at the same time, except `close`.
+ * Source of the bytes of a file. Initialize it with EBPO_SOURCE_INIT. The library may call `read`
+ * and `prefetch` from several threads at the same time.
  */
 typedef struct ebpo_source {
     size_t struct_size;
 
-    /* Argument of the functions. */
+    /* Argument that is passed to read, close and prefetch. */
     void *user;
 
-    /* Size in bytes. */
+    /* Size of the file in bytes. */
     uint64_t size;
 
     /*
@@ -577,17 +595,17 @@ typedef struct ebpo_source {
     void (*close)(void *user);
 
     /*
-     * Prefetch hint: these ranges will be read soon, about once each. A remote source fetches them
-     * together and in advance. The function returns immediately, and results do not depend on it.
-     * May be NULL.
+     * Prefetch hint: each of these ranges will soon be read, about once. A remote source fetches
+     * them together and in advance. The function must return immediately. Results do not depend on
+     * it. May be NULL.
      */
     void (*prefetch)(void *user, const ebpo_range *ranges, size_t count);
 
     /*
-     * With `prefetch`: number of bytes at the beginning of the file that are already available. If
-     * this number is more than 0 and less than `size`, opening reads only these bytes; the chunk
-     * offsets of arrays with several chunks are read later, when needed, or by ebpo_file_locate.
-     * With 0 or `size`, opening also reads all chunk offsets.
+     * Number of bytes at the beginning of the file that are already available, if `prefetch` is not
+     * NULL. If this number is more than 0 and less than `size`, opening reads only these bytes. The
+     * chunk offsets of arrays with several chunks are then read when they are needed, or by
+     * ebpo_file_locate. If this number is 0 or `size`, opening also reads all chunk offsets.
      */
     uint64_t prefetched;
 } ebpo_source;
@@ -614,20 +632,20 @@ typedef struct ebpo_file ebpo_file;
  * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
  * exchanged chunks. For files without this list, ebpo_file_check_content detects exchanged chunks.
  *
- * In copies by other programs, chunks may have no checksums. Opening such a file reads the whole
- * file and compares content_sha256. Later changes of such a file are not detected.
+ * If another program has copied a file, its chunks may have no checksums. Opening such a file reads
+ * the whole file and compares content_sha256. Later changes of such a file are not detected.
  *
- * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: the file has another
- * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: another program,
- * such as h5repack, wrote a layout that only ebpo_open_compat reads. EBPO_E_LIMIT: the decoded
- * arrays are too large for the file size (ebpo_open_options).
+ * EBPO_E_IO. EBPO_E_FORMAT: the file is not an .ebpo.h5 file, or is damaged. EBPO_E_VERSION: the
+ * file has another major version, or a part that this library does not know. EBPO_E_UNSUPPORTED:
+ * another program, such as h5repack, wrote a layout that only ebpo_open_compat reads. EBPO_E_LIMIT:
+ * the decoded arrays are too large for the file size (max_expansion of ebpo_open_options).
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
 
 /*
- * Limit for the total size of the decoded arrays: EBPO_EXPANSION_MAX times the file size, or
+ * Maximum total size of the decoded arrays: EBPO_EXPANSION_MAX times the file size, or
  * EBPO_EXPANSION_FREE bytes if this is more.
  */
 #define EBPO_EXPANSION_MAX  256
@@ -637,12 +655,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, 
 typedef struct ebpo_open_options {
     size_t struct_size;
 
-    /* Used instead of EBPO_EXPANSION_MAX; UINT64_MAX: no limit. */
+    /* Replaces EBPO_EXPANSION_MAX for this file. 0: EBPO_EXPANSION_MAX. UINT64_MAX: no maximum. */
     uint64_t max_expansion;
 
     /*
-     * If not NULL, this source is opened instead of the path, which is then only for messages. The
-     * source is closed as by ebpo_open_source.
+     * Source to open. The path is then only the file's name in messages. The source is closed as by
+     * ebpo_open_source. NULL: the file at the path is opened.
      */
     const ebpo_source *source;
 
@@ -700,9 +718,9 @@ typedef struct ebpo_compat_options {
  * the format. A file at a URL is first fetched completely to TMPDIR.
  *
  * The copy is then opened like any other file, and its content checksum is compared. This checksum
- * does not include HDF5 attributes, such as the root's box, and the headers of files of other
- * programs have no checksums: use ebpo_verify to find errors in attributes. Sizes in ebpo_info are
- * those of the copy.
+ * does not include HDF5 attributes, such as the root's box. The headers that other programs write
+ * have no checksums, so use ebpo_verify to find errors in attributes. Sizes in ebpo_info are those
+ * of the copy.
  *
  * Errors are those of ebpo_open. EBPO_E_FORMAT: libhdf5 rejected the file or crashed, or the
  * content does not match its checksum. EBPO_E_IO: the process or the temporary file could not be
@@ -716,8 +734,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_compat(const char *path,
                                                     ebpo_file **out, ebpo_error *error);
 
 /*
- * Opens a file in memory. The bytes are borrowed until the file is closed. `name` is for messages
- * and may be NULL.
+ * Opens a file in memory. The bytes are borrowed until the file is closed. `name` is the name of
+ * the file in messages, and may be NULL.
  *
  * Threads: any.
  */
@@ -726,8 +744,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t s
                                                     ebpo_error *error);
 
 /*
- * Opens a file from any source. The source is closed with the file, and also if opening fails,
- * unless source->struct_size is not set.
+ * Opens a file from any source. `name` is the name of the file in messages. The source is closed
+ * when the file is closed, and also if opening fails. Exception: if source->struct_size is not set,
+ * the call fails and does not close the source.
  *
  * Threads: any.
  */
@@ -777,7 +796,7 @@ typedef struct ebpo_array_facts {
     char path[48];
     uint64_t rows;
     unsigned columns;       /* 1: one value per row */
-    unsigned element_bytes; /* in the file, before compression */
+    unsigned element_bytes; /* size of a value in the file before compression */
     bool is_signed;
     uint64_t stored_bytes;      /* compressed size; set after ebpo_file_locate */
     const char *coding, *about; /* coding of the values, and their meaning */
@@ -807,19 +826,19 @@ typedef struct ebpo_attribute_facts {
 
     uint64_t rows;
 
-    /* Number of columns. For lists: number of items if this is equal in all rows; else 0. */
+    /* Number of columns. For lists: number of items if all rows have the same number; else 0. */
     uint64_t columns;
 
-    /* 1: each row is a list. */
+    /* 1: each row is a list. 0: each row has one value for each column. */
     uint64_t list;
 
-    /* 1: the file has the range of the values. */
+    /* 1: the file has the range of the values. 0: it does not. */
     uint64_t has_range;
 
     /* Minimum and maximum of all values, if has_range is 1. */
     double range[2];
 
-    /* Compressed size; set after ebpo_file_locate. */
+    /* Compressed size in bytes; set after ebpo_file_locate. */
     uint64_t stored_bytes;
 } ebpo_attribute_facts;
 
@@ -844,17 +863,22 @@ EBPO_API const char *ebpo_attribute_type_text(uint64_t type);
 typedef struct ebpo_stored_sizes {
     size_t struct_size;
 
+    /* Size of each level. */
     uint64_t level_bytes[EBPO_LEVELS_MAX];
+
+    /* Size of the vertices, of the faces, and of the source indices (ebpo_maps). */
     uint64_t mesh_vertex_bytes, mesh_face_bytes, map_bytes;
 
-    /* Table of subtrees. */
+    /* Size of the table of subtrees. */
     uint64_t subtree_bytes;
 
+    /* Size of all arrays of attributes. */
     uint64_t attribute_bytes;
 
-    /* List of chunk checksums. */
+    /* Size of the list of chunk checksums. */
     uint64_t checksum_bytes;
 
+    /* Size of the border, and of the simplified surface. */
     uint64_t border_bytes, surface_bytes;
 } ebpo_stored_sizes;
 
@@ -873,8 +897,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_
 
 /*
  * Prefetch hint: levels `first` to `last` will be read; `last` may be beyond the last level. A
- * remote source then fetches them with as few requests as possible. Waits only for the chunk
- * directory (ebpo_file_locate). Errors are reported by later reads.
+ * remote source then fetches them with as few requests as possible. The function may wait for the
+ * chunk directory (ebpo_file_locate), but not for levels. Errors are reported by later reads.
  *
  * Threads: any.
  */
@@ -886,22 +910,25 @@ EBPO_API void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int la
 typedef struct ebpo_read_options {
     size_t struct_size;
 
-    /* 0: all cores */
+    /* Number of threads. 0: all cores. */
     unsigned threads;
 
-    /* Owns the results; free the workspace after them. NULL: results are allocated with malloc. */
+    /*
+     * Workspace that owns the results; free it after the results. NULL: the results are allocated
+     * with malloc.
+     */
     ebpo_workspace *workspace;
 
     /*
      * For ebpo_file_read_level: ebpo_part bits of the parts to omit. The arrays of these parts are
-     * NULL; their counts are set. For whole trees (ebpo_file_read_tree, ebpo_file_repack) it must
-     * be 0, else EBPO_E_ARGUMENT.
+     * NULL, but their counts are set. For whole trees (ebpo_file_read_tree, ebpo_file_repack) this
+     * member must be 0 (EBPO_E_ARGUMENT).
      */
     uint64_t omitted_parts;
 
     /*
      * 1: ebpo_file_read_mesh and ebpo_file_read_source_mesh also read attributes if the file has
-     * them. Trees always have them.
+     * attributes. 0: they do not. Functions that read whole trees always read attributes.
      */
     uint64_t attributes;
 } ebpo_read_options;
@@ -946,7 +973,7 @@ typedef struct ebpo_maps {
     /* [face_count] source index of each face */
     uint32_t *face_source;
 
-    /* Owns both arrays; NULL: allocated with malloc. */
+    /* Workspace that owns both arrays. NULL: the arrays are allocated with malloc. */
     ebpo_workspace *workspace;
 } ebpo_maps;
 
@@ -975,7 +1002,7 @@ EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 typedef struct ebpo_attribute_values {
     /*
      * [rows][columns] values of the array's type, in native byte order. For lists of different
-     * lengths: the items of all rows, in order
+     * lengths: [count] items of all rows, in the order of the rows
      */
     void *values;
 
@@ -988,7 +1015,7 @@ typedef struct ebpo_attribute_values {
     /* Number of items in `values`. */
     uint64_t count;
 
-    /* Owns both arrays; NULL: allocated with malloc. */
+    /* Workspace that owns both arrays. NULL: the arrays are allocated with malloc. */
     ebpo_workspace *workspace;
 } ebpo_attribute_values;
 
@@ -1064,14 +1091,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
 
 /*
  * Writes the whole content of a file to a new file with the layout of `write` (codec, subtrees;
- * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before the
- * replacement the new file is read again. It must have the content_sha256 of `file`, so the content
- * of `file` is checked too. The whole model is loaded into memory, which the workspace of `read`
- * limits.
+ * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before `path`
+ * is replaced, the new file is read again. It must have the content_sha256 of `file`, so the
+ * content of `file` is checked too. The whole model is loaded into memory; the workspace of `read`
+ * limits this memory.
  *
  * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the content
  * is correct, but this library would write the arrays in another way (for example, another program
- * chose wider types than needed); nothing is written. EBPO_E_IO: also if `path` is the path of
+ * chose wider types than needed); no file is written. EBPO_E_IO: also if `path` is the path of
  * `file` and another program has replaced the file since opening. Other errors are those of
  * reading, and of ebpo_tree_write.
  *
@@ -1083,8 +1110,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_repack(const ebpo_file *file, const
                                                     ebpo_error *error);
 
 /*
- * Registers the zstd filter with libhdf5 in this process, so that HDF5 calls of the caller can read
- * the files.
+ * Registers the zstd filter with libhdf5 in this process, so that the caller can read .ebpo.h5
+ * files with HDF5 functions.
  *
  * EBPO_E_UNSUPPORTED: libhdf5 rejected the filter.
  *
@@ -1094,27 +1121,33 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_register_filters(ebpo_error *error);
 
 /* ---- patches of the simplified surface ---- */
 
-/* A patch: the simplified surface of the faces that are new in the leaves below a node. */
+/*
+ * A patch: the simplified surface of a node. It replaces the new faces (leaf_new of ebpo_level) of
+ * the leaves below the node.
+ */
 typedef struct ebpo_patch {
-    int level;
+    int level;      /* level of the node */
     uint32_t at[3]; /* position of the node's cell, 0 .. 2^level - 1 on each axis */
 
-    /* The model's faces [first_face, first_face + face_count), which the patch replaces. */
+    /* The patch replaces the faces first_face .. first_face + face_count - 1 of the file. */
     uint64_t first_face, face_count;
 
     /*
-     * Each point of the patch is at most this far from these faces, and each point of these faces
-     * from the patch, in the model's unit.
+     * Upper bound, in the model's unit, of the distance of each point of the patch from the
+     * replaced faces, and of each point of the replaced faces from the patch.
      */
     double error;
     uint64_t vertex_count, triangle_count;
 
-    /* [vertex_count][3] coordinates; unit normals; red, green and blue, or NULL */
+    /*
+     * [vertex_count][3] coordinates; unit normals; red, green and blue. colours: NULL if the patch
+     * has no colours
+     */
     double *xyz;
     float *normals;
     uint8_t *colours;
 
-    /* [triangle_count][3] vertices, counter-clockwise seen from outside */
+    /* [triangle_count][3] vertex indices, counter-clockwise seen from outside */
     uint32_t *triangles;
 } ebpo_patch;
 #define EBPO_PATCH_INIT                                       \
@@ -1129,10 +1162,10 @@ EBPO_API void ebpo_patch_free(ebpo_patch *patch);
 EBPO_API void ebpo_surface_free(ebpo_surface *surface);
 
 /*
- * Reads the patches of levels [first_level, last_level] of a file with EBPO_PART_SURFACE, to be
- * freed by ebpo_surface_free. No other part of the file is read.
+ * Reads the patches of levels first_level to last_level of a file with EBPO_PART_SURFACE. No other
+ * part of the file is read. `out` is freed by ebpo_surface_free.
  *
- * EBPO_E_ABSENT: the file does not have the part. EBPO_E_FORMAT: wrong values.
+ * EBPO_E_ABSENT: the file does not have the part. EBPO_E_FORMAT: the part has invalid values.
  *
  * Threads: any. Source: format-spec/surface.md.
  */
@@ -1141,8 +1174,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_surface(const ebpo_file *file,
                                                           ebpo_error *error);
 
 /*
- * Reads only the table of all patches: out->patch, and the counts. Free it with ebpo_surface_free.
- * The errors are those of ebpo_file_read_surface.
+ * Reads the table of all patches: only out->patch and the counts are set. `out` is freed by
+ * ebpo_surface_free. Errors are those of ebpo_file_read_surface.
  *
  * Threads: any.
  */
@@ -1150,9 +1183,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_patches(const ebpo_file *file,
                                                           ebpo_error *error);
 
 /*
- * Decodes patch `index`, to be freed by ebpo_patch_free. `info`: of the file or tree.
+ * Decodes the patch with this index. `info` is the metadata of the file or tree that has the patch.
+ * `out` is freed by ebpo_patch_free.
  *
- * EBPO_E_ARGUMENT: there is no such patch. EBPO_E_FORMAT: its code is wrong. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: there is no such patch. EBPO_E_FORMAT: the code of the patch is not valid.
+ * EBPO_E_MEMORY.
  *
  * Threads: any.
  */

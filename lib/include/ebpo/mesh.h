@@ -3,7 +3,7 @@
  *
  *   Reading      ebpo_mesh_read, ebpo_points_parse_ply
  *   Writing      ebpo_mesh_write_ply
- *   Preparing    ebpo_mesh_prepare (the following steps, in the best order)
+ *   Preparing    ebpo_mesh_prepare (arranges, repairs and checks, in the best order)
  *   Checking     ebpo_mesh_check
  *   Order        ebpo_mesh_arrange
  *   Repairing    ebpo_mesh_weld, ebpo_mesh_weld_within, ebpo_mesh_drop_duplicates,
@@ -45,9 +45,9 @@ typedef struct ebpo_mesh {
     uint64_t face_count;
 
     /*
-     * [vertex_count][3] coordinates. Exactly one of the two arrays is set, the other is NULL.
-     * xyz32: the source has floats, or text that floats represent (ebpo_mesh_read). xyz64: the
-     * source has doubles, or text with more digits.
+     * [vertex_count][3] coordinates. Exactly one of the two arrays is set; the other array is NULL.
+     * xyz32 is set if the source has floats, or text that floats represent (ebpo_mesh_read). xyz64
+     * is set if the source has doubles, or text with more digits.
      */
     float *xyz32;
     double *xyz64;
@@ -56,32 +56,33 @@ typedef struct ebpo_mesh {
     uint32_t *faces;
 
     /*
-     * Numbers of faces of the source that reading changed.
-     * - polygons_triangulated: polygons of more than three corners.
+     * Number of faces of the source that reading changed, by kind.
+     * - polygons_triangulated: polygons of more than three corners, which became triangles.
      * - polygons_concave: concave polygons among polygons_triangulated.
-     * - strips: triangle strips.
-     * - polygons_dropped: omitted faces of fewer than three corners.
+     * - strips: triangle strips, which became triangles.
+     * - polygons_dropped: faces of fewer than three corners, which were omitted.
      */
     uint64_t polygons_triangulated;
     uint64_t polygons_concave;
     uint64_t strips;
     uint64_t polygons_dropped;
 
-    /* File name without folders; "" if not from a file. */
+    /* Name of the mesh file without folders; "" if the mesh was not read from a file. */
     char source_name[256];
 
-    /* SHA-256 of the file; zeros if not from a file. */
+    /* SHA-256 of the file; zeros if the mesh was not read from a file. */
     uint8_t source_sha256[32];
 
     /* Size of the file in bytes. */
     uint64_t source_size;
 
-    /* "ply-ascii", "ply-le", "ply-be", "obj", "stl", "off" or "". */
+    /* Format of the file: "ply-ascii", "ply-le", "ply-be", "obj", "stl", "off" or "". */
     char source_format[16];
 
     /*
      * Original indices of vertices and faces, set by ebpo_mesh_arrange and
-     * ebpo_mesh_drop_duplicates. NULL: all vertices and faces of the source, in the source's order.
+     * ebpo_mesh_drop_duplicates. NULL: the mesh has all vertices and faces of the source, in the
+     * source's order.
      */
     struct ebpo_arrangement *arrangement;
 
@@ -98,8 +99,9 @@ typedef struct ebpo_mesh {
     struct ebpo_attributes *attributes;
 
     /*
-     * Number of triangulated polygons whose outline crosses itself (their triangulation of least
-     * area is a guess), and index of the first triangle of the first such polygon.
+     * polygons_guessed: number of triangulated polygons whose outline crosses itself, so that their
+     * triangles are only a guess. first_guessed_face: index of the first triangle of the first
+     * polygon of this kind.
      */
     uint64_t polygons_guessed;
     uint64_t first_guessed_face;
@@ -113,8 +115,8 @@ typedef struct ebpo_mesh {
 EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
 
 /*
- * Returns a text that names the attributes of the file that could not be kept. NULL: all were kept,
- * or none were requested. Valid as long as the mesh.
+ * Returns a text that names the attributes of the file that could not be kept. NULL: all attributes
+ * were kept, or no attributes were requested. The text is valid until the mesh is freed.
  *
  * Threads: any.
  */
@@ -128,15 +130,15 @@ EBPO_API const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh);
  * - texture coordinates to which faces of an OBJ file refer, but which the file does not contain
  * - data that was not read because no attributes were requested
  *
- * NULL: no such data. Valid as long as the mesh.
+ * NULL: there is no such data. The text is valid until the mesh is freed.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_mesh_ignored(const ebpo_mesh *mesh);
 
 /*
- * Returns 1 if the mesh has attributes, or comments of a PLY file; else 0. Attributes that could
- * not be kept do not count.
+ * Returns 1 if the mesh has attributes or comments of a PLY file, else 0. Attributes that could not
+ * be kept do not count.
  *
  * Threads: any.
  */
@@ -159,16 +161,16 @@ typedef struct ebpo_mesh_read_options {
     ebpo_workspace *workspace;
 
     /*
-     * 1: also reads attributes, which ebpo_build stores. PLY: all properties of vertices, faces and
-     * other elements, and comments. Other formats: colours, normals, texture coordinates, names of
-     * materials. PLY and OBJ: the names of texture images to which the file or its material
-     * libraries refer, and the digests of the images in the file's folder or below. 0: reads no
-     * attributes.
+     * 1: also reads attributes, which ebpo_build stores. From PLY files: all properties of
+     * vertices, faces and other elements, and comments. From other formats: colours, normals,
+     * texture coordinates and names of materials. For PLY and OBJ files, attributes include the
+     * names of texture images to which the file or its material libraries refer, and the digests of
+     * those images that are in the file's folder or below. 0: reads no attributes.
      */
     uint64_t attributes;
 
     /*
-     * 1, with `attributes`: also reads the bytes of the texture images. 0: does not read these
+     * 1: also reads the bytes of the texture images, if `attributes` is 1. 0: does not read these
      * bytes.
      */
     uint64_t embed_textures;
@@ -180,13 +182,13 @@ typedef struct ebpo_mesh_read_options {
     }
 
 /*
- * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes, else by the file
- * name, else by the first word (OBJ).
+ * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes. If they do not
+ * decide, the file name decides, and then the first word (OBJ).
  *
  * Polygons are triangulated, including concave polygons and polygons that touch themselves (slits,
  * bridges to holes, pinched corners). A polygon whose outline crosses itself, such as a folded
- * quad, is counted in `polygons_guessed`; if it has at most 64 corners, it gets the triangles of
- * least area. Triangle strips are converted to triangles.
+ * quad, is counted in `polygons_guessed`; if it has at most 64 corners, the triangulation of least
+ * area is used. Triangle strips are converted to triangles.
  *
  * Binary coordinates keep every bit. Text of a PLY file is rounded correctly to the type in the
  * header. Text of other formats becomes floats if floats represent every coordinate, and doubles
@@ -198,9 +200,10 @@ typedef struct ebpo_mesh_read_options {
  * Safe for untrusted files. The whole file is read into memory; with `workspace`, into an array of
  * the workspace, which may be a temporary file.
  *
- * EBPO_E_IO: also if another program changes the file during reading. EBPO_E_FORMAT: not a mesh, or
- * damaged. EBPO_E_LIMIT: too large. EBPO_E_UNSUPPORTED: a variant that is not supported, such as
- * binary OFF. On failure `out` is cleared.
+ * EBPO_E_IO: also if another program changes the file during reading. EBPO_E_FORMAT: the file is
+ * not a mesh, or is damaged. EBPO_E_LIMIT: the mesh has too many vertices or faces.
+ * EBPO_E_UNSUPPORTED: the variant of the format is not supported, such as binary OFF. On failure
+ * `out` is cleared.
  *
  * Threads: any.
  */
@@ -213,10 +216,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
  * allowed. Faces are ignored and may be missing. Coordinates may be NaN or infinite. Safe for
  * untrusted data.
  *
- * name    for messages
- * xyz     [*count][3] doubles, freed by free(). Binary floats and integers are converted exactly.
- *         If no float represents a text value of a float property (see ebpo_mesh_read), the result
- *         is the nearest double.
+ * name    name of the data for messages
+ * xyz     [*count][3] coordinates, freed by free(). Binary floats and integers are converted
+ *         exactly. If no float represents a text value of a float property (see ebpo_mesh_read),
+ *         the result is the double nearest to the text
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT.
  *
@@ -228,9 +231,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_points_parse_ply(const void *data, uint6
 
 /*
  * Writes a binary little-endian PLY file, which is replaced atomically. Vertices are floats or
- * doubles as in the mesh, triangles are int32 or uint32. Attributes that were read from a PLY file
- * keep their order and types, and the comments of that file are also written. A mesh with
- * attributes must be in the order of its source.
+ * doubles as in the mesh; vertex indices of triangles are int32 or uint32. Attributes that were
+ * read from a PLY file keep their order and types, and the comments of that file are also written.
+ * A mesh with attributes must be in the order of its source.
  *
  * EBPO_E_ARGUMENT: the mesh is not valid. EBPO_E_IO.
  *
@@ -241,6 +244,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, co
 
 /* ---- checking ---- */
 
+/* Maximum number of locations in ebpo_finding. */
 #define EBPO_FINDING_LOCATIONS 4
 
 /*
@@ -252,14 +256,14 @@ typedef struct ebpo_finding {
     /* Number of findings of this kind. */
     uint64_t count;
 
-    /* First min(count, EBPO_FINDING_LOCATIONS) indices, ascending. */
+    /* Least source indices, ascending: min(count, EBPO_FINDING_LOCATIONS) of them. */
     uint64_t locations[EBPO_FINDING_LOCATIONS];
 } ebpo_finding;
 
 /*
- * Properties of a mesh. Edges are undirected pairs of distinct vertex indices. The location of an
- * edge is the least source index of the faces that use the edge. If two edges of a finding have the
- * same location, the index is listed twice.
+ * Properties of a mesh. Edges are undirected pairs of distinct vertex indices. A face uses each of
+ * its edges in one direction. The location of an edge is the least source index of the faces that
+ * use the edge. If two edges of one kind have the same location, the index is listed twice.
  */
 typedef struct ebpo_mesh_report {
     /*
@@ -293,7 +297,7 @@ typedef struct ebpo_mesh_report {
      */
     ebpo_finding bowtie_vertices;
 
-    /* Faces without area, by an exact test; includes index_repeated_faces. */
+    /* Faces without area, by an exact test, including the faces of index_repeated_faces. */
     ebpo_finding zero_area_faces;
 
     /* Faces that use a vertex twice. */
@@ -305,6 +309,7 @@ typedef struct ebpo_mesh_report {
      */
     ebpo_finding repeated_faces;
 
+    /* Vertices that no face uses. */
     ebpo_finding unreferenced_vertices;
 
     /* Vertices at the position of an earlier vertex. */
@@ -314,17 +319,18 @@ typedef struct ebpo_mesh_report {
     uint64_t edges;
 
     /*
-     * Number of components: sets of faces that share no vertices with other faces. Vertices without
-     * faces are not counted.
+     * Number of components. A component is a set of faces that are connected by vertices.
+     * Unreferenced vertices are not counted.
      */
     uint64_t components;
 
     /*
-     * Number of holes: closed chains of boundary edges, split where a chain passes a vertex twice.
+     * Number of holes. A hole is a closed chain of boundary edges; a chain that passes a vertex
+     * twice is split there.
      */
     uint64_t boundary_loops;
 
-    /* Sum of the genus of all components; known only for a closed 2-manifold. */
+    /* Sum of the genus of all components. genus_known: false if the mesh is not `manifold`. */
     bool genus_known;
     int64_t genus;
 
@@ -337,7 +343,7 @@ typedef struct ebpo_mesh_report {
      */
     double volume;
 
-    /* Mean edge length of EBP 2017, equation 3. */
+    /* Mean edge length as defined in EBP 2017, equation 3, in the unit of the source. */
     double mean_edge;
 
     /* Bounding box of the referenced vertices. */
@@ -348,8 +354,8 @@ typedef struct ebpo_mesh_report {
  * Checks a mesh and counts findings.
  *
  * EBPO_E_FORMAT: a coordinate is NaN or infinite, a vertex index is out of range, or the mesh has
- * no faces; the message gives the location. EBPO_E_ARGUMENT: the struct is not valid. EBPO_E_LIMIT,
- * EBPO_E_IO.
+ * no faces; the message gives the location. EBPO_E_ARGUMENT: the struct of the mesh is not valid.
+ * EBPO_E_LIMIT, EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -378,41 +384,44 @@ typedef struct ebpo_repair_record {
     /* True for each repair that was requested. */
     bool weld, orient, fill_holes, drop_duplicates;
 
-    /* Vertices removed because an earlier vertex has the same position. */
+    /* Number of vertices that were merged into another vertex. */
     uint64_t welded_vertices;
 
-    /* Faces that were reversed. */
+    /* Number of faces that were reversed. */
     uint64_t flipped_faces;
 
     /*
-     * Sets of faces that cannot be oriented, or whose faces around an edge cannot have alternating
-     * directions (see ebpo_mesh_orient).
+     * Number of sets of faces that cannot be oriented, or whose faces around an edge cannot have
+     * alternating directions (see ebpo_mesh_orient).
      */
     uint64_t unorientable_components;
 
-    /* Holes that were closed by faces. */
+    /* Number of holes that were closed by faces. */
     uint64_t filled_holes;
 
-    /* Faces that fill holes. These faces are the last ones of the mesh. */
+    /* Number of faces that fill holes. These faces are the last ones of the mesh. */
     uint64_t added_faces;
 
-    /* Chains of boundary edges that are not simple loops. */
+    /* Number of chains of boundary edges that form no simple loop, and were not filled. */
     uint64_t unfilled_holes;
 
-    /* Faces removed because an earlier face has the same vertices. */
+    /* Number of faces that were removed because an earlier face has the same vertices. */
     uint64_t dropped_faces;
 
-    /* Dropped faces whose orientation is opposite to that of the kept face. */
+    /* Number of dropped faces whose orientation is opposite to that of the kept face. */
     uint64_t dropped_opposite;
 
     /*
-     * Distance given to ebpo_mesh_weld_within, and the largest distance by which this function
-     * moved a vertex. 0: the function was not called.
+     * Distance given to ebpo_mesh_weld_within, and greatest distance by which this function moved a
+     * vertex. 0: the function was not called.
      */
     double weld_distance;
     double weld_moved;
 
-    /* Faces that use a vertex twice after ebpo_mesh_weld_within, and therefore have no area. */
+    /*
+     * Number of faces that use a vertex twice after ebpo_mesh_weld_within, and therefore have no
+     * area.
+     */
     uint64_t collapsed_faces;
 } ebpo_repair_record;
 
@@ -425,9 +434,9 @@ typedef struct ebpo_repair_record {
  */
 
 /*
- * Merges vertices of equal position (-0 equals 0), including unreferenced ones. Of vertices at one
- * position, the first one stays; the order of vertices is kept. Faces that then use a vertex twice
- * stay.
+ * Merges vertices of equal position (-0 equals 0), including unreferenced vertices. Of all vertices
+ * at one position, the first vertex stays; the order of vertices is kept. Faces that use a vertex
+ * twice after merging are not removed.
  *
  * Threads: one at a time per mesh.
  */
@@ -435,15 +444,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_r
                                                   ebpo_error *error);
 
 /*
- * Merges vertices of equal position as ebpo_mesh_weld does, then others within a distance.
- * Positions are visited in ascending order of x, then y, then z. A vertex is kept unless a kept
- * vertex is within the distance. Each other vertex is merged into the nearest kept vertex (the
- * first of several at equal distance). Distances are compared exactly.
+ * Merges vertices of equal position as ebpo_mesh_weld does, and then vertices that are within a
+ * distance of each other. Positions are visited in ascending order of x, then y, then z. A vertex
+ * is kept unless a kept vertex is within the distance. Each vertex that is not kept is merged into
+ * the nearest kept vertex (the first of several at equal distance). Distances are compared exactly.
  *
- * No vertex moves farther than the distance, also in a chain of near vertices. No two kept vertices
+ * No vertex moves farther than the distance, even in a chain of near vertices. No two kept vertices
  * are within the distance. The result does not depend on the order of vertices. A kept vertex keeps
- * its position, index and attributes. Faces that then use a vertex twice stay and are counted in
- * `collapsed_faces`.
+ * its position, index and attributes. Faces that use a vertex twice after merging are not removed,
+ * and are counted in `collapsed_faces`.
  *
  * distance   in the mesh's unit; above 0, and less than the longest side of the bounding box of all
  *            vertices
@@ -459,17 +468,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
 
 /*
  * Removes repeated faces: of all faces with the same three distinct vertices, in any rotation and
- * orientation, the first one in the source stays. `repeated_faces` of ebpo_mesh_report counts the
- * others. The order and the source indices are kept, and attributes of faces remain assigned by
- * source index.
+ * orientation, the first face in the source stays. `repeated_faces` of ebpo_mesh_report counts the
+ * removed faces. The order and the source indices are kept, and attributes of faces remain assigned
+ * by source index.
  *
  * Repeated faces of the same orientation count twice in winding numbers and volume. Two faces of
- * opposite orientation cancel, for example the two sides of a sheet, or the boundaries between
- * solids. So a mesh may be balanced with both faces and not with one of them. `dropped_opposite`
- * counts dropped faces of opposite orientation; ebpo_mesh_check and ebpo_mesh_try_repairs show the
- * effect.
+ * opposite orientation cancel, for example the two sides of a sheet, or the boundary between two
+ * solids. So a mesh may be balanced with both faces, but not with one of them. `dropped_opposite`
+ * counts the removed faces of opposite orientation. ebpo_mesh_check and ebpo_mesh_try_repairs show
+ * if removing faces makes the mesh open.
  *
- * EBPO_E_ARGUMENT: a component (ebpo_components_mesh) with repeated faces.
+ * EBPO_E_ARGUMENT: the mesh is a component (ebpo_components_mesh) and has repeated faces.
  *
  * Threads: one at a time per mesh.
  */
@@ -478,12 +487,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
                                                              ebpo_error *error);
 
 /*
- * Counts the faces that ebpo_mesh_drop_duplicates would remove after ebpo_mesh_weld: faces at the
- * three positions of an earlier face. If no positions are repeated (ebpo_mesh_report), the result
- * is equal to `repeated_faces`.
+ * Counts the faces that ebpo_mesh_drop_duplicates would remove after ebpo_mesh_weld: faces whose
+ * corners are at the three positions of an earlier face. If repeated_positions of ebpo_mesh_report
+ * is 0, the result is equal to repeated_faces of the report.
  *
- * out        count and first indices
- * opposite   count of faces whose orientation is opposite to that of the kept face
+ * out        number of these faces, and first source indices
+ * opposite   number of these faces whose orientation is opposite to that of the kept face
  *
  * Errors are those of ebpo_mesh_weld. On failure `out` and `opposite` are 0.
  *
@@ -497,27 +506,28 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * Orients faces consistently. First, neighbours across edges that are used twice get consistent
  * directions. Then shells are turned outwards, or inwards if they bound a cavity.
  *
- * A *patch* is a set of faces that are connected by edges that are used twice. A patch is a *shell*
- * if it uses each edge equally often in both directions. So two cubes that share only a vertex or
- * an edge are two shells.
+ * Here a *patch* is a set of faces that are connected by edges that are used twice. A patch is a
+ * *shell* if it uses each edge equally often in both directions. So two cubes that share only a
+ * vertex or an edge are two shells.
  *
  * A patch may be open at edges that are used more than twice. Example: each of two stacked cubes
  * has its own faces in the common square, so four faces use each side of the square. The square of
  * a cube is one patch, the other five sides of the cube are another patch, and both patches are
- * open. Such patches are joined at these edges. The faces at an edge are sorted by their angle
- * around the edge, and each face gets the direction opposite to that of the previous face. The
- * angles are compared exactly; faces at the same angle are ordered by source index. Faces that
- * already alternate are unchanged. Joined patches are a shell if they use each edge equally often
- * in both directions.
+ * open. Patches are joined at edges that are used more than twice. The faces at such an edge are
+ * sorted by their angle around the edge, and each face gets the direction opposite to that of the
+ * previous face. The angles are compared exactly; faces at the same angle are ordered by source
+ * index. Faces that already alternate are unchanged. Joined patches are a shell if they use each
+ * edge equally often in both directions.
  *
- * A shell gets a positive volume, or a negative one if it is inside an odd number of other shells.
- * A shell is inside another one if its least and greatest vertices along each axis are inside:
- * their exact winding numbers with respect to the other shell are not zero.
+ * A shell gets a positive volume, or a negative volume if it is inside an odd number of other
+ * shells. Shell A is inside shell B if the least and the greatest vertex of A along each axis are
+ * inside B: their exact winding numbers with respect to B are not zero.
  *
  * An open patch is oriented so that most of its faces are unchanged. A patch that cannot be
  * oriented is unchanged. A set of joined patches whose faces cannot alternate around all edges is
- * separated again, and its patches are oriented separately. `unorientable_components` counts both
- * cases. Do not orient a mesh that has intended solids inside other solids.
+ * separated again, and its patches are oriented one by one. `unorientable_components` counts these
+ * patches and these sets. Do not orient a mesh in which solids inside other solids are intended,
+ * because they become cavities.
  *
  * Threads: one at a time per mesh.
  */
@@ -525,8 +535,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair
                                                     ebpo_error *error);
 
 /*
- * Reverses every face. Adds the number of faces to `flipped_faces` of the record, and sets no flag
- * of a requested step.
+ * Reverses every face. Adds the number of faces to `flipped_faces` of the record. The record has no
+ * flag for this step.
  *
  * Threads: one at a time per mesh.
  */
@@ -537,10 +547,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_r
  * Closes each boundary loop (boundary_loops of ebpo_mesh_report) by triangles between its vertices.
  * The triangles are appended at the end; no vertices are added.
  *
- * A loop of up to 256 edges gets the triangulation of least area that, if possible, does not use an
- * existing edge again. Longer loops are closed by ear clipping. Chains of boundary edges that do
- * not close because orientations differ (see ebpo_mesh_orient) are unchanged, and are counted in
- * `unfilled_holes`.
+ * A loop of up to 256 edges gets the triangulation of least area. If possible, triangulations that
+ * use an existing edge of the mesh are excluded. Longer loops are closed by ear clipping. A chain
+ * of boundary edges may not close, because orientations differ (see ebpo_mesh_orient). Such a chain
+ * is unchanged, and is counted in `unfilled_holes`.
  *
  * Threads: one at a time per mesh.
  */
@@ -554,10 +564,11 @@ typedef struct ebpo_prepare_options {
     size_t struct_size;
 
     /*
-     * Steps, in this order: ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient,
-     * ebpo_mesh_flip, ebpo_mesh_fill_holes. After holes were filled, closed components are oriented
-     * again. A mesh from STL (`source_format`) is welded also if `weld` is false. This does not
-     * change a mesh from ebpo_mesh_read, which has already merged vertices at equal positions.
+     * True for each step to make. The order of all steps is ebpo_mesh_weld,
+     * ebpo_mesh_drop_duplicates, ebpo_mesh_orient, ebpo_mesh_flip, ebpo_mesh_fill_holes. After
+     * holes were filled, closed components are oriented again. A mesh from STL (`source_format`) is
+     * welded even if `weld` is false. This does not change a mesh from ebpo_mesh_read, which has
+     * already merged vertices of equal position.
      */
     bool weld;
     bool orient;
@@ -573,7 +584,7 @@ typedef struct ebpo_prepare_options {
     /* 1: also calls ebpo_mesh_drop_duplicates. 0: does not call it. */
     uint64_t drop_duplicates;
 
-    /* Above 0: calls ebpo_mesh_weld_within with this distance, and not ebpo_mesh_weld. */
+    /* Above 0: calls ebpo_mesh_weld_within with this distance, and does not call ebpo_mesh_weld. */
     double weld_distance;
 } ebpo_prepare_options;
 
@@ -586,13 +597,13 @@ typedef struct ebpo_prepare_options {
 typedef struct ebpo_prepared {
     size_t struct_size;
 
-    /* True if the mesh was repaired. In this case `before` and `report` may differ. */
+    /* True if repairs were made. In this case `before` and `report` may differ. */
     bool was_repaired;
 
     /* Repairs that were made. */
     ebpo_repair_record record;
 
-    /* before: report on the original mesh. report: report on the current mesh, for ebpo_build. */
+    /* before: report on the original mesh. report: report on the repaired mesh, for ebpo_build. */
     ebpo_mesh_report before;
     ebpo_mesh_report report;
 } ebpo_prepared;
@@ -601,12 +612,12 @@ typedef struct ebpo_prepared {
 
 /*
  * Prepares a mesh for ebpo_build: arranges the mesh, repairs it as requested, and checks it before
- * and after. Calls of the single functions give the same mesh and reports, but may need more
- * memory. A mesh with coordinates beyond 2^1000 (ebpo_mesh_arrange) is checked as well, but
+ * and after the repairs. Calling the function of each step gives the same mesh and reports, but may
+ * need more memory. A mesh with coordinates beyond 2^1000 (ebpo_mesh_arrange) is also checked, but
  * ebpo_build rejects it.
  *
- * Errors are those of the single calls. On failure `out` is cleared; the mesh is valid and includes
- * the steps that were completed.
+ * Errors are those of the functions of the steps. On failure `out` is cleared; the mesh is valid
+ * and includes the changes of the steps that were completed.
  *
  * Threads: one at a time per mesh.
  */
@@ -618,11 +629,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
 
 /*
  * Components of a mesh. Faces that share vertices are in one component. A component is closed if it
- * uses each edge equally often in both directions. A closed component of negative volume is a
- * cavity. A cavity is joined to the closed component of positive volume that surrounds it. A
- * component surrounds a cavity if the component's exact winding number is not zero at one vertex of
- * the cavity: the first vertex of its first face in the source. Of several such components, the one
- * of least volume is used. A cavity that is in no other component stays a separate component.
+ * uses each edge equally often in both directions.
+ *
+ * A closed component of negative volume is a cavity. A cavity is joined to the closed component of
+ * positive volume that surrounds it. A component surrounds a cavity if the component's exact
+ * winding number is not zero at one vertex of the cavity: the first vertex of the cavity's first
+ * face in the source. If several components surround a cavity, the component of least volume is
+ * used. A cavity that no component surrounds stays a separate component.
  */
 typedef struct ebpo_components ebpo_components;
 
@@ -651,8 +664,8 @@ typedef struct ebpo_component {
  *
  * mesh   borrowed until ebpo_components_free
  *
- * EBPO_E_FORMAT: no faces, or a vertex index is out of range. EBPO_E_ARGUMENT: the struct is not
- * valid. EBPO_E_LIMIT, EBPO_E_IO.
+ * EBPO_E_FORMAT: the mesh has no faces, or a vertex index is out of range. EBPO_E_ARGUMENT: the
+ * struct of the mesh is not valid. EBPO_E_LIMIT, EBPO_E_IO.
  *
  * Threads: any.
  */

@@ -36,18 +36,20 @@ extern "C" {
 
 /* ---- models and contexts ---- */
 
-/* How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on it. */
+/*
+ * How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on this.
+ */
 typedef enum ebpo_loading {
     /*
-     * Whole subtrees, which are kept while the budget allows. The least recently used subtrees are
-     * removed first (4.2.3).
+     * Whole subtrees are loaded, and kept while the budget allows. The least recently used subtrees
+     * are removed first (4.2.3).
      */
     EBPO_LOAD_CACHE = 0,
 
-    /* One whole subtree at a time; no other subtree is kept (4.2.5). */
+    /* One whole subtree is loaded at a time; no other subtree is kept (4.2.5). */
     EBPO_LOAD_SUBTREE = 1,
 
-    /* Only the nodes on the path from the root to the leaf; no node is kept (4.2.4). */
+    /* Only the nodes on the path from the root to the leaf are loaded; none is kept (4.2.4). */
     EBPO_LOAD_NODES = 2
 } ebpo_loading;
 
@@ -59,28 +61,28 @@ typedef struct ebpo_model_options {
     size_t struct_size;
 
     /*
-     * Memory limit of the model in bytes, including its caches and buffers for loading. 0: no
-     * limit, except for a remote file (http.h) larger than 2 MiB with `cut_level` -1, where the
-     * limit is 256 MiB. If such a file has a table of subtrees (ebpo_info.subtree_level), it is
-     * loaded subtree by subtree for any budget.
+     * Maximum memory of the model in bytes, including its caches and buffers for loading. 0: 256
+     * MiB for a remote file (http.h) larger than 2 MiB if `cut_level` is -1; no limit in all other
+     * cases. A remote file larger than 2 MiB that has a table of subtrees (ebpo_info.subtree_level)
+     * is loaded subtree by subtree for any budget.
      *
      * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
-     * per loading thread) and contexts. A context holds results; for distances also 4 bytes per
-     * subtree below the cut level, and a queue of nodes.
+     * per loading thread) and contexts. A context contains results; for distances, it also contains
+     * 4 bytes per subtree below the cut level, and a queue of nodes.
      */
     uint64_t memory;
 
     /*
-     * Levels 0 to cut_level stay in memory, and the subtrees (nodes with all nodes and faces below
-     * them) below this level are loaded on demand. -1: the level is chosen by the budget. If
-     * everything fits, everything is loaded at once, except for a remote file that has a table of
-     * subtrees and is larger than 2 MiB.
+     * Levels 0 to cut_level stay in memory. The subtrees below this level are loaded on demand; a
+     * subtree is a node with all nodes and faces below it. -1: the level is chosen so that the
+     * budget is met. If everything fits, everything is loaded at once, except for a remote file
+     * that has a table of subtrees and is larger than 2 MiB.
      */
     int cut_level;
 
     /*
-     * How subtrees are loaded; used only if not everything fits in memory, or if cut_level is
-     * given.
+     * How subtrees are loaded. This member is used if cut_level is given, or if the budget is too
+     * small for everything.
      */
     ebpo_loading loading;
 
@@ -96,19 +98,21 @@ typedef struct ebpo_model_options {
     ebpo_progress progress;
 
     /*
-     * Shared budget, used instead of `memory`; NULL: none. Requires EBPO_LOAD_CACHE. The model is
-     * entirely in memory if it and the other models that are entirely in memory take at most half
-     * of the budget; else it is loaded subtree by subtree.
+     * Shared budget; `memory` is then ignored. NULL: no shared budget. Requires EBPO_LOAD_CACHE.
+     * The model is entirely in memory if all models of the budget that are entirely in memory,
+     * including this one, take at most half of the budget. Otherwise it is loaded subtree by
+     * subtree.
      */
     ebpo_budget *budget;
 
     /*
-     * For surfaces with EBPO_PART_BORDER, from 1/1024 to 1023/1024. Such surfaces have an inside,
-     * and signed distances, by the generalized winding number w: the sum of the solid angles of all
-     * faces, divided by 4 pi. The file's winding rule defines the inside: nonzero: |w| > threshold;
-     * positive: w > threshold; evenodd: |w - e| > threshold, where e is the nearest even integer.
-     * Decisions are exact. Where w equals the boundary of the rule, or 512 bits do not decide, a
-     * point is outside, and ebpo_model_stats.ties counts it.
+     * Threshold of the winding number for surfaces with EBPO_PART_BORDER, from 1/1024 to 1023/1024.
+     * Such surfaces have an inside, and signed distances, by the generalized winding number w: the
+     * sum of the solid angles of all faces, divided by 4 pi. The file's winding rule defines the
+     * inside. Nonzero: |w| > threshold. Positive: w > threshold. Evenodd: |w - e| > threshold,
+     * where e is the nearest even integer. Decisions are exact, with one exception: if both sides
+     * of the comparison are equal, or arithmetic with 512 bits cannot decide it, the point counts
+     * as outside, and ebpo_model_stats.ties counts it.
      */
     double threshold;
 } ebpo_model_options;
@@ -122,13 +126,14 @@ typedef struct ebpo_model_options {
 typedef struct ebpo_model ebpo_model;
 
 /*
- * Makes a model: loads everything, or the levels up to the cut level. A model of a file without
- * mesh supports only queries with a level. The file must stay open as long as the model.
+ * Makes a model: loads everything, or levels 0 to the cut level. If the file has no mesh, the model
+ * supports only queries with a level (`level` in the options of queries). The file must stay open
+ * as long as the model exists.
  *
- * EBPO_E_LIMIT: the budget is too small; the message names a sufficient one. An accepted budget
- * is large enough for some subtrees of average size, but perhaps not for the largest one. A query
- * that needs a subtree larger than the budget allows returns EBPO_E_LIMIT. Other errors are those
- * of reading.
+ * EBPO_E_LIMIT: the budget is too small; the message names a sufficient budget. An accepted budget
+ * is large enough for some subtrees of average size, but perhaps not for the largest subtree. A
+ * query that needs a subtree larger than the budget allows returns EBPO_E_LIMIT. Other errors are
+ * those of reading.
  *
  * Threads: any.
  */
@@ -138,9 +143,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
 
 /*
  * Estimated memory use for a budget. Numbers of bytes are upper bounds for ordinary models; for
- * subtrees they are 1.05 to 1.4 times the actual use. If the actual use is higher, the budget still
- * holds: other data is removed, or loading fails. If everything will be in memory, all members
- * except `resident`, `budget`, `whole` and `least` are 0.
+ * subtrees they are 1.05 to 1.4 times the actual use. The budget is met even if the actual use
+ * would be higher: other data is removed, or loading fails. If everything will be in memory, all
+ * members except `resident`, `budget`, `whole` and `least` are 0.
  */
 typedef struct ebpo_model_plan {
     size_t struct_size;
@@ -151,30 +156,31 @@ typedef struct ebpo_model_plan {
     /* Deepest level that will stay in memory. */
     int cut_level;
 
-    /* Budget that ebpo_model_new will use. 0: none. */
+    /* Budget that ebpo_model_new will use, in bytes. 0: no limit. */
     uint64_t budget;
 
     /*
+     * Budgets in bytes.
      * - whole: the smallest budget with which everything is in memory (for remote files, see
      *   ebpo_model_options.memory).
-     * - least: a budget that ebpo_model_new accepts, slightly above the smallest one. With this
+     * - least: a budget slightly above the smallest budget that ebpo_model_new accepts. With this
      *   budget, some subtrees of average size are in memory at a time.
      */
     uint64_t whole, least;
 
     /*
-     * Parts of the budget in bytes. Subtrees use the rest.
-     * - top: levels 0 to cut_level.
-     * - chunks: decoded chunks.
-     * - skeletons: data that is kept of subtrees after they leave memory.
+     * Parts of the budget in bytes. Subtrees use the remaining part.
+     * - top: for levels 0 to cut_level.
+     * - chunks: for decoded chunks.
+     * - skeletons: for data that is kept of subtrees after they leave memory.
      */
     uint64_t top, chunks, skeletons;
 
     /*
      * - subtrees: number of subtrees below the cut level.
-     * - subtree_bytes: size of the average subtree in memory.
-     * - subtrees_held: number of average subtrees that fit in memory. Fewer fit while a subtree is
-     *   loaded, because loading needs buffers.
+     * - subtree_bytes: size of the average subtree in memory, in bytes.
+     * - subtrees_held: number of subtrees of average size that fit in memory. Fewer subtrees fit
+     *   while a subtree is being loaded, because loading needs buffers.
      */
     uint64_t subtrees, subtree_bytes, subtrees_held;
 } ebpo_model_plan;
@@ -185,7 +191,7 @@ typedef struct ebpo_model_plan {
  * Estimates memory use for a budget from the counts in the file header; reads no chunks. With both
  * a cut level and a budget, ebpo_model_new may still find that the levels exceed the budget.
  *
- * EBPO_E_LIMIT: the budget is too small; the message names a sufficient one.
+ * EBPO_E_LIMIT: the budget is too small; the message names a sufficient budget.
  *
  * Threads: any.
  */
@@ -210,35 +216,38 @@ typedef struct ebpo_model_stats {
     /* Deepest level that stays in memory; 0 if everything is in memory. */
     int cut_level;
 
-    /* Current and peak memory in bytes: tree, caches, buffers for loading. */
+    /* Current and peak memory of the tree, the caches and the buffers for loading, in bytes. */
     uint64_t memory, memory_peak;
 
-    /* Budget in bytes. 0: none. */
+    /* Budget in bytes. 0: no limit. */
     uint64_t budget;
 
-    /* Number of times that a query found a subtree in memory (hits) or loaded it (loads). */
+    /* Number of times that a query found a subtree in memory (hits) or loaded a subtree (loads). */
     uint64_t hits, loads;
 
-    /* Number of subtrees loaded in the background. */
+    /* Number of subtrees that the background thread loaded. */
     uint64_t prefetched;
 
     /* Number of subtrees removed from memory. */
     uint64_t evicted;
 
-    /* Bytes and number of reads from the source, including opening of the file. */
+    /*
+     * Number of bytes read from the source, and number of reads. Both include the opening of the
+     * file.
+     */
     uint64_t bytes_read, reads;
 
-    /* Duration of ebpo_model_new. */
+    /* Duration of ebpo_model_new, in seconds. */
     double open_seconds;
 
-    /* Time that queries waited for subtrees. */
+    /* Time that queries waited for subtrees, in seconds. */
     double load_seconds;
 
     /*
      * leaves: number of leaves in memory.
      *
-     * leaves_of_kind: number of frequently queried leaves of each kind. The kind of other leaves is
-     * not determined. In the leaf's cell, the solid is bounded by:
+     * leaves_of_kind: number of leaves of each kind. The kind of a leaf is determined only after
+     * many queries in its cell. In the leaf's cell, the solid is bounded by:
      * - [0] faces in any arrangement
      * - [1] one plane
      * - [2] two planes
@@ -255,23 +264,23 @@ typedef struct ebpo_model_stats {
     uint64_t leaves_one_cell_face;
 
     /*
-     * Counts for distance queries while not everything was in memory. To get the mean cost of a
+     * Counts for distance queries of models that are partly in memory. To get the mean cost of a
      * query, divide distance_subtrees and distance_loads by distances.
-     * - distances: number of points.
+     * - distances: number of queried points.
      * - distance_subtrees: number of searched subtrees.
      * - distance_loads: number of loaded subtrees, including those for the sign.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
     /*
-     * Part of `memory` in bytes for skeletons: data that is kept of subtrees after they leave
-     * memory. Skeletons avoid unnecessary loads.
+     * Bytes of `memory` that skeletons use. A skeleton is data that is kept of a subtree after the
+     * subtree has left memory; it avoids unnecessary loads.
      */
     uint64_t skeleton_bytes;
 
     /*
-     * Number of points whose winding number equals the boundary of the rule, or was not decided
-     * (ebpo_model_options.threshold).
+     * Number of points that counted as outside because their winding number is exactly at the
+     * threshold, or the comparison was not decided (ebpo_model_options.threshold).
      */
     uint64_t ties;
 } ebpo_model_stats;
@@ -290,15 +299,15 @@ EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_st
 /*
  * Makes a budget for ebpo_model_options.budget. The budget limits the memory of all its models
  * together, as ebpo_model_options.memory limits the memory of one model. The least recently used
- * subtrees and chunks of any model are removed first; levels above the cut levels and models
- * entirely in memory stay. Models do not share data, even those of the same file: use one model for
- * several instances of a file.
+ * subtrees and chunks of any model are removed first. Levels down to the cut level, and models
+ * entirely in memory, are not removed. Two models of the same file share no data, so use one model
+ * for several instances of a file.
  *
  * bytes   greater than 0
  *
- * EBPO_E_LIMIT: too few bytes for any model.
+ * EBPO_E_LIMIT: the budget is too small for any model.
  *
- * Threads: any; different threads may query its models.
+ * Threads: any; different threads may query the models of one budget at the same time.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out,
                                                    ebpo_error *error);
@@ -314,7 +323,7 @@ EBPO_API void ebpo_budget_free(ebpo_budget *budget);
 typedef struct ebpo_budget_stats {
     size_t struct_size;
 
-    /* Bytes: the budget, the current use and the peak use. */
+    /* Budget, current memory use and peak memory use, in bytes. */
     uint64_t budget, memory, memory_peak;
 } ebpo_budget_stats;
 
@@ -353,15 +362,15 @@ EBPO_API void ebpo_context_free(ebpo_context *context);
 /* ---- rules for all queries ---- */
 
 /*
- * Points are three finite doubles in the model's unit; for other values, queries return
- * EBPO_E_ARGUMENT with the index of the point. A query of many points gives the same results as
- * single queries. On failure results are unspecified. All queries can return the errors of reading,
- * and EBPO_E_LIMIT (ebpo_model_new).
+ * Points are three finite doubles in the model's unit. For other values, queries return
+ * EBPO_E_ARGUMENT; the message gives the index of the point. A query of many points gives the same
+ * results as single queries. On failure results are unspecified. All queries can return the errors
+ * of reading, and EBPO_E_LIMIT (ebpo_model_new).
  *
- * Options member `done`, for files whose bytes arrive asynchronously (async.h): [count] flags of
- * the items of a batch, or NULL. Clear them before the first call. The call computes items whose
- * flag is false, and sets the flag of each completed item, even if the call returns EBPO_E_PENDING.
- * Keep flags and results for the repeated call.
+ * Member `done` of options: [count] flags of the items of a batch, for files whose bytes arrive
+ * asynchronously (async.h); NULL: no flags. Set all flags to false before the first call. The call
+ * computes the items whose flag is false, and sets the flag of each completed item to true, even if
+ * the call returns EBPO_E_PENDING. Keep flags and results for the repeated call.
  */
 
 /* Value of `level` for exact results. */
@@ -369,11 +378,14 @@ enum { EBPO_LEVEL_ALL = -1 };
 
 /* ---- point in solid ---- */
 
-/* Use of envelopes for early decisions. Results do not depend on it. */
+/*
+ * Gray nodes in which a query tests if the point is outside the envelope, which decides early that
+ * the point is outside the solid. Results do not depend on this choice.
+ */
 typedef enum ebpo_envelopes {
-    EBPO_ENVELOPES_AUTO = 0, /* where they avoid loading */
-    EBPO_ENVELOPES_USE = 1,  /* at every gray node on the path (EBP 2017, 4.2.1) */
-    EBPO_ENVELOPES_SKIP = 2  /* never */
+    EBPO_ENVELOPES_AUTO = 0, /* nodes where the test can avoid loading */
+    EBPO_ENVELOPES_USE = 1,  /* every gray node on the path (EBP 2017, 4.2.1) */
+    EBPO_ENVELOPES_SKIP = 2  /* none */
 } ebpo_envelopes;
 
 /* Options of ebpo_inside and ebpo_inside_many. */
@@ -381,9 +393,9 @@ typedef struct ebpo_inside_options {
     size_t struct_size;
 
     /*
-     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. For a
-     * surface, whose envelopes do not contain its inside, EBPO_MAYBE is the result in all cells of
-     * gray nodes and leaves. EBPO_LEVEL_ALL: exact results.
+     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. The
+     * envelopes of a surface contain its faces, but not its inside. So for a surface, the result in
+     * every cell of a gray node or leaf is EBPO_MAYBE. EBPO_LEVEL_ALL: exact results.
      */
     int level;
 
@@ -391,12 +403,12 @@ typedef struct ebpo_inside_options {
 
     /*
      * The query stops after about this many nanoseconds per point, and returns a certain result or
-     * EBPO_MAYBE. 0: no deadline. The query completes a subtree or leaf that it has
-     * started.
+     * EBPO_MAYBE. 0: no deadline. A subtree that is being loaded, and a leaf that is being tested,
+     * are completed after the deadline.
      */
     uint64_t deadline_ns;
 
-    /* Flags of completed points; see "rules for all queries". */
+    /* Flags of completed points; see the section "rules for all queries". */
     bool *done;
 } ebpo_inside_options;
 
@@ -419,15 +431,15 @@ typedef struct ebpo_inside_result {
     int32_t where;
 
     /*
-     * Winding number; for a surface, 1 inside and 0 outside. 0 for EBPO_ON and EBPO_MAYBE. With a
-     * level or deadline, 0 also if an envelope decided that the point is outside. The true winding
-     * number may then differ from 0 with rules other than EBPO_RULE_NONZERO.
+     * Winding number; for a surface, 1 inside and 0 outside. For EBPO_ON and EBPO_MAYBE, it is 0.
+     * With a level or deadline, it is also 0 if an envelope decided that the point is outside. For
+     * rules other than EBPO_RULE_NONZERO, the true winding number may then differ from 0.
      */
     int32_t winding;
 
     /*
-     * EBPO_MAYBE: the diagonal of the deepest visited cell, which is an upper bound of the distance
-     * to the surface. Else 0.
+     * For EBPO_MAYBE: length of the diagonal of the deepest visited cell, which is an upper bound
+     * of the distance to the surface. In other cases 0.
      */
     double doubt;
 } ebpo_inside_result;
@@ -461,12 +473,14 @@ typedef struct ebpo_winding_bounds {
 } ebpo_winding_bounds;
 
 /*
- * Bounds the winding numbers of points[count][3], into out[count]. For a surface with
- * EBPO_PART_BORDER, hi - lo is at most `width` (at least 0), where double precision allows it: down
- * to about 1e-14 for small meshes, but only to much larger values near an edge of the border. For a
- * solid, both bounds are the integer winding number.
+ * Computes bounds of the winding numbers of points[count][3], into out[count]. For a solid, both
+ * bounds are the integer winding number. For a surface with EBPO_PART_BORDER, hi - lo is at most
+ * `width` if double precision suffices. The least possible hi - lo is about 1e-14 for small meshes,
+ * and much greater near an edge of the border.
  *
- * EBPO_E_NOT_SOLID, EBPO_E_ABSENT as for ebpo_inside.
+ * width   at least 0
+ *
+ * EBPO_E_NOT_SOLID, EBPO_E_ABSENT: as for ebpo_inside.
  *
  * Threads: one at a time per context.
  */
@@ -509,7 +523,7 @@ typedef struct ebpo_distance_options {
     /* As in ebpo_inside_options. */
     uint64_t deadline_ns;
 
-    /* Faces farther away are ignored; in the model's unit, at least 0. INFINITY: no limit. */
+    /* Faces farther away than this are ignored. In the model's unit, at least 0, or INFINITY. */
     double max_distance;
 
     /*
@@ -536,32 +550,35 @@ typedef struct ebpo_distance_options {
             false, true, { 0 }, NULL                                                            \
     }
 
-/* Index of no face. */
+/* Value of a face index if there is no face. */
 #define EBPO_NO_FACE UINT64_MAX
 
 /* Result of ebpo_distance. Lengths are in the model's unit. */
 typedef struct ebpo_distance_result {
     /*
-     * Distance, correctly rounded. Negative inside a solid (-0.0 if it underflows), unless
-     * unsigned_distance is true. INFINITY without a face: no face is within max_distance. INFINITY
-     * with a face: the distance is larger than every double. NAN: not determined, see `lo` and
-     * `hi`.
+     * Distance, correctly rounded. It is negative inside a solid (-0.0 if it underflows), unless
+     * unsigned_distance is true. INFINITY, and `face` is EBPO_NO_FACE: no face is within
+     * max_distance. INFINITY, and `face` is an index: the distance is larger than every double.
+     * NAN: the distance is not determined, but `lo` and `hi` bound it.
      */
     double distance;
 
     /* Bounds of the exact unsigned distance; equal for exact results. */
     double lo, hi;
 
-    /* Point of the model nearest to the given point, rounded. NAN: no such point was determined. */
+    /*
+     * Point of the model that is nearest to the queried point, rounded. NAN: no such point was
+     * determined.
+     */
     double point[3];
 
-    /* Unit normal of the face, outward by its orientation. (0, 0, 0) for a face without area. */
+    /* Unit normal of the nearest face, outward by its orientation; (0, 0, 0) if it has no area. */
     double normal[3];
 
     /*
      * Nearest face: its source index if the file has source indices, else its index in the file. Of
-     * several faces at exactly the same distance, the first one in the file. EBPO_NO_FACE: none,
-     * for example with a level, a deadline or EBPO_DISTANCE_ENVELOPE.
+     * several faces at exactly the same distance, the first one in the file. EBPO_NO_FACE: no face
+     * was determined, for example with a level, a deadline or EBPO_DISTANCE_ENVELOPE.
      */
     uint64_t face;
 } ebpo_distance_result;
@@ -595,14 +612,15 @@ typedef struct ebpo_within_options {
     size_t struct_size;
 
     /*
-     * Maximum distance of faces, in the model's unit, compared exactly; at least 0. INFINITY: all.
+     * Maximum distance of the faces that are passed, in the model's unit, compared exactly; at
+     * least 0. INFINITY: all faces.
      */
     double radius;
 
-    /* Maximum number of faces, nearest first; 0: all. */
+    /* Maximum number of faces that are passed, nearest first. 0: all faces. */
     uint64_t most;
 
-    /* False: normals are NAN, which is faster. */
+    /* True: normals are computed. False: normals are NAN, which is faster. */
     bool normals;
 
     uint8_t reserved[7];
@@ -627,22 +645,22 @@ typedef struct ebpo_near_face {
     uint64_t reserved[3];
 } ebpo_near_face;
 
-/* Callback. It returns false to stop the call. */
+/* Callback that gets a face. It returns false to stop the call. */
 typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
 
 /*
- * Passes the faces nearest to a point, or all faces within a radius, to `take`: each once, in
- * ascending order of exact distance. Faces at the same distance are in the order of the file, so
- * the first face is that of ebpo_distance.
+ * Passes the faces nearest to a point, or all faces within a radius, to `take`. Each face is passed
+ * once, in ascending order of exact distance. Faces at the same distance are in the order of the
+ * file, so the first face is the face that ebpo_distance returns.
  *
  * options   NULL: all faces of the model
  * take      must not use the context
  *
- * Uses at most 16 MiB besides the model's budget, for any number of faces: a search finds at most
- * 65,536 faces and passes them to `take`, and the next search finds the faces that follow. Without
- * `most`, the first three searches find fewer faces: 256, 2,048 and 16,384. Subtrees are loaded in
- * order of distance, and only if they may contain a result. Each subtree is loaded once, if the
- * budget is large enough to keep it.
+ * Uses at most 16 MiB besides the model's budget, for any number of faces. For this reason, a
+ * search finds at most 65,536 faces and passes them to `take`, and the next search finds the faces
+ * that follow. If `most` is 0, the first three searches find fewer faces: 256, 2,048 and 16,384.
+ * Subtrees are loaded in order of distance, and only if they may contain a result. A subtree is
+ * loaded once if the budget is large enough to keep it.
  *
  * EBPO_E_ABSENT: as for ebpo_distance. In a subset, the call may pass some faces before it returns
  * this error; these faces are correct. EBPO_E_ARGUMENT: returned before the first face.
@@ -660,9 +678,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
 /* A face that a ray hits. */
 typedef struct ebpo_ray_hit {
     /*
-     * Parameter of the hit, which is at origin + t direction; correctly rounded. INFINITY with a
-     * face: t is larger than every double, because the direction is very short. A direction longer
-     * by a power of two gives a finite t for the same face. Hits are sorted by exact values of t.
+     * Parameter of the hit, which is at origin + t direction; correctly rounded. INFINITY although
+     * `face` is an index: t is larger than every double, because the direction is very short. If
+     * the direction is multiplied by a power of two, t is finite for the same face. Hits are sorted
+     * by exact values of t.
      */
     double t;
 
@@ -670,17 +689,17 @@ typedef struct ebpo_ray_hit {
     uint64_t face;
 
     /*
-     * 1: the ray enters: it passes through the interior of the face against the face's normal. -1:
-     * the ray exits: it passes through along the normal. 0: the ray hits an edge or a vertex, or is
-     * in the face's plane, or the face has no area.
+     * 1: the ray enters: it passes through the interior of the face, against the face's normal. -1:
+     * the ray exits: it passes through the interior of the face, along the normal. 0: the ray hits
+     * an edge or a vertex, or is in the face's plane, or the face has no area.
      */
     int32_t side;
 } ebpo_ray_hit;
 
 /*
- * Finds the first triangle (including its boundary) that intersects the ray origin + t direction, t
- * from 0 to t_max. Of several triangles at the same t, the first one in the file is the result.
- * *hit is false if no triangle intersects the ray.
+ * Finds the first triangle (including its boundary) that intersects the ray origin + t direction
+ * with t from 0 to t_max. Of several triangles at the same t, the first one in the file is the
+ * result. *hit is false if no triangle intersects the ray.
  *
  * direction   of any length except 0
  * t_max       at least 0; INFINITY: unbounded
@@ -705,7 +724,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Tests if the ray intersects any triangle. Faster than ebpo_ray_first, with the same errors.
+ * Tests if the ray intersects any triangle, which is faster than ebpo_ray_first. Errors are those
+ * of ebpo_ray_first.
  *
  * Threads: one at a time per context.
  */
@@ -714,14 +734,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Triangles that count as hit, by the side from which the ray comes. Only the normal of a triangle
- * decides, also if the ray hits an edge or a vertex. An edge or a vertex belongs to all its
- * triangles, so there are no gaps between triangles. Triangles without area, and those whose plane
- * contains the ray, count only with EBPO_RAY_BOTH.
+ * Triangles that count as hit, by the side from which the ray comes. The normal of the triangle
+ * decides, even if the ray hits an edge or a vertex. An edge or a vertex belongs to all its
+ * triangles, so there are no gaps between triangles. Triangles without area, and triangles whose
+ * plane contains the ray, count only with EBPO_RAY_BOTH.
  */
 typedef enum ebpo_ray_sides {
     EBPO_RAY_BOTH = 0,  /* all triangles */
-    EBPO_RAY_FRONT = 1, /* triangles hit against their normal: from outside, for a solid */
+    EBPO_RAY_FRONT = 1, /* triangles hit against their normal (for a solid: from outside) */
     EBPO_RAY_BACK = 2   /* triangles hit along their normal */
 } ebpo_ray_sides;
 
@@ -732,8 +752,8 @@ typedef struct ebpo_ray_options {
     ebpo_ray_sides sides;
 
     /*
-     * 0: all cores. Fewer threads are used for few rays, and one thread for loading modes other
-     * than EBPO_LOAD_CACHE.
+     * Number of threads. 0: all cores. Fewer threads are used for few rays, and one thread for
+     * loading modes other than EBPO_LOAD_CACHE.
      */
     unsigned threads;
 
@@ -746,17 +766,17 @@ typedef struct ebpo_ray_options {
         sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 0, NULL \
     }
 
-/* Ray origin + t direction, as in ebpo_ray_first. */
+/* The ray origin + t direction with t from 0 to t_max, as in ebpo_ray_first. */
 typedef struct ebpo_ray {
     double origin[3], direction[3];
     double t_max;
 } ebpo_ray;
 
 /*
- * Finds the first hit of rays[count] as ebpo_ray_first does, into out[count]. Without a hit, t is
- * INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or other rays. If not
- * everything is in memory, rays are ordered along a curve by their entry into the model, so that
- * each subtree is loaded only a few times.
+ * Finds the first hit of each of rays[count] as ebpo_ray_first does, into out[count]. For a ray
+ * without a hit, t is INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or
+ * other rays. If not everything is in memory, the rays are processed along a curve of the points
+ * where they enter the model, so that each subtree is loaded only a few times.
  *
  * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
  * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
@@ -770,7 +790,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first_many(ebpo_context *context, co
                                                        ebpo_ray_hit *out, ebpo_error *error);
 
 /*
- * Tests rays[count] as ebpo_ray_any does, into any[count]; see ebpo_ray_first_many.
+ * Tests each of rays[count] as ebpo_ray_any does, into any[count]. Order of processing and errors
+ * are those of ebpo_ray_first_many.
  *
  * Threads: one at a time per context.
  */
@@ -780,9 +801,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, cons
                                                      ebpo_error *error);
 
 /*
- * Finds all hits of rays[count] as ebpo_ray_all does; see ebpo_ray_first_many. The hits
- * of ray i are hits[begin[i]] to hits[begin[i + 1] - 1]; `begin` has count + 1 items. `hits` and
- * `begin` are valid until the next call with the context.
+ * Finds all hits of each of rays[count] as ebpo_ray_all does. The hits of ray i are hits[begin[i]]
+ * to hits[begin[i + 1] - 1]; `begin` has count + 1 items. `hits` and `begin` are valid until the
+ * next call with the context. Order of processing and errors are those of ebpo_ray_first_many.
  *
  * Threads: one at a time per context.
  */
@@ -798,21 +819,21 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, cons
 enum { EBPO_SAMPLER_MAX = 16 };
 
 /*
- * Attributes of a file (ebpo_file_attribute), for sampling at points on faces. Threads may share a
- * sampler.
+ * Some attributes of a file (ebpo_file_attribute), whose values can be sampled at points on faces.
+ * Threads may share a sampler.
  */
 typedef struct ebpo_sampler ebpo_sampler;
 
 /*
- * Reads the named attributes, and the data to find the values of a face. This memory is not part of
- * the budgets of models: the values, the maps if present (4 bytes per face), and for attributes of
- * vertices the mesh (12 bytes per face, 12 or 24 bytes per vertex). The file must stay open as long
- * as the sampler.
+ * Reads the named attributes, and the data to find the values of a face. The memory of a sampler is
+ * not part of the budgets of models. It contains the values, the source indices of faces if the
+ * file has them (4 bytes per face), and for attributes of vertices the mesh (12 bytes per face, 12
+ * or 24 bytes per vertex). The file must stay open as long as the sampler exists.
  *
- * names   separated by commas, such as "quality" or "red,green,blue". "face:red" also gives the
- *         element. Without an element, attributes of vertices are preferred to those of faces. Of
- *         several attributes with equal names, the first one in the file is used. Attributes whose
- *         values are lists are not supported.
+ * names   names separated by commas, such as "quality" or "red,green,blue". A name may begin with
+ *         the element, as in "face:red". Without an element, attributes of vertices are preferred
+ *         to those of faces. Of several attributes with equal names, the first one in the file is
+ *         used. Attributes whose values are lists are not supported.
  *
  * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
  * EBPO_SAMPLER_MAX names. Other errors are those of reading.
@@ -838,10 +859,11 @@ EBPO_API void ebpo_sampler_free(ebpo_sampler *sampler);
 EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
 
 /*
- * Samples attributes at points on faces. Points and faces are those that distances (`point` and
- * `face`) and rays (origin + t direction) return. An attribute of faces gives the face's value. An
- * attribute of vertices gives a mean of the values A, B and C at the corners a, b and c, weighted
- * by the position of the point p. Values that are labels are also averaged.
+ * Samples attributes at points on faces. Points and faces are results of distance queries (`point`
+ * and `face`) or ray queries (origin + t direction, and `face`). The value of an attribute of faces
+ * is the face's value. The value of an attribute of vertices is a mean of the values A, B and C at
+ * the corners a, b and c, weighted by the position of the point p. Labels are averaged like all
+ * other values.
  *
  * The weights are computed in doubles, without fused operations. The vectors e = b - a, f = c - a
  * and d = p - a are multiplied by one power of two, so that the greatest absolute coordinate of e
@@ -852,13 +874,13 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  *     w_c = ((e.e)(d.f) - (e.f)(d.e)) / D, or 0 if negative
  *     w_a = 1 - w_b - w_c, or 0 if negative
  *
- * Each weight is divided by the sum of the three. If D is at most 2^-900, the face counts as a face
- * without area. The weights are then those of the point nearest to p on the longest of the edges
- * ab, ac, bc (the first of several with equal length).
+ * Each weight is divided by the sum of the three weights. If D is at most 2^-900, the face counts
+ * as a face without area. The weights are then those of the point nearest to p on the longest of
+ * the edges ab, ac, bc (the first of several edges with equal length).
  *
- * The value is (w_a A + w_b B) + w_c C without terms of weight 0, clamped to the range of the
- * values used. At a corner, the result is the corner's value. If the three values are equal, the
- * result is this value.
+ * The value is (w_a A + w_b B) + w_c C, without the terms whose weight is 0. It is clamped to the
+ * range of the values in the sum. At a corner, the result is the corner's value. If the three
+ * values are equal, the result is this value.
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
@@ -890,25 +912,25 @@ enum { EBPO_TRIANGLES_MAX = 1024 };
 
 /* A batch of triangles; valid until the callback returns. */
 typedef struct ebpo_triangles {
-    /* 1 to EBPO_TRIANGLES_MAX */
+    /* Number of triangles, 1 to EBPO_TRIANGLES_MAX. */
     uint64_t count;
 
-    /* [count] corners, in the model's unit: exactly the stored values */
+    /* [count] coordinates of the three corners, in the model's unit: exactly the stored values */
     const double (*corners)[3][3];
 
-    /* [count] faces: indices as in ebpo_distance_result; file_faces: indices in the file */
+    /* [count] faces: indices as in ebpo_distance_result. file_faces: indices in the file */
     const uint64_t *faces, *file_faces;
 
     uint64_t reserved[4];
 } ebpo_triangles;
 
-/* Callback. It returns false to stop the call. */
+/* Callback that gets a batch. It returns false to stop the call. */
 typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 
 /*
- * Passes the triangles of ebpo_faces_in_box with their corners to `take`, each once, in batches.
- * Besides the model's budget, this call needs 4 bytes for each triangle of one subtree (or of the
- * result, if everything is in memory).
+ * Passes the triangles that ebpo_faces_in_box finds, with their corners, to `take` in batches. Each
+ * triangle is passed once. Besides the model's budget, this call needs 4 bytes for each triangle of
+ * one subtree (or of the result, if everything is in memory).
  *
  * Triangles are in the order of the file if everything is in memory. Else the subtrees below the
  * cut level are in depth-first order, and the triangles of a subtree are in the order of the file.
@@ -934,17 +956,18 @@ typedef struct ebpo_solid_volume {
     /*
      * Bounds of the volume; 0 and 0 for a surface.
      *
-     * lo == hi: the volume is known except for rounding. This requires that no component intersects
+     * lo == hi: the volume is known except for rounding, provided that no component intersects
      * itself, which is not tested.
      *
-     * lo < hi: components intersect or repeat each other, or the mesh is not a 2-manifold. If the
-     * argument `info` is NULL, the bounds are then 0 and INFINITY.
+     * lo < hi: components intersect or repeat each other, or the mesh is not a 2-manifold. In this
+     * case the bounds are 0 and INFINITY if the argument `info` is NULL.
      */
     double lo, hi;
 
     /*
-     * Integral of the winding number over space; equal to the volume if winding numbers are only 0
-     * and 1. A region with winding number 2 counts twice; a region with -1 is subtracted.
+     * Integral of the winding number over space. It is equal to the volume if all winding numbers
+     * are 0 or 1. A region with winding number 2 counts twice; a region with winding number -1 is
+     * subtracted.
      */
     double integral;
 } ebpo_solid_volume;
@@ -954,11 +977,12 @@ typedef struct ebpo_solid_volume {
 /*
  * Computes bounds of the volume of the solid, in negligible time.
  *
- * report    of the mesh (ebpo_mesh_check); for a file: &info->report
- * rule      for a file: info->rule
- * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, so the volume of several
- *           components is unknown
- * info      of the mesh's file, whose black cells and envelopes bound the volume; NULL: no file
+ * report    report on the mesh (ebpo_mesh_check); for a file: &info->report
+ * rule      rule for winding numbers; for a file: info->rule
+ * shells    shells of the mesh (ebpo_mesh_count_shells); NULL: not counted, so the volume of
+ *           several components is unknown
+ * info      metadata of the mesh's file, whose black cells and envelopes bound the volume; NULL:
+ *           no file
  *
  * Threads: any.
  */
@@ -975,31 +999,38 @@ typedef struct ebpo_mass {
     double area;
 
     /*
-     * Volume of the solid (ebpo_solid_volume_of); NAN if unknown, 0 for a surface without
-     * EBPO_PART_BORDER. If the volume is 0, the following members are 0. A surface with
-     * EBPO_PART_BORDER is measured with its caps (format-spec/border.md). Its volume is known if it
-     * is one component without edges of more than two faces or of opposed faces; intersections are
-     * not tested.
+     * Volume of the solid (ebpo_solid_volume_of). NAN: unknown. 0 for a surface without
+     * EBPO_PART_BORDER. If the volume is 0, `centroid` and `inertia` are 0.
+     *
+     * A surface with EBPO_PART_BORDER is measured with its caps, which are triangles that close its
+     * border (format-spec/border.md). The volume of this surface is known if the surface has one
+     * component, every edge has at most two faces, and the two faces of an edge have the same
+     * orientation. Intersections are not tested.
      */
     double volume;
 
-    /* Centroid of the solid. If the volume is unknown, the winding number is the density. */
+    /*
+     * Centroid of the solid. If the volume is unknown: centroid of a body whose density at each
+     * point is the winding number.
+     */
     double centroid[3];
 
-    /* Inertia tensor about the centroid, for density 1. */
+    /* Inertia tensor about `centroid`, for density 1 (or the density of `centroid`). */
     double inertia[3][3];
 
     /*
      * Area, volume and inertia in a scaled unit, which is 2^exponent times the model's unit. The
-     * model is about 1 long in the scaled unit. These members are for very large or very small
-     * models, whose members above are infinite or 0.
+     * model is about 1 long in the scaled unit. These members are useful for very large or very
+     * small models, for which `area`, `volume` and `inertia` are infinite or 0.
      */
     double scaled_area, scaled_volume, scaled_inertia[3][3];
     int64_t exponent;
 
     /*
-     * Bounds of the volume. For a solid, both are `volume` if it is known; for a surface, `volume`
-     * minus and plus the errors below. 0 and INFINITY if the volume is not known.
+     * Bounds of the volume. If it is known: for a solid, both bounds are `volume`; for a surface
+     * with EBPO_PART_BORDER, `volume` minus and plus the sum of integral_error and caps_integral.
+     * If it is not known: for a solid, the bounds of ebpo_solid_volume; for a surface, 0 and
+     * INFINITY.
      */
     double volume_lo, volume_hi;
 
@@ -1010,17 +1041,17 @@ typedef struct ebpo_mass {
     double integral, scaled_integral;
 
     /*
-     * The following members are for surfaces with EBPO_PART_BORDER, in the model's unit; else 0.
-     *
-     * Bounds of the rounding errors of `integral`, and of `centroid` on each axis.
+     * For surfaces with EBPO_PART_BORDER, else 0: bounds of the rounding errors of `integral`, and
+     * of `centroid` on each axis; in powers of the model's unit.
      */
     double integral_error, centroid_error;
 
     /*
-     * Greatest difference that other caps could make to `integral` and to the centroid of the
-     * winding number (INFINITY: no bound). The other caps are in the convex hulls of their loops.
-     * With our cap of the same loop they bound winding numbers -1, 0 and 1 only, times the loop's
-     * weight.
+     * For surfaces with EBPO_PART_BORDER, else 0: greatest difference that other caps could make to
+     * `integral`, and to the centroid of the winding number (INFINITY: no bound). This holds for
+     * caps that satisfy two conditions. First, each cap is in the convex hull of its loop. Second,
+     * the closed mesh of this cap and the cap of format-spec/border.md, reversed, has no winding
+     * numbers other than -1, 0 and 1, times the weight of the loop (border.md).
      */
     double caps_integral, caps_centroid;
 } ebpo_mass;
