@@ -418,8 +418,8 @@ typedef struct ebpo_border_loops {
     uint64_t loop_count, point_count;
 
     /*
-     * [loop_count][2] number of points of each loop, at least 3, and weight of the loop, at least 1:
-     * number of times that the loop counts
+     * [loop_count][2] number of points of each loop, at least 3; weight of each loop, at least 1,
+     * which is the number of times that the loop counts
      */
     uint32_t *loop;
 

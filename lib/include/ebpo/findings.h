@@ -35,22 +35,22 @@ typedef enum ebpo_finding_kind {
 #define EBPO_FINDING_KINDS 10
 
 /*
- * Returns the name of the member of ebpo_mesh_report, such as "boundary_edges". NULL: the kind is
- * not valid.
+ * Returns the name of the member of ebpo_mesh_report that counts findings of a kind, such as
+ * "boundary_edges". Returns NULL if the kind is not valid.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_finding_name(int32_t kind);
 
 /*
- * Gets the colour of a kind in the picture: red, green and blue, 0 to 255 each. Grey for an invalid
- * kind.
+ * Gets the colour of a kind in the picture: red, green and blue, 0 to 255 each. An invalid kind
+ * gets grey.
  *
  * Threads: any.
  */
 EBPO_API void ebpo_finding_colour(int32_t kind, uint8_t rgb[3]);
 
-/* Component of an unreferenced vertex. */
+/* Value of `component` of ebpo_mesh_finding for an unreferenced vertex. */
 #define EBPO_NO_COMPONENT UINT32_MAX
 
 /* One finding. Indices are those of the source. */
@@ -59,8 +59,8 @@ typedef struct ebpo_mesh_finding {
     int32_t kind;
 
     /*
-     * Index of the component (faces that share vertices); components are numbered by their lowest
-     * faces. EBPO_NO_COMPONENT: the vertex is unreferenced.
+     * Index of the component, which is a set of faces that are connected by vertices. Components
+     * are in the order of their lowest face indices. EBPO_NO_COMPONENT: the vertex is unreferenced.
      */
     uint32_t component;
 
@@ -71,18 +71,21 @@ typedef struct ebpo_mesh_finding {
     uint64_t vertex[2];
 
     /*
-     * For an edge or a vertex: all faces that use it. For a repeated face: this face, and the first
-     * face with the same vertices. For another face: this face. Ascending; valid until the callback
-     * returns. NULL: none.
+     * [face_count] indices of faces, ascending; valid until the callback returns. For an edge or a
+     * vertex: all faces that use the edge or vertex (NULL if there are none). For a repeated face:
+     * this face, and the first face with the same vertices. For any other face: this face.
      */
     const uint64_t *faces;
     uint64_t face_count;
 
-    /* Middle of the edge, the vertex, or the mean of the face's corners, rounded. */
+    /*
+     * Middle of the edge, position of the vertex, or mean of the face's corners; rounded. In the
+     * unit of the mesh.
+     */
     double point[3];
 } ebpo_mesh_finding;
 
-/* Callback. It returns false to stop the call. */
+/* Callback that gets a finding. It returns false to stop the call. */
 typedef bool (*ebpo_findings_fn)(void *user, const ebpo_mesh_finding *finding);
 
 /* Options of ebpo_mesh_findings. */
@@ -94,11 +97,11 @@ typedef struct ebpo_findings_options {
     ebpo_progress progress;
 
     /*
-     * Binary PLY file to write, replaced atomically; NULL: none. The file contains the mesh in the
-     * source's order, without dropped faces, and coordinates as doubles. Faces with findings have
-     * the colours of their kinds; all others are grey (200, 200, 200). Comments in the file explain
-     * the colours. Vertices have no colours, because most programs would show these instead of the
-     * colours of faces.
+     * Binary PLY file to write, which is replaced atomically; NULL: no file. The file contains the
+     * mesh in the source's order, without dropped faces; coordinates are doubles. A face with
+     * findings has the colour of its kind; all other faces are grey (200, 200, 200). Comments in
+     * the file explain the colours. Vertices have no colours, because most programs would show the
+     * colours of vertices and not those of faces.
      */
     const char *ply;
 } ebpo_findings_options;
@@ -109,13 +112,13 @@ typedef struct ebpo_findings_options {
     }
 
 /*
- * Checks a mesh as ebpo_mesh_check does, and passes every counted finding to `take`: by kind, then
- * by the lowest face, then by the vertices. Besides the memory of checking, it uses about 80 bytes
- * per finding during sorting and 16 bytes afterwards, from the mesh's workspace; with `ply` also at
- * most 13 bytes per face and vertex.
+ * Checks a mesh as ebpo_mesh_check does, and passes every counted finding to `take`. Findings are
+ * sorted by kind, then by the lowest face, then by the vertices. Besides the memory of checking,
+ * the mesh's workspace provides about 80 bytes per finding during sorting and 16 bytes per finding
+ * afterwards; with `ply`, it also provides at most 13 bytes per face and vertex.
  *
- * take     may be NULL. If it returns false, `ply` is complete nevertheless
- * report   result of ebpo_mesh_check; may be NULL
+ * take     may be NULL. Even if it returns false, the file `ply` is complete
+ * report   receives the result of ebpo_mesh_check; may be NULL
  *
  * Errors are those of ebpo_mesh_check. EBPO_E_IO: also if `ply` cannot be written.
  *

@@ -16,9 +16,9 @@ extern "C" {
 
 /*
  * Named groups of an OBJ file. A group contains the faces that follow a line `g` or `o`, up to the
- * next line of either kind. The name is the rest of the line without surrounding spaces. Groups of
- * equal name are one group. Faces before the first name or under an empty name are in the group
- * "default".
+ * next line `g` or `o`. The name of the group is the text after `g` or `o`, without surrounding
+ * spaces. Groups of equal name are one group. Faces before the first such line, and faces of a
+ * group without a name, are in the group "default".
  */
 typedef struct ebpo_mesh_groups ebpo_mesh_groups;
 
@@ -27,8 +27,8 @@ typedef struct ebpo_mesh_group {
     size_t struct_size;
 
     /*
-     * Name as in the file: any number of any bytes except 0 and line ends. Valid until
-     * ebpo_mesh_groups_free.
+     * Name as in the file: any number of bytes, of any value except 0 and line ends. It is valid
+     * until ebpo_mesh_groups_free.
      */
     const char *name;
 
@@ -80,15 +80,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_groups_get(const ebpo_mesh_groups *
                                                         ebpo_error *error);
 
 /*
- * Makes a component (ebpo_components_new) of each group with faces. Component and group have the
- * same number. A vertex may be in several groups. The components are never cavities, and `closed`
- * is not tested: use ebpo_mesh_check for their meshes.
+ * Makes a component (ebpo_components_new) from each group that has faces. The component has the
+ * same index as the group. A vertex may be in several groups. Components made from groups are never
+ * cavities, and their member `closed` is not computed: use ebpo_mesh_check for their meshes.
  *
  * mesh   the mesh that was read with the groups. It may have been oriented and welded, but no holes
- *        may have been filled. Mesh and groups are borrowed until ebpo_components_free.
+ *        may have been filled. Mesh and groups are borrowed until ebpo_components_free
  * out    freed by ebpo_components_free
  *
- * EBPO_E_ARGUMENT: the groups are NULL or not of this mesh. EBPO_E_FORMAT, EBPO_E_IO.
+ * EBPO_E_ARGUMENT: `groups` is NULL, or was not read with this mesh. EBPO_E_FORMAT, EBPO_E_IO.
  *
  * Threads: any.
  */

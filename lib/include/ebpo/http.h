@@ -10,14 +10,14 @@
  *     ebpo_open_url("https://example.org/model.ebpo.h5", &options, &file, &error);
  *
  * The server must respond to "Range: bytes=a-b" with the status code 206. Opening takes one request
- * for the first 128 KiB, which usually include levels 0 to 4. Later data is fetched in advance in
- * requests of up to 4 MiB, several at a time.
+ * for the first 128 KiB, which usually include levels 0 to 4. Data that is needed later is
+ * prefetched in requests of up to 4 MiB, several at a time.
  *
- * Every response is checked: its range, its size, and the version of the file, which must be the
- * version of the opened file. The version is the size with the ETag (weak or not) or, if there is
- * no ETag, with Last-Modified.
+ * Every response is checked: its range, its size, and the version of the file, which must be equal
+ * to the version at opening. The version consists of the file size and the ETag (weak or not), or
+ * of the file size and Last-Modified if there is no ETag.
  *
- * Without libcurl the functions return EBPO_E_UNSUPPORTED.
+ * If the library was built without libcurl, the functions return EBPO_E_UNSUPPORTED.
  */
 #ifndef EBPO_HTTP_H
 #define EBPO_HTTP_H
@@ -32,18 +32,18 @@ extern "C" {
 typedef struct ebpo_http_options {
     size_t struct_size;
 
-    /* Seconds for name resolution, connection and TLS together; above 0. */
+    /* Maximum time of name resolution, connection and TLS together, in seconds; above 0. */
     double connect_timeout;
 
     /*
-     * Seconds, at least 1. A response slower than 100 bytes a second for this time is aborted and
-     * requested again.
+     * Time in seconds, at least 1. A response that is slower than 100 bytes a second for this time
+     * is aborted and requested again.
      */
     double stall_timeout;
 
     /*
-     * Seconds for one request with all its retries and pauses; above 0. No single read takes longer
-     * than this.
+     * Maximum time of one request with all its retries and pauses, in seconds; above 0. No read
+     * takes longer than this.
      */
     double time_limit;
 
@@ -60,8 +60,9 @@ typedef struct ebpo_http_options {
     unsigned connections;
 
     /*
-     * Memory limit in bytes for prefetched and recently read data. While readers wait for responses
-     * of up to 4 MiB, the limit may be exceeded. This memory is not part of a model's budget.
+     * Maximum memory in bytes for prefetched and recently read data. It may be exceeded while
+     * readers wait for responses, which have up to 4 MiB each. This memory is not part of a model's
+     * budget.
      */
     uint64_t memory;
 
@@ -72,56 +73,57 @@ typedef struct ebpo_http_options {
     uint64_t whole_limit;
 
     /*
-     * True: only the size of the file is compared. For servers that send neither ETag nor
-     * Last-Modified, and for addresses of several servers that send different ETags. A change
-     * during reading may then not be detected.
+     * True: the version is only the file size, so a change of the file may not be detected. For
+     * servers that send neither ETag nor Last-Modified, and for an address that several servers
+     * with different ETags share.
      */
     bool unversioned;
 
     /* True: reads user names and passwords from ~/.netrc. */
     bool netrc;
 
-    /* "name:password" for basic authentication, or NULL. */
+    /* "name:password" for basic authentication. NULL: no basic authentication. */
     const char *user;
 
-    /* Trusted certificates (PEM) instead of those of the system, or NULL. */
+    /* Path of a file of trusted certificates (PEM). NULL: the certificates of the system. */
     const char *ca_file;
 
     /*
-     * Proxy, as for CURLOPT_PROXY of libcurl. NULL: from the environment (http_proxy, https_proxy,
-     * no_proxy). "": none.
+     * Proxy, as for CURLOPT_PROXY of libcurl. NULL: the proxy that the environment names
+     * (http_proxy, https_proxy, no_proxy). "": no proxy.
      */
     const char *proxy;
 
-    /* Header User-Agent. NULL: libebpo/VERSION. */
+    /* Value of the header User-Agent. NULL: libebpo/VERSION. */
     const char *user_agent;
 
     /*
-     * Headers "Name: value", an array terminated by NULL, sent with every request; or NULL. These
-     * headers are not sent after a redirect to another host, port or scheme.
+     * Array of headers "Name: value", terminated by NULL, which are sent with every request. NULL:
+     * no headers. They are not sent after a redirect to another host, port or scheme.
      */
     const char *const *headers;
 
     /*
-     * Cache folder, which keeps fetched bytes for later use. The folder and its parents are made if
-     * missing. Any number of processes may share it. NULL: none.
+     * Path of the cache folder, which keeps fetched bytes for later use. The folder and its parents
+     * are made if missing. Any number of processes may share it. NULL: no cache folder.
      */
     const char *cache_folder;
 
-    /* Size limit of the cache folder in bytes. The least recently used blocks are removed first. */
+    /* Maximum size of the cache folder in bytes. The least recently used blocks are removed. */
     uint64_t cache_bytes;
 
     /*
-     * Called with `stop_user` about ten times a second by another thread. If it returns true,
-     * current and later operations fail with EBPO_E_CANCELLED. NULL: operations are never stopped.
+     * Function that another thread calls with `stop_user` about ten times a second. If it returns
+     * true, current and later operations fail with EBPO_E_CANCELLED. NULL: operations are never
+     * stopped.
      */
     bool (*stop)(void *user);
     void *stop_user;
 
     /*
      * Block size of the cache folder in bytes, a power of two from 4 KiB to 128 KiB; 0: 32 KiB.
-     * Fetched ranges are rounded outward to whole blocks. Smaller blocks reduce the transferred
-     * bytes and increase the number of blocks. Blocks of other sizes are not found.
+     * Fetched ranges are extended to whole blocks. Smaller blocks reduce the transferred bytes and
+     * increase the number of blocks. Blocks of another size that are in the folder are not used.
      */
     unsigned cache_block;
 
@@ -157,20 +159,21 @@ typedef struct ebpo_http_stats {
     uint64_t cache_hits, cache_bytes;
 
     /*
-     * Bytes in the cache folder at opening. cache_held: of this version of the file. cache_others:
-     * of other files and versions.
+     * Number of bytes in the cache folder at opening. cache_held: bytes of this version of the
+     * file. cache_others: bytes of other files and versions.
      */
     uint64_t cache_held, cache_others;
 
-    /* Seconds that readers waited, summed over threads. */
+    /* Time that readers waited, in seconds, summed over threads. */
     double wait_seconds;
 } ebpo_http_stats;
 
 #define EBPO_HTTP_STATS_INIT EBPO_SIZED(ebpo_http_stats)
 
 /*
- * Writes a URL for messages to `out`, without user name, password and the part from "?" on. Names
- * that are not URLs are unchanged. Truncates to `space` bytes. Returns `out`.
+ * Copies a URL to `out` for use in messages, without user name, password and the part from "?" on.
+ * A name that is not a URL is copied unchanged. The result is truncated to `space` bytes. Returns
+ * `out`.
  *
  * Threads: any.
  */
@@ -184,13 +187,14 @@ EBPO_API char *ebpo_url_redact(const char *name, char *out, size_t space);
 EBPO_API bool ebpo_is_url(const char *name);
 
 /*
- * Makes a source for a URL, after the first response was received. Texts of the options are copied.
- * Initialize `out` with EBPO_SOURCE_INIT. Close it by out->close, or pass it to ebpo_open_source.
+ * Sends the first request for a URL, and makes a source when the response has been received. Texts
+ * of the options are copied. Initialize `out` with EBPO_SOURCE_INIT. Close the source by
+ * out->close, or pass it to ebpo_open_source.
  *
  * EBPO_E_IO: the server was not reached, refused the request, or sent wrong responses.
- * EBPO_E_UNSUPPORTED: the server does not support ranges and the file is too large, or the library
- * was built without HTTP. EBPO_E_ARGUMENT: not a URL, options out of range, or a cache folder that
- * cannot be used. EBPO_E_CANCELLED.
+ * EBPO_E_UNSUPPORTED: the server does not support ranges and the file is larger than whole_limit,
+ * or the library was built without libcurl. EBPO_E_ARGUMENT: `url` is not a URL, an option is out
+ * of range, or the cache folder cannot be used. EBPO_E_CANCELLED.
  *
  * Reading can return EBPO_E_IO and EBPO_E_CANCELLED. If the file on the server has changed since
  * opening, all reads fail.
@@ -210,8 +214,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(const char *url, const ebpo_htt
                                                  ebpo_file **out, ebpo_error *error);
 
 /*
- * Gets statistics of network transfers. EBPO_E_ABSENT: the file was not opened by its URL; the
- * statistics are zeros.
+ * Gets statistics of network transfers. EBPO_E_ABSENT: the file was not opened by a URL; all
+ * members of `out` are then 0.
  *
  * Threads: any.
  */

@@ -19,8 +19,8 @@ typedef struct ebpo_limit_options {
     ebpo_progress progress;
 
     /*
-     * 1: volumes as fractions of the root cell, 0 to 1, independent of the model's scale. 0:
-     * volumes in cubic units of the model.
+     * 1: volumes of the result are fractions of the root cell's volume, 0 to 1, independent of the
+     * model's scale. 0: they are in cubic units of the model.
      */
     uint64_t in_root_cells;
 } ebpo_limit_options;
@@ -31,45 +31,46 @@ typedef struct ebpo_limit_options {
     }
 
 /*
- * Result of ebpo_limit_level. Volumes are in cubic units of the model, or as fractions of the root
- * cell (ebpo_limit_options).
+ * Result of ebpo_limit_level. Volumes are in cubic units of the model, or fractions of the root
+ * cell's volume (in_root_cells of ebpo_limit_options).
  */
 typedef struct ebpo_limit {
     size_t struct_size;
 
     /*
-     * Volume of the level: sum over the nodes of ebpo_lod_level; hulls of gray nodes and leaves,
-     * cells of black nodes.
+     * Least possible volume of the level: sum of the volumes of the hulls of gray nodes and leaves,
+     * and of the cells of black nodes. The nodes are those of ebpo_lod_level.
      */
     double volume;
 
-    /* Volume of the hulls of the level's gray nodes alone. */
+    /* Sum of the volumes of the hulls of the level's gray nodes. */
     double gray_volume;
 
     /* Number of computed hulls. */
     uint64_t hulls;
 
-    /* Number of hulls without volume: their points are in a plane or nearly in a plane. */
+    /* Number of hulls without volume, whose points are in a plane or nearly in a plane. */
     uint64_t flat;
 } ebpo_limit;
 
 #define EBPO_LIMIT_INIT EBPO_SIZED(ebpo_limit)
 
 /*
- * Computes the volume of the convex hull of the solid in each cell (for a surface: of its faces
- * there), summed over a level. qhull computes the hull from the parts of faces in the cell, and
- * from the corners of the cell that are inside the solid.
+ * Computes, for each cell of a level, the volume of the convex hull of the part of the solid in the
+ * cell (for a surface: of the parts of faces in the cell), and sums these volumes. qhull computes
+ * the hull from the parts of faces in the cell, and from the corners of the cell that are inside
+ * the solid.
  *
- * The sum is rounded and not certified: use it for comparison. In cubic units of the model, the sum
- * is infinite or 0 if a double cannot hold the volume of a cell, with coordinates beyond about
- * 1e102 or below 1e-102.
+ * The sum is rounded and not certified, so use it only for comparison. In cubic units of the model,
+ * the sum is infinite or 0 if the volume of a cell is out of the range of doubles, that is, with
+ * coordinates beyond about 1e102 or below 1e-102.
  *
  * The decoded tree and mesh are in memory, and a number for each node of the level. The cost of a
  * hull depends on the faces in the cell. Memory and time are not limited; `progress` can stop the
  * call.
  *
- * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull. The errors of
- * reading.
+ * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull. Also the errors of
+ * reading (base.h).
  *
  * Threads: any.
  */

@@ -15,14 +15,17 @@ extern "C" {
 typedef struct ebpo_lod_options {
     size_t struct_size;
 
-    /* True: polygons on cell faces are kept, so that each envelope is closed. */
+    /*
+     * True: polygons on cell faces are kept, so that each envelope is closed. False: they are
+     * omitted.
+     */
     bool cell_faces;
 
     unsigned threads;
 
     ebpo_progress progress;
 
-    /* Limits the memory for data read from the file. NULL: no limit. */
+    /* Workspace that limits the memory for data read from the file. NULL: no limit. */
     ebpo_workspace *workspace;
 } ebpo_lod_options;
 
@@ -32,16 +35,17 @@ typedef struct ebpo_lod_options {
     }
 
 /*
- * Computes the envelopes of a level: of its gray nodes, and of the leaves and black nodes of levels
- * 0 to `level`. Each envelope is a convex polyhedron, cut from the node's cell by the
- * half-spaces of the node and its ancestors. Leaves are cut by stored planes if the file has them,
- * else by planes derived from their faces (EBP 2017, 3.3.4).
+ * Computes the envelopes of a level: those of its gray nodes, and those of the leaves and black
+ * nodes of levels 0 to `level`. Each envelope is a convex polyhedron: the intersection of the
+ * node's cell with the half-spaces of the node and its ancestors. The half-spaces of a leaf are
+ * those stored in the file; if the file has none, they are derived from the leaf's faces (EBP 2017,
+ * 3.3.4).
  *
  * The polygons are rounded. Only the decoded half-spaces are guaranteed to contain the solid.
  *
- * out      triangles with double vertices, in the order of the nodes; nodes share no vertices.
- *          Freed by ebpo_mesh_free. NULL: only the volume.
- * volume   sum of the polyhedra's volumes, in cubic units of the model; or NULL
+ * out      mesh of triangles in the order of the nodes, with coordinates as doubles; nodes share no
+ *          vertices. Freed by ebpo_mesh_free. NULL: only the volume is computed
+ * volume   sum of the polyhedra's volumes, in cubic units of the model; may be NULL
  *
  * The level's nodes, their polygons and `out` are in memory that `workspace` does not limit. Memory
  * and time depend on the level; `progress` can stop the call.
@@ -54,7 +58,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int lev
                                                   const ebpo_lod_options *options, ebpo_mesh *out,
                                                   double *volume, ebpo_error *error);
 
-/* One node of a level's envelopes. */
+/* A node whose envelope is part of a level. */
 typedef struct ebpo_lod_node {
     /* Path from the root to the node, as in ebpo_stream_node (stream.h). */
     uint64_t octcode;
@@ -63,20 +67,23 @@ typedef struct ebpo_lod_node {
     double volume;
 
     /*
-     * Winding number. Black nodes: that of all points in the cell. Leaves: that of the lowest
-     * corner. 0 for gray nodes, and for nodes of surfaces.
+     * Black nodes: winding number of all points in the cell. Leaves: winding number of the cell's
+     * lowest corner. 0 for gray nodes, and for nodes of surfaces.
      */
     int32_t winding;
 
     /* EBPO_GRAY (only on the requested level), EBPO_LEAF or EBPO_BLACK. */
     ebpo_node_type type;
 
-    /* Counts of the polyhedron; without `cell_faces`, polygons on cell faces are not counted. */
+    /*
+     * Number of vertices and of polygons of the envelope. Without the option `cell_faces`, polygons
+     * on cell faces are not counted.
+     */
     uint32_t vertex_count, polygon_count;
 
     /*
-     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has its own colour; a leaf or black
-     * node has the colour of its parent. 0x808080 if `coloured` is 0.
+     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has the colour that is stored for
+     * it; a leaf or black node has the colour of its parent. 0x808080 if `coloured` is 0.
      */
     uint32_t colour;
 
@@ -121,10 +128,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, i
                                                         double *volume, ebpo_error *error);
 
 /*
- * Gets the colours of a level's vertices: each vertex has the colour of its node. If the file has
- * no colours, `out` has none. Faces have no colours.
+ * Gets the colours of a level's vertices: each vertex has the colour of its node. Faces have no
+ * colours. If the file has no colours, `out` has no colours.
  *
- * vertex_count  of the mesh returned with the nodes
+ * vertex_count  number of vertices of the mesh returned with the nodes
  * out           freed by ebpo_colours_free; cleared on failure
  *
  * EBPO_E_ARGUMENT: the nodes have another number of vertices.
@@ -136,16 +143,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
                                                     ebpo_error *error);
 
 /*
- * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets its
- * own normal. A polygon on a cell face is only a step between two envelopes. Such a polygon gets a
- * mean normal, weighted by area. The mean is taken over nearby polygons that are on planes and face
- * roughly the same way as the cell face. If there are no such polygons, the polygon gets its own
- * normal. Cell faces of the root cell count as planes. For images only: the normals are rounded and
+ * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets the
+ * normal of the plane. A polygon on a cell face is only a step between two envelopes. It gets the
+ * mean normal, weighted by area, of nearby polygons that are on planes and face roughly the same
+ * way as the cell face. If there are no such polygons, it gets the normal of the cell face. Cell
+ * faces of the root cell count as planes. Use the normals for images only: they are rounded and
  * guarantee nothing about the solid.
  *
- * info  of the level's file
- * mesh  returned with the nodes
- * out   [polygon_count][3] of length 1, or 0 for a polygon without area; allocated by the caller
+ * info  metadata of the level's file
+ * mesh  mesh returned with the nodes
+ * out   [polygon_count][3] unit normals, or 0 for a polygon without area; allocated by the caller
  *
  * EBPO_E_ARGUMENT: the nodes have another number of triangles, or the mesh has single precision.
  *
@@ -157,19 +164,20 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_normals(const ebpo_info *info, const
 
 /* ---- the simplified surface ---- */
 
-/* Patches as one mesh. */
+/* Patches of the simplified surface, joined to one mesh. */
 typedef struct ebpo_surface_mesh {
     ebpo_mesh mesh; /* double precision */
 
     /* [vertex_count][3] unit normals */
     float *normals;
 
-    /* Colours of vertices, or none. */
+    /* Colours of vertices. If the patches have no colours, its arrays are NULL. */
     ebpo_colours colours;
 
     /*
-     * Greatest error of the patches, in the model's unit. Vertices that are replaced to close
-     * cracks are within the error of the coarser patch.
+     * Greatest error of the patches (ebpo_patch), in the model's unit. To close cracks, some
+     * vertices of a finer patch are replaced by vertices of a coarser patch; their error is at most
+     * that of the coarser patch.
      */
     double error;
 
@@ -180,8 +188,8 @@ typedef struct ebpo_surface_mesh {
     double pixels;
 
     /*
-     * Number of patches in the mesh, and number of the model's own faces in the mesh. Faces replace
-     * the finest patches if the option `faces` of ebpo_view_stream_surface is true.
+     * Number of patches in the mesh, and number of faces of the model in the mesh. Faces of the
+     * model replace the finest patches if the option `faces` of ebpo_view_stream_surface is true.
      */
     uint64_t patches, faces;
 } ebpo_surface_mesh;
@@ -190,10 +198,10 @@ typedef struct ebpo_surface_mesh {
 EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
 
 /*
- * Lists the patches of a level, and the patches of coarser nodes without patches below. Together
- * these patches replace all faces of the model.
+ * Lists the patches of a level, and those patches of coarser levels whose nodes have no patches
+ * below. Together these patches replace all faces of the model.
  *
- * patches  [*count] ascending numbers of patches; freed by free()
+ * patches  [*count] indices of patches, ascending; freed by free()
  *
  * EBPO_E_MEMORY.
  *
@@ -208,8 +216,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_surface_select(const ebpo_surface *surfa
  * node of another patch. Vertices on the borders of finer patches are replaced by vertices of
  * coarser patches.
  *
- * info     of the file or tree
- * patches  [count] ascending numbers of patches
+ * info     metadata of the file or tree
+ * patches  [count] indices of patches, ascending
  * out      freed by ebpo_surface_mesh_free; cleared on failure
  *
  * EBPO_E_ARGUMENT, EBPO_E_FORMAT, EBPO_E_MEMORY, EBPO_E_LIMIT.

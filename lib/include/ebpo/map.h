@@ -27,8 +27,8 @@ typedef struct ebpo_map_options {
     size_t struct_size;
 
     /*
-     * Points farther away from the model than this get INFINITY; a smaller value is faster. In the
-     * model's unit; at least 0.
+     * Points that are farther away from the model than this get the value INFINITY. In the model's
+     * unit; at least 0. A smaller distance is faster.
      */
     double max_distance;
 
@@ -51,10 +51,10 @@ typedef struct ebpo_map_options {
     }
 
 /*
- * Computes the distances of points[count][3], each finite, into distances[count]: correctly
- * rounded, and negative inside a solid, as ebpo_distance does. If not everything is in memory,
- * points are processed along a curve, so that subtrees are loaded few times; this takes 24 bytes
- * per point.
+ * Computes the distances of points[count][3], each finite, into distances[count]. As those of
+ * ebpo_distance, they are correctly rounded, and negative inside a solid. If not everything is in
+ * memory, points are processed along a curve, so that each subtree is loaded only a few times; this
+ * takes 24 bytes per point.
  *
  * EBPO_E_ARGUMENT: an option or a point is not valid; the message has the index of the point.
  * EBPO_E_ABSENT: the file has no mesh. EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also
@@ -67,18 +67,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_points(ebpo_model *model, const doub
                                                    double *distances, ebpo_error *error);
 
 /*
- * Points in rows, columns and layers: origin + i step[0] + j step[1] + k step[2] for i, j, k from 0
- * to count - 1 each. Each product and each sum is rounded, in this order. A plane has count[2] ==
- * 1.
+ * Points in rows, columns and layers: origin + i step[0] + j step[1] + k step[2], where i, j and k
+ * are from 0 to count[0] - 1, count[1] - 1 and count[2] - 1. Each product and each sum is rounded,
+ * in this order. A plane has count[2] == 1.
  */
 typedef struct ebpo_lattice {
     double origin[3], step[3][3];
-    uint64_t count[3]; /* at least 1 each; at most 2^40 points */
+    uint64_t count[3]; /* each at least 1; their product is at most 2^40 */
 } ebpo_lattice;
 
 /*
- * Makes a lattice that fills a box: the first points are on its lower faces, the last ones on its
- * upper faces. On an axis with one point, the point is in the middle.
+ * Makes a lattice that fills a box: the first points on each axis are on its lower face, the last
+ * points on its upper face. On an axis with one point, the point is in the middle.
  *
  * EBPO_E_ARGUMENT: a count is 0, the box is not finite, or `low` is not below `high` on each axis.
  *
@@ -89,17 +89,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lattice_of_box(const double low[3], cons
                                                        ebpo_error *error);
 
 /*
- * Callback that gets values[layers][count[1]][count[0]], valid until it returns, in the lattice's
- * order, from layer `first` on. Any return value except EBPO_OK ends the map with that status; the
- * callback then fills in `error`.
+ * Callback that gets values[layers][count[1]][count[0]] of the lattice, from layer `first` on. The
+ * values are valid until the callback returns. If it returns a status other than EBPO_OK, the call
+ * ends with this status; the callback then fills in `error`.
  */
 typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t first,
                                    uint64_t layers, ebpo_error *error);
 
 /*
- * Computes the distances at a lattice's points and passes them to `take` by layers. Memory: 8
- * bytes per point of the layers that are computed together, which are about 64 MiB, or one layer if
- * a layer is larger.
+ * Computes the distances at a lattice's points and passes them to `take` by layers. Memory: about
+ * 64 MiB, or one layer of 8 bytes per point if this is more.
  *
  * EBPO_E_ARGUMENT: also if a point of the lattice is not finite, or if there are too many points.
  * Other errors are those of ebpo_map_points.
@@ -113,10 +112,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_lattice(ebpo_model *model, const ebp
 
 /* ---- statistics ---- */
 
-/* Number of percentiles: 1, 5, 25, 50, 75, 95, 99 percent. */
+/* Number of percentiles: those of 1, 5, 25, 50, 75, 95 and 99 percent. */
 enum { EBPO_MAP_PERCENTILES = 7 };
 
-/* Lengths are in the model's unit. All except the counts are NAN if no value is finite. */
+/*
+ * Statistics of the values of a map. Lengths are in the model's unit. If no value is finite, all
+ * members except the counts are NAN.
+ */
 typedef struct ebpo_map_stats {
     size_t struct_size;
 
@@ -136,14 +138,15 @@ typedef struct ebpo_map_stats {
     double farthest;
 
     /*
-     * mean: mean of the values. mean_unsigned: mean of the absolute values. rms: root mean square.
-     * standard_deviation: of the values.
+     * mean: mean of the values. mean_unsigned: mean of the absolute values. rms: root mean square
+     * of the values. standard_deviation: standard deviation of the values.
      */
     double mean, mean_unsigned, rms, standard_deviation;
 
     /*
-     * For each percentage (ebpo_map_percent): the least value v such that at least this
-     * percentage of the finite values are <= v. For signed and for absolute values.
+     * For each percentage (ebpo_map_percent): the least value v such that at least this percentage
+     * of the finite values are <= v. percentile: of the values. percentile_unsigned: of the
+     * absolute values.
      */
     double percentile[EBPO_MAP_PERCENTILES], percentile_unsigned[EBPO_MAP_PERCENTILES];
 } ebpo_map_stats;
@@ -151,7 +154,8 @@ typedef struct ebpo_map_stats {
 #define EBPO_MAP_STATS_INIT EBPO_SIZED(ebpo_map_stats)
 
 /*
- * Returns the percentage of an index of EBPO_MAP_PERCENTILES: 1, 5, 25, ... NAN for another index.
+ * Returns the percentage of percentile[index] of ebpo_map_stats: 1, 5, 25, 50, 75, 95 or 99. NAN if
+ * the index is out of range.
  *
  * Threads: any.
  */
@@ -170,12 +174,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_describe(const double *values, uint6
 typedef struct ebpo_map_hausdorff_options {
     size_t struct_size;
 
-    /* Bounds are refined until hi <= (1 + tolerance) lo. Above 0. */
+    /* Bounds are refined until hi <= (1 + tolerance) lo. The tolerance is above 0. */
     double tolerance;
 
     /*
-     * The search stops after about this many distances, besides those of vertices. 0: 16 for each
-     * face.
+     * The search stops after about this many distances have been computed. The given distances of
+     * vertices do not count. 0: 16 distances for each face.
      */
     uint64_t queries;
 
@@ -213,8 +217,8 @@ typedef struct ebpo_map_hausdorff {
  * Bounds the maximum distance of a mesh's faces from a model's faces. The interiors of faces are
  * included, because they may be farther away than the vertices.
  *
- * mesh        indices below vertex_count, finite coordinates
- * distances   [vertex_count] of its vertices, from ebpo_map_points, all finite
+ * mesh        mesh whose coordinates are finite
+ * distances   [vertex_count] distances of its vertices from ebpo_map_points, all finite
  *
  * EBPO_E_ARGUMENT: an option, a distance or an index is not valid. Other errors are those of
  * ebpo_map_points.
@@ -230,21 +234,24 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_bound_hausdorff(
 /* Palette by which a distance gets a colour. */
 typedef enum ebpo_map_palette {
     /*
-     * Signed: blue inside, orange outside, grey at 0; lightness decreases evenly with distance,
-     * also for colour-blind viewers.
+     * Colours by signed distance: blue inside, orange outside, grey at 0. Lightness decreases
+     * evenly with the absolute distance, also for colour-blind viewers.
      */
     EBPO_MAP_DIVERGING = 0,
 
     /*
-     * As in EBP 2017, section 4.4: black on the surface, then red, green, and blue for the
-     * farthest.
+     * Colours by absolute distance as in EBP 2017, section 4.4: black on the surface, then red, then
+     * green, and blue for the farthest points.
      */
     EBPO_MAP_THESIS = 1,
+
+    /* Number of palettes. */
     EBPO_MAP_PALETTES
 } ebpo_map_palette;
 
 /*
- * Returns "diverging" or "thesis". A static string; NULL for invalid values.
+ * Returns the name of a palette as a static string: "diverging" or "thesis". Returns NULL for
+ * invalid values.
  *
  * Threads: any.
  */
@@ -252,7 +259,7 @@ EBPO_API const char *ebpo_map_palette_name(ebpo_map_palette palette);
 
 /*
  * Gets the sRGB colour of a distance. The distance is clamped to -range .. range; `range` is above
- * 0. A distance that is not finite is grey.
+ * 0. The colour of a distance that is not finite is grey.
  *
  * Threads: any.
  */
@@ -264,8 +271,8 @@ EBPO_API void ebpo_map_colour(ebpo_map_palette palette, double distance, double 
  * `green`, `blue` (uint8). Attributes of these names are replaced. ebpo_mesh_write_ply writes the
  * attributes.
  *
- * distances   [vertex_count]
- * range       above 0 and finite
+ * distances   [vertex_count] distances of the vertices
+ * range       as for ebpo_map_colour, and finite
  *
  * EBPO_E_ARGUMENT: palette or range is not valid, or the mesh has too many attributes.
  *
@@ -280,8 +287,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double 
 /* Format of the file of a map. */
 typedef enum ebpo_map_format {
     /*
-     * HDF5, as an image of VTKHDF 1.0: /VTKHDF/PointData/distance[count[2]][count[1]][count[0]] of
-     * float64, with Origin, Spacing and Direction. Steps must be at right angles.
+     * HDF5, as an image of VTKHDF 1.0: float64 array /VTKHDF/PointData/distance of shape
+     * [count[2]][count[1]][count[0]], with Origin, Spacing and Direction. The steps of the lattice
+     * must be at right angles.
      */
     EBPO_MAP_VTKHDF = 0,
 
@@ -293,7 +301,7 @@ typedef enum ebpo_map_format {
  * Writes the map of a lattice to a file, which is replaced atomically. Values beyond max_distance
  * are INFINITY.
  *
- * stats   receives the statistics, with percentiles NAN; may be NULL
+ * stats   receives the statistics, in which percentiles are NAN; may be NULL
  *
  * EBPO_E_ARGUMENT: also if the format does not support the lattice. EBPO_E_IO. Other errors are
  * those of ebpo_map_lattice.

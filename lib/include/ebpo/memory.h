@@ -11,10 +11,10 @@ extern "C" {
 #endif
 
 /*
- * Returns the number of bytes that this process can still allocate: the available memory of the
- * machine, or what remains of the limits of the process's control groups, whichever is least.
- * Memory that caches files counts as free. Returns half of the machine's memory if the system does
- * not report it.
+ * Returns the number of bytes that this process can still allocate: the least of the available
+ * memory of the machine and the unused memory of each of the process's control groups. Memory that
+ * caches files counts as available. Returns half of the machine's memory if the system does not
+ * report the available memory.
  *
  * Threads: any.
  */

@@ -6,10 +6,10 @@
 
 /* Relation of two faces as point sets; defined in docs/develop/collision.md. */
 typedef enum ebpo_pair_kind {
-    EBPO_PAIR_APART = 0,
+    EBPO_PAIR_APART = 0,    /* no common point */
     EBPO_PAIR_TOUCHING = 1, /* a common point; interiors do not intersect */
-    EBPO_PAIR_CROSSING = 2, /* interiors intersect, planes differ */
-    EBPO_PAIR_COPLANAR = 3  /* interiors intersect in one plane */
+    EBPO_PAIR_CROSSING = 2, /* interiors intersect; the faces are in different planes */
+    EBPO_PAIR_COPLANAR = 3  /* interiors intersect; the faces are in one plane */
 } ebpo_pair_kind;
 
 #endif

@@ -17,8 +17,9 @@ extern "C" {
 
 /*
  * Transforms a point x of the model to rotation (scale x) + translation. All values are finite;
- * `scale` is from 2^-300 to 2^300. rotation[i][k] multiplies x_k: its rows are the axes of the
- * world in model coordinates.
+ * `scale` is from 2^-300 to 2^300. Coordinate i of the result is the sum of rotation[i][k] scale
+ * x_k over k, plus translation[i]. So the rows of `rotation` are the axes of the world in model
+ * coordinates.
  */
 typedef struct ebpo_pose {
     double rotation[3][3];
@@ -26,17 +27,18 @@ typedef struct ebpo_pose {
     double scale;
 } ebpo_pose;
 
-/* Identity. */
+/* The identity: posed coordinates equal the coordinates in the file. */
 #define EBPO_POSE_INIT                                            \
     {                                                             \
         { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 0, 0, 0 }, 1 \
     }
 
 /*
- * Sets pose->rotation from a quaternion x, y, z, w (w is the real part) of any length. The result
- * is bitwise equal to that for scene files.
+ * Sets pose->rotation from a quaternion x, y, z, w of any length; w is the real part. The result is
+ * bitwise equal to the rotation of an instance with this quaternion in a scene file.
  *
- * EBPO_E_ARGUMENT: its greatest component is not from 2^-500 to 2^500; the pose is unchanged.
+ * EBPO_E_ARGUMENT: the greatest absolute value of a component is not within 2^-500 .. 2^500. The
+ * pose is then unchanged.
  *
  * Threads: any.
  */

@@ -3,7 +3,7 @@
  *
  *   ebpo_mesh_try_repairs    tries sequences of repairs and chooses the shortest successful one
  *   ebpo_mesh_count_shells   counts shells (closed sets of faces) by orientation and nesting
- *   ebpo_mesh_doubts         reasons why a mesh is no solid, or probably not the intended solid
+ *   ebpo_mesh_doubts         reasons why a mesh is not a solid, or probably not the intended solid
  */
 #ifndef EBPO_REPAIR_H
 #define EBPO_REPAIR_H
@@ -15,7 +15,8 @@ extern "C" {
 #endif
 
 /*
- * Reasons why a mesh is not a solid, or is a solid that its author probably did not intend. Bits.
+ * Reasons why a mesh is not a solid, or is a solid that its author probably did not intend; as
+ * bits.
  */
 typedef enum ebpo_doubt {
     /* The mesh has unbalanced edges (ebpo_mesh_report): it is not closed. */
@@ -42,11 +43,11 @@ typedef enum ebpo_doubt {
 } ebpo_doubt;
 
 /*
- * Returns the doubts about the current mesh.
+ * Returns the doubts about a mesh, as ebpo_doubt bits.
  *
  * area     area of the mesh before repairs. 0: unknown; EBPO_DOUBT_MOSTLY_FILLED is then not set
- * report   report on the current mesh
- * record   repairs that were made; NULL: none
+ * report   report on the mesh after repairs
+ * record   repairs that were made; NULL: no repairs
  *
  * Threads: any.
  */
@@ -58,7 +59,7 @@ EBPO_API uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
 
 /* One sequence of steps that was tried. */
 typedef struct ebpo_repair_try {
-    /* Requested steps, and the changes that they made. */
+    /* The steps of this try, and the changes that they made. */
     ebpo_repair_record record;
 
     /* Report on the mesh after these steps. */
@@ -68,8 +69,8 @@ typedef struct ebpo_repair_try {
     uint32_t doubts;
 
     /*
-     * The requested steps of `record` as bits: 1 weld, 2 orient, 4 fill holes, 32 drop repeated
-     * faces. The bits 8 and 16 are not set.
+     * The steps of this try as bits: 1 weld, 2 orient, 4 fill holes, 32 drop repeated faces. The
+     * bits 8 and 16 are not used.
      */
     uint32_t steps;
 } ebpo_repair_try;
@@ -81,13 +82,13 @@ typedef struct ebpo_repairs {
     /* Number of tries. */
     uint64_t count;
 
-    /* The tries in their order: fewer steps first. */
+    /* The tries in the order in which they were made: those with fewer steps first. */
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1: every try
-     * has doubts, or the unrepaired mesh has no doubts and needs no repair (even if dropping
-     * repeated faces was tried).
+     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1: there are
+     * doubts about the mesh of every try, or there are no doubts about the unrepaired mesh, which
+     * then needs no repair (even if dropping repeated faces was tried).
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -112,8 +113,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh,
                                                          ebpo_repairs *out, ebpo_error *error);
 
 /*
- * Number of shells by kind. Shells are defined at ebpo_mesh_orient; they may share vertices or
- * edges. Here a component is a shell, or a set of other faces that are connected by vertices.
+ * Number of shells by kind. A shell is a closed set of faces (ebpo_mesh_orient); shells may share
+ * vertices or edges. In this struct, a component is a shell, or a set of faces that belong to no
+ * shell and are connected by vertices.
  */
 typedef struct ebpo_shells {
     size_t struct_size;
@@ -143,10 +145,11 @@ typedef struct ebpo_shells {
     uint32_t reserved;
 
     /*
-     * Differences of volumes, indexed by ebpo_rule: volume of the solid under this rule, minus the
+     * Difference of two volumes for each ebpo_rule: volume of the solid under this rule, minus the
      * signed volume of the mesh (the integral of the winding number). In cubic units of the source.
-     * Valid only if `apart` is 1; else 0. All differences are also 0 if every winding number is 0
-     * or 1, as in bodies that are oriented outwards and whose cavities are oriented inwards.
+     * If `apart` is 0, the differences are unknown, and 0. All differences are also 0 if every
+     * winding number is 0 or 1, as for bodies that are oriented outwards and have cavities that are
+     * oriented inwards.
      */
     double volume_difference[3];
 } ebpo_shells;
@@ -154,9 +157,9 @@ typedef struct ebpo_shells {
 #define EBPO_SHELLS_INIT EBPO_SIZED(ebpo_shells)
 
 /*
- * Counts the shells, and tests if faces of different components have a common point. Takes a few
- * passes over the faces and a search in trees of boxes. The search stops after 64 * face_count +
- * 2^22 compared boxes; `apart` is then 0.
+ * Counts the shells, and tests if faces of different components have a common point. The test is a
+ * search in trees of boxes, which stops after 64 * face_count + 2^22 compared boxes; `apart` is
+ * then 0.
  *
  * Errors are those of ebpo_components_new. On failure `out` is cleared.
  *

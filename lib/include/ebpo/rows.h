@@ -14,18 +14,18 @@ extern "C" {
  * Reads a whole dataset of rows x columns as doubles. The dataset may contain integers or floats of
  * any size and byte order. Values are rounded to the nearest double.
  *
- * dataset        such as "/points". NULL or "": reads nothing; the error message lists the suitable
- *                datasets
- * least, most    allowed number of columns, 1 to 64
+ * dataset        path of the dataset in the file, such as "/points". NULL or "": reads no dataset;
+ *                the error message lists the suitable datasets
+ * least, most    minimum and maximum number of columns of the dataset, 1 to 64
  * fill           value for missing columns, if the dataset has fewer than `most`
  * rows           [*count][most] doubles; freed by free()
  *
  * EBPO_E_IO: the file cannot be read, or another program has it open for writing. EBPO_E_FORMAT:
- * not an HDF5 file; no such dataset; another shape or type (for example complex numbers, or an
- * array of an .ebpo.h5 file, which holds codes); or the values are in another file. EBPO_E_ABSENT:
- * no dataset was named, and the file has no suitable one. EBPO_E_LIMIT: the rows would take more
- * than 64 MiB, and more than 1,024 times the file size. EBPO_E_UNSUPPORTED: the library was built
- * without libhdf5.
+ * the file is not an HDF5 file; the dataset does not exist, or has another shape or type (for
+ * example complex numbers, or the codes in an array of an .ebpo.h5 file); or its values are in
+ * another file. EBPO_E_ABSENT: `dataset` is NULL or "", and the file has no suitable dataset.
+ * EBPO_E_LIMIT: the rows would take more than 64 MiB, and more than 1,024 times the file size.
+ * EBPO_E_UNSUPPORTED: the library was built without libhdf5.
  *
  * libhdf5 reads the file in a separate process, with limits on memory and time and without plugins.
  * The rows are passed through an unnamed file in TMPDIR.
@@ -38,12 +38,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read(const char *path, const char *
                                                   ebpo_error *error);
 
 /*
- * Reads a part of the rows as ebpo_rows_read does. Of a chunked dataset, only the chunks that
- * contain these rows are read.
+ * Reads consecutive rows of a dataset, as ebpo_rows_read reads all rows. Of a chunked dataset, only
+ * the chunks that contain these rows are read.
  *
- * first, max_rows   first row, and maximum number of rows; 0 rows: only sets *total
- * count             number of rows read
- * total             number of rows of the dataset; 0 on failure
+ * first      index of the first row to read
+ * max_rows   maximum number of rows to read; 0: only *total is set
+ * count      number of rows that were read
+ * total      number of rows of the dataset; 0 on failure
  *
  * Threads: any.
  */

@@ -20,7 +20,7 @@ extern "C" {
 typedef struct ebpo_stream_options {
     size_t struct_size;
 
-    /* True: returns the half-spaces of nodes. False: plane_count is 0. */
+    /* True: nodes have half-spaces. False: plane_count of all nodes is 0. */
     bool planes;
 
     /* True: computes the polygons and volumes of envelopes. Implies `planes`. */
@@ -35,13 +35,13 @@ typedef struct ebpo_stream_options {
     }
 
 /*
- * One node. Its pointers are valid until the next call with the stream. The mesh is never read. A
- * leaf of a file without EBPO_PART_LEAF_PLANES has no planes: its envelope is the part of its
- * parent's envelope in the leaf's cell.
+ * One node. Its pointers are valid until the next call with the stream. Streams never read the
+ * mesh. So in a file without EBPO_PART_LEAF_PLANES, a leaf has no planes, and its envelope is the
+ * part of its parent's envelope in the leaf's cell.
  *
- * The vertices of an envelope's polygons are rounded, and negligible cuts are omitted. So the
- * polygons usually enclose slightly more than the envelope. The half-spaces in `planes` are
- * guaranteed to contain the envelope; the polygons are not.
+ * The vertices of an envelope's polygons are rounded, and planes that remove a negligible volume
+ * are omitted. So the polygons usually enclose slightly more than the envelope. The half-spaces in
+ * `planes` are guaranteed to contain the envelope, but the polygons are not.
  */
 typedef struct ebpo_stream_node {
     /* Path from the root to the node: a leading 1, then three bits for each level. */
@@ -53,38 +53,41 @@ typedef struct ebpo_stream_node {
     double min[3], max[3];
 
     /*
-     * Winding number. White and black nodes: that of all points in the cell. Leaf: leaf_winding
-     * (file.h). Gray: 0.
+     * White and black nodes: winding number of all points in the cell. Leaves: leaf_winding of
+     * ebpo_level (file.h). Gray nodes: 0.
      */
     int32_t winding;
 
     /*
-     * Number of the node's own planes: those of a gray node, and those stored for a leaf. The
-     * planes of all ancestors also cut the envelope.
+     * Number of planes that are stored for this gray node or leaf. The planes of all ancestors also
+     * bound the envelope.
      */
     uint32_t plane_count;
 
     /*
      * [plane_count] coefficients a, b, c, d of the half-space a x + b y + c z <= d, in the model's
-     * unit, with a unit normal. They are rounded outward: points of the cell that are in the
-     * half-space of the plane code satisfy this inequality, also if the left side is computed in
-     * doubles.
+     * unit, with a unit normal. They are rounded outward: all points of the cell that are in the
+     * exact half-space of the plane code satisfy this inequality, even if its left side is computed
+     * in doubles.
      */
     const double (*planes)[4];
 
     /*
-     * With `polygons`: volume of the envelope, in cubic units of the model. Black nodes: volume of
-     * the cell, also without `polygons`. White nodes: 0.
+     * Volume in cubic units of the model. Gray nodes and leaves: volume of the envelope with the
+     * option `polygons`, else 0. Black nodes: volume of the cell. White nodes: 0.
      */
     double volume;
 
-    /* With `polygons`: counts for gray nodes, leaves and black nodes; else 0. */
+    /*
+     * Number of vertices and polygons of the envelope of a gray node, leaf or black node; 0 without
+     * the option `polygons`.
+     */
     uint32_t vertex_count, polygon_count;
 
     /* [vertex_count] coordinates, in the model's unit */
     const double (*vertices)[3];
 
-    /* [polygon_count + 1] first index of each polygon in `corners` */
+    /* [polygon_count + 1] index in `corners` of the first corner of each polygon */
     const uint32_t *polygon_first;
 
     /* Indices of the polygons' corners in `vertices`, counter-clockwise seen from outside. */
@@ -107,20 +110,20 @@ typedef struct ebpo_stream_level {
     /* Number of nodes of all types. */
     uint64_t node_count;
 
-    /* Bytes of the file for levels 0 to `level`, including the header. */
+    /* Number of bytes of the file for the header and levels 0 to `level`. */
     uint64_t cumulative_bytes;
 
     /*
-     * Volume of the model's outer approximation at this level. This is the volume of the envelopes
-     * of this level's gray nodes, and of all leaves and black cells of levels 0 to `level`. With
-     * `polygons` it is the sum of the nodes' volumes, otherwise it is computed from the volumes
-     * stored in the file.
+     * Volume of the model's outer approximation at this level, in cubic units of the model. This is
+     * the volume of the envelopes of this level's gray nodes, and of all leaves and black cells of
+     * levels 0 to `level`. With the option `polygons` it is the sum of the nodes' volumes; without
+     * this option it is computed from the volumes stored in the file.
      *
-     * The envelopes of leaves are cut by the stored planes of the leaves, or only by the planes of
-     * their ancestors if no planes of leaves are stored. Planes derived from the faces would cut
-     * off more (ebpo_lod_level).
+     * The envelopes of leaves are bounded by the planes of the leaves' ancestors, and by the planes
+     * of the leaves if these are stored. With planes derived from the faces (ebpo_lod_level), the
+     * envelopes would be smaller.
      *
-     * In a subset, only nodes in the file count. A pruned node counts at its own level, and not at
+     * In a subset, the nodes in the file count. A pruned node counts at its own level, and not at
      * deeper levels.
      */
     double volume;
@@ -130,8 +133,9 @@ typedef struct ebpo_stream_level {
 typedef struct ebpo_stream ebpo_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Reads nothing yet. The stream keeps the
- * node types of the levels that it has read, and with `polygons` also their planes.
+ * Makes a stream of an open file, which must stay open. Reads no data yet. The stream keeps the
+ * node types of the levels that it has read in memory; with the option `polygons`, it also keeps
+ * their planes.
  *
  * Threads: any.
  */
@@ -155,8 +159,9 @@ EBPO_API void ebpo_stream_free(ebpo_stream *stream);
 EBPO_API void ebpo_stream_prefetch(const ebpo_stream *stream, int last);
 
 /*
- * Reads the next level, from level 0 on, and no data of deeper levels. After the last one, *more is
- * false and *out is unchanged. The caller may pause at any level, and may retry after a failure.
+ * Reads the next level, from level 0 on, and no data of deeper levels. After the last level, *more
+ * is false and *out is unchanged. The caller may pause at any level, and may repeat the call after
+ * a failure.
  *
  * Threads: one at a time per stream.
  */
@@ -165,7 +170,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_next_level(ebpo_stream *stream,
                                                           ebpo_error *error);
 
 /*
- * Gets the next node of the current level, in the order of octcodes. After the last one, *more is
+ * Gets the next node of the current level, in the order of octcodes. After the last node, *more is
  * false and *out is unchanged.
  *
  * EBPO_E_ARGUMENT: no level has been read yet.

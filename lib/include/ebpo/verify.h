@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-/* One kind of check: number of checks and of violations. */
+/* Result of one kind of check: number of checks, and number of violations. */
 typedef struct ebpo_verify_count {
     uint64_t checks, violations;
 
@@ -18,23 +18,24 @@ typedef struct ebpo_verify_count {
     char first[240];
 } ebpo_verify_count;
 
-/* Result of ebpo_verify, by kind of check. */
+/* Result of ebpo_verify, by kind of check. Comments say what is checked. */
 typedef struct ebpo_verify_report {
     size_t struct_size;
 
     /*
-     * Header; shapes and counts of arrays; order of values; index arrays (running sums of counts).
-     * Also checks that exactly the cells with more than leaf_faces faces are divided, although no
-     * rule of the format requires this.
+     * The header, the shapes and counts of arrays, the order of values, and the index arrays
+     * (running sums of counts) are valid. Exactly the cells with more than leaf_faces faces are
+     * divided, although no rule of the format requires this.
      */
     ebpo_verify_count structure;
 
-    /* The content checksum (content_sha256) is the one computed from the arrays. */
+    /* The content checksum (content_sha256) equals the checksum computed from the arrays. */
     ebpo_verify_count content;
 
     /*
-     * In each cell: vertices, parts of faces, and corners of the cell that are inside the solid,
-     * are in every half-space on the path from the root.
+     * In each cell, all points of the solid are in every half-space of the nodes on the path from
+     * the root. The vertices in the cell, the parts of faces in the cell, and the corners of the
+     * cell that are inside the solid are tested.
      */
     ebpo_verify_count containment;
 
@@ -45,8 +46,8 @@ typedef struct ebpo_verify_report {
     ebpo_verify_count nesting;
 
     /*
-     * White and black cells, and winding numbers of corners, agree with winding numbers that
-     * another method computes.
+     * The types of white and black cells, and the winding numbers of cell corners, agree with
+     * winding numbers that another method computes.
      */
     ebpo_verify_count labels;
 
@@ -60,10 +61,10 @@ typedef struct ebpo_verify_report {
     uint64_t checks, violations;
 
     /*
-     * Number of unused bytes of the file, which are outside headers, chunk directories and chunks;
-     * and number of unused bytes that are not zero, which is 0 in files of this library. Unused
-     * bytes change no result and are not violations. For remote files (http.h) both are 0, because
-     * unused bytes are not read.
+     * spare_bytes: number of unused bytes of the file, which are outside headers, chunk directories
+     * and chunks. spare_filled: number of unused bytes that are not zero; 0 in files of this
+     * library. Unused bytes change no result and are not violations. For remote files (http.h) both
+     * are 0, because unused bytes are not read.
      */
     uint64_t spare_bytes, spare_filled;
 } ebpo_verify_report;
@@ -75,23 +76,24 @@ typedef struct ebpo_verify_options {
     size_t struct_size;
 
     /*
-     * The source mesh as ebpo_mesh_read returns it, neither repaired nor arranged. NULL: not
-     * compared. The repairs that the file records are applied to a copy.
+     * The source mesh as ebpo_mesh_read returns it, neither repaired nor arranged. The repairs that
+     * the file records are applied to a copy of the source mesh, which is compared with the mesh in
+     * the file. NULL: no source mesh is compared.
      */
     const ebpo_mesh *source;
 
     unsigned threads;
 
     /*
-     * Number of cells whose labels are checked, at least one of each level and type. 0: all cells
-     * if there are at most 2^22 cells, else 2^20 cells; 4,096 cells if these numbers would take
-     * more than a few seconds.
+     * Number of cells whose labels (`labels` of ebpo_verify_report) are checked, at least one of
+     * each level and type. 0: all cells if there are at most 2^22 cells, else 2^20 cells; but only
+     * 4,096 cells if this would take more than a few seconds.
      */
     uint64_t label_samples;
 
     ebpo_progress progress;
 
-    /* Limits memory, and provides temporary files. NULL: no limit. */
+    /* Workspace that limits memory and provides temporary files. NULL: no limit of memory. */
     ebpo_workspace *workspace;
 } ebpo_verify_options;
 
@@ -101,10 +103,11 @@ typedef struct ebpo_verify_options {
     }
 
 /*
- * Verifies an open file. EBPO_OK means that the verification was completed; report->violations has
- * the result. A file too damaged to be read counts as a violation of its structure.
+ * Verifies an open file. EBPO_OK means that the verification was completed, even if the file has
+ * violations; report->violations gives their number. If the file is too damaged to be read, this
+ * counts as a violation of its structure.
  *
- * EBPO_E_ARGUMENT: the source is not a valid mesh, or has been arranged. EBPO_E_IO.
+ * EBPO_E_ARGUMENT: the source mesh is not valid, or has been arranged. EBPO_E_IO.
  *
  * Threads: any.
  */

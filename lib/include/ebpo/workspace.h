@@ -18,10 +18,10 @@ extern "C" {
 #endif
 
 /*
- * Holds the arrays of models that are read, built or verified. Arrays are in memory while they fit
- * into half of the budget. All other arrays are in unnamed temporary files, which disappear with
- * the process. These files are mapped, and their resident part stays within the budget. Results do
- * not depend on the workspace.
+ * Allocates the arrays of models that are read, built or verified. Arrays are in memory while they
+ * fit into half of the budget. All other arrays are in unnamed temporary files, which disappear
+ * with the process. These files are mapped, and their resident part stays within the budget.
+ * Results do not depend on the workspace.
  */
 typedef struct ebpo_workspace ebpo_workspace;
 
@@ -33,14 +33,14 @@ typedef struct ebpo_workspace_options {
     size_t struct_size;
 
     /*
-     * Maximum resident memory of the whole process, in bytes. 0: half of the memory of the machine
-     * or of its control group.
+     * Budget: maximum resident memory of the whole process, in bytes. 0: half of the memory of the
+     * machine, or of the process's control group if that is less.
      */
     uint64_t memory;
 
     /*
-     * Folder for temporary files. It should be on a disk, not in memory. NULL: $TMPDIR, else
-     * /var/tmp.
+     * Folder for temporary files. It should be on a disk, not in memory. NULL: $TMPDIR, or /var/tmp
+     * if TMPDIR is not set.
      */
     const char *temp_dir;
 } ebpo_workspace_options;
@@ -51,8 +51,8 @@ typedef struct ebpo_workspace_options {
     }
 
 /*
- * Makes a workspace. EBPO_E_ARGUMENT: less memory than EBPO_WORKSPACE_MIN. EBPO_E_IO: the folder is
- * not writable.
+ * Makes a workspace. EBPO_E_ARGUMENT: `memory` is below EBPO_WORKSPACE_MIN. EBPO_E_IO: the folder
+ * is not writable.
  *
  * Threads: any.
  */
@@ -70,15 +70,15 @@ EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 typedef struct ebpo_workspace_stats {
     size_t struct_size;
 
-    /* Budget. */
+    /* The budget (memory of ebpo_workspace_options). */
     uint64_t memory;
 
-    /* Arrays in memory: held: current size; held_peak: peak. */
+    /* Total size of the arrays in memory. held: current size. held_peak: maximum so far. */
     uint64_t held, held_peak;
 
     /*
-     * Arrays in files: filed: current size; filed_peak: peak; filed_total: sum over all arrays so
-     * far.
+     * Total size of the arrays in files. filed: current size. filed_peak: maximum so far.
+     * filed_total: sum over all arrays that were ever in a file.
      */
     uint64_t filed, filed_peak, filed_total;
 } ebpo_workspace_stats;
