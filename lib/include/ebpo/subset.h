@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT
- * Extracts a smaller file: some levels, a box, parts, or a target size.
+ * Extracts a smaller file: selected levels, a box, selected parts, or a target size.
  *
  *     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
  *     options.last_level = 5;
  *     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
  *     ebpo_subset(file, "small.ebpo.h5", &options, &error);
  *
- * `file` may be opened by its URL: only kept data is fetched.
+ * `file` may be opened by a URL. In this case only the data that is kept is fetched.
  *
- * The tree is cut at gray nodes, which are then *pruned*: they have envelopes and no children
- * (format-spec/README.md, section 7). Results from such a file are never wrong. Where data is
- * missing, queries with a level return EBPO_MAYBE or a wider interval. Exact queries return
+ * Some gray nodes of a subset are *pruned*: they have envelopes, but no children
+ * (format-spec/README.md, section 7). Results from a subset are never wrong. Where data is missing,
+ * queries with a level return EBPO_MAYBE or a wider interval, and exact queries return
  * EBPO_E_ABSENT.
  */
 #ifndef EBPO_SUBSET_H
@@ -31,8 +31,8 @@ typedef enum ebpo_profile {
     EBPO_PROFILE_LOD = 1,
 
     /*
-     * Parts for exact queries: nodes, envelopes, mesh. Maps and stored leaf planes are omitted.
-     * Leaf planes can be derived from the mesh.
+     * Parts for exact queries: nodes, envelopes, mesh. Source indices and stored leaf planes are
+     * omitted, but leaf planes can be derived from the mesh.
      */
     EBPO_PROFILE_COLLISION = 2
 } ebpo_profile;
@@ -49,14 +49,16 @@ typedef struct ebpo_subset_options {
     size_t struct_size;
 
     /*
-     * Levels 0 to last_level are kept. -1: all. If the file is itself a subset, last_level may be
-     * any level of the original file; all existing levels up to last_level are kept.
+     * Levels 0 to last_level are kept. -1: all levels are kept. If the file is itself a subset,
+     * last_level may be any level of the original file; all existing levels up to last_level are
+     * kept.
      */
     int last_level;
 
     /*
-     * True: target_bytes selects the parts, and `parts` is ignored. The first of the profiles full,
-     * collision and lod that fits completely is used; if none fits, lod with a max_error.
+     * True: target_bytes selects the parts, and `parts` is ignored. The profiles full, collision
+     * and lod are tried in this order, and the first one whose complete file fits is used. If none
+     * fits, the profile lod is used with a max_error.
      */
     bool choose_parts;
 
@@ -68,8 +70,8 @@ typedef struct ebpo_subset_options {
 
     /*
      * ebpo_part bits: parts to keep. Parts that the file does not have are ignored. The new mesh
-     * has only the faces in the lists of the kept leaves. Maps and attributes are kept only
-     * together with the mesh.
+     * has only the faces in the lists of the kept leaves. Source indices and attributes are omitted
+     * if the mesh is omitted.
      */
     uint32_t parts;
 
@@ -78,15 +80,15 @@ typedef struct ebpo_subset_options {
     int codec_level;
 
     /*
-     * Prunes nodes whose envelope has at most this error bound, in the model's unit. 0: prunes no
-     * nodes for this reason. See ebpo_subset.
+     * Nodes whose envelopes have at most this error bound are pruned (see ebpo_subset). In the
+     * model's unit. 0: no nodes are pruned because of their error bound.
      */
     double max_error;
 
     /*
-     * Maximum size of the new file in bytes. The least max_error (to 1 %) with which the file has
-     * at most this size is found and used. If the complete file fits, no max_error is used. 0: no
-     * target. target_bytes and max_error cannot be set together.
+     * Maximum size of the new file in bytes. The least max_error (to 1 %) with which the new file
+     * has at most this size is found and used. If the complete file has at most this size, no
+     * max_error is used. 0: no maximum size. target_bytes and max_error cannot be set together.
      */
     uint64_t target_bytes;
 
@@ -109,32 +111,32 @@ typedef struct ebpo_subset_options {
     }
 
 /*
- * Estimates the memory in bytes that ebpo_subset needs with max_error or target_bytes, because it
- * then opens the whole model in memory. The estimate uses the measured bytes per face, which depend
- * on the number of faces per leaf.
+ * Estimates the memory, in bytes, that ebpo_subset needs with max_error or target_bytes. With these
+ * options it loads the whole model into memory. The estimate uses measured numbers of bytes per
+ * face, which depend on the number of faces per leaf.
  *
  * Threads: any.
  */
 EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
 
 /*
- * Writes the subset of a file to another file, which is replaced atomically. If everything is kept,
- * the content (content_sha256) is that of `file`. Needs memory for the result, and up to 64 MiB for
- * data that is read.
+ * Writes a subset of `file` to a file at `path`, which is replaced atomically. If everything is
+ * kept, the new file has the content (content_sha256) of `file`. Needs memory for the result, and
+ * up to 64 MiB for data that is read.
  *
  * Guarantee for every node that was pruned because of max_error: no point of the node's envelope,
  * including the interior, is farther than max_error from the solid and its faces (for a surface:
- * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is also pruned if the planes
- * of its ancestors alone satisfy max_error; in the new file this leaf is a pruned gray node without
- * planes. Kept leaves have the same error bound as in `file`, which may be larger than max_error. A
- * smaller max_error keeps all nodes that a larger max_error keeps. With max_error or target_bytes,
- * the whole model is loaded into memory (see ebpo_subset_memory).
+ * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is also pruned if its cell
+ * with the planes of its ancestors satisfies max_error; in the new file this leaf is a pruned gray
+ * node without planes. Leaves that are kept have the same error bound as in `file`, which may be
+ * larger than max_error. A smaller max_error keeps all nodes that a larger max_error keeps. With
+ * max_error or target_bytes, the whole model is loaded into memory (see ebpo_subset_memory).
  *
  * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
  * the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a
- * subset. EBPO_E_IO: also if `path` is that of `file`, and another program has replaced the file
- * since opening. Also the errors of reading the file.
+ * subset. EBPO_E_IO: also if `path` is the path of `file`, and another program has replaced the
+ * file since opening. Also the errors of reading (base.h).
  *
  * Threads: any.
  */
@@ -143,8 +145,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(const ebpo_file *file, const char
                                                ebpo_error *error);
 
 /*
- * Writes the subset of a tree. ebpo_tree_write first writes the tree to a temporary file beside
- * `path`; the result is that of ebpo_subset for this file. The tree is freed, also on failure.
+ * Writes a subset of a tree. First the tree is written to a temporary file beside `path`, as by
+ * ebpo_tree_write. Then the result is the same as that of ebpo_subset for the temporary file. The
+ * tree is freed, also on failure.
  *
  * Threads: one at a time per tree.
  */

@@ -8,7 +8,7 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Little more of the file is read than the data that is returned; remote files (http.h) take a few
+ * Besides the data that is returned, little of the file is read; remote files (http.h) take a few
  * requests. The octcode (locational code) of a node is a leading 1 and three bits for each level
  * (stream.h); ebpo_octcode_at returns the octcode of the cell that contains a point.
  */
@@ -34,15 +34,15 @@ typedef struct ebpo_subtree_options {
     uint32_t parts;
 
     /*
-     * Number of levels below the subtree's root. -1: all. With another value no faces are read,
-     * because leaves below the last level list some of the faces, and the lists of these leaves are
-     * not read.
+     * Number of levels to read below the subtree's root. -1: all levels. With another value no
+     * faces are read. They would be incomplete, because the leaves below the last level, which list
+     * some of the faces, are not read.
      */
     int levels;
 
     /*
-     * Memory limit of the subtree in bytes, including buffers for reading. 0: no limit. Not
-     * included: the chunk directory of the file (24 bytes per chunk).
+     * Maximum memory of the subtree in bytes, including buffers for reading. 0: no maximum. The
+     * chunk directory of the file (24 bytes per chunk) does not count.
      */
     uint64_t memory;
 
@@ -50,8 +50,8 @@ typedef struct ebpo_subtree_options {
     bool corners;
 
     /*
-     * True: if the tree ends at a leaf above the octcode, opens this leaf. False: returns
-     * EBPO_E_ARGUMENT in this case.
+     * Action if there is no node with this octcode, because a leaf above it has no children. True:
+     * this leaf is opened. False: EBPO_E_ARGUMENT is returned.
      */
     bool or_leaf_above;
 
@@ -67,11 +67,12 @@ typedef struct ebpo_subtree_options {
 typedef struct ebpo_subtree ebpo_subtree;
 
 /*
- * Reads the subtree of the gray node or leaf with this octcode; 1: the whole tree. The file may be
- * closed before the subtree.
+ * Reads the subtree of the gray node or leaf with this octcode. The octcode of the root, 1, reads
+ * the whole tree. The file may be closed before the subtree.
  *
- * EBPO_E_ARGUMENT: not an octcode; no such node; or a white or black node, which no face
- * intersects. EBPO_E_ABSENT: the file is a subset (ebpo_subset) without the data below this node.
+ * EBPO_E_ARGUMENT: the value is not an octcode, the node does not exist, or it is a white or black
+ * node, which no face intersects. EBPO_E_ABSENT: the file is a subset (ebpo_subset) without the
+ * data below this node.
  * EBPO_E_LIMIT: options.memory is too small, and the message names a sufficient value; or more than
  * 2^32 - 2 nodes, planes or listed faces. Also the errors of reading (base.h).
  *
@@ -89,8 +90,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_open(const ebpo_file *file, uint
 EBPO_API void ebpo_subtree_close(ebpo_subtree *subtree);
 
 /*
- * Returns the octcode of the cell of a level that contains the point. A point on a cell face
- * belongs to the cell with the larger coordinates. The node may be missing in the tree
+ * Returns the octcode of that cell of a level which contains the point. A point on a cell face
+ * belongs to the cell with the larger coordinates. The tree may have no node for this cell
  * (ebpo_subtree_options.or_leaf_above). Returns 0 if the point is not in the model's root cell, or
  * the level is invalid.
  *
@@ -102,7 +103,7 @@ EBPO_API uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], 
 
 /* ---- nodes ---- */
 
-/* In `children`: the node has no children in this subtree. */
+/* Value in `children` of ebpo_subtree_nodes: the node has no children in this subtree. */
 #define EBPO_NO_CHILDREN UINT32_MAX
 
 /*
@@ -117,7 +118,7 @@ typedef struct ebpo_subtree_nodes {
 
     uint64_t node_count;
 
-    /* [level_count + 1] first node of each level */
+    /* [level_count + 1] index of the first node of each level; then node_count */
     const uint64_t *level_first;
 
     /* [node_count] octcodes of the nodes */
@@ -127,38 +128,40 @@ typedef struct ebpo_subtree_nodes {
     const uint8_t *types;
 
     /*
-     * [node_count] winding number. White, black: that of all points in the cell. Leaf: that of the
-     * lowest corner, after a shift by infinitely small positive numbers (format-spec/README.md,
-     * section 10). Gray: 0. NULL: the model is a surface.
+     * [node_count] winding numbers. White or black node: winding number of all points in the cell.
+     * Leaf: winding number of the lowest corner, after the corner was shifted by infinitely small
+     * positive numbers (format-spec/README.md, section 10). Gray node: 0. NULL: the model is a
+     * surface
      */
     const int32_t *windings;
 
     /*
-     * [node_count] index of the first of a gray node's eight children, which are in the order of
-     * octants. EBPO_NO_CHILDREN: the node is not gray, its children are beyond options.levels, or
-     * it is pruned.
+     * [node_count] index of the first child of each gray node; its eight children are consecutive,
+     * in the order of octants. EBPO_NO_CHILDREN: the node is not gray, it is pruned, or its
+     * children are beyond options.levels
      */
     const uint32_t *children;
 
     /*
      * [node_count + 1] index in `planes` of each node's first stored plane. Stored planes are the
-     * planes that a gray node adds to its parent's envelope, and the planes of a leaf if the file
-     * has them. NULL: not requested, or not in the file.
+     * planes that a gray node adds to those of its ancestors, and the planes of a leaf if the file
+     * has them. NULL: planes were not requested, or the file has none
      */
     const uint32_t *plane_first;
 
-    /* Plane codes (ebpo_plane_decode), in coordinates of the node's cell. */
+    /* Plane codes (ebpo_plane_decode) of all nodes, in the coordinates of each node's cell. */
     const uint32_t *planes;
 
     /*
      * [level + 1] index in `above_planes` of the first plane of each node above the subtree's root,
-     * from the tree's root down. These planes also bound all envelopes of the subtree. NULL: as for
-     * plane_first.
+     * from the tree's root down. These planes also bound all envelopes of the subtree. NULL: planes
+     * were not requested, or the file has none
      */
     const uint32_t *above_first;
 
     /*
-     * Plane codes (ebpo_plane_decode); the codes of a node are in coordinates of the node's cell.
+     * Plane codes (ebpo_plane_decode) of the nodes above the subtree's root, in the coordinates of
+     * each node's cell.
      */
     const uint32_t *above_planes;
 
@@ -175,29 +178,33 @@ typedef struct ebpo_subtree_nodes {
  */
 EBPO_API ebpo_status ebpo_subtree_get_nodes(const ebpo_subtree *subtree, ebpo_subtree_nodes *out);
 
-/* A node, with planes and vertices in the model's coordinates. */
+/* A node of a subtree, with planes and vertices in the model's coordinates. */
 typedef struct ebpo_subtree_node {
     size_t struct_size;
 
     /*
-     * As in streams (stream.h), with polygons only if requested. Leaves without stored planes have
-     * planes derived from their faces if the subtree has faces (EBP 2017, 3.3.4).
+     * The node as a stream returns it (stream.h), with one difference: if no planes of leaves are
+     * stored, and the subtree has faces, leaves have planes derived from their faces (EBP 2017,
+     * 3.3.4).
      */
     ebpo_stream_node node;
 
-    /* Number of half-spaces of the nodes above this node, from the tree's root down. */
+    /* Number of half-spaces in `inherited`. */
     uint32_t inherited_count;
 
-    /* [inherited_count] as `planes` of ebpo_stream_node */
+    /*
+     * [inherited_count] half-spaces of the nodes above this node, from the tree's root down, in the
+     * form of `planes` of ebpo_stream_node
+     */
     const double (*inherited)[4];
 } ebpo_subtree_node;
 
 #define EBPO_SUBTREE_NODE_INIT EBPO_SIZED(ebpo_subtree_node)
 
 /*
- * Gets the node with index `number` in ebpo_subtree_nodes: its cell, half-spaces and, with
- * `polygons`, its envelope; without planes if these were not read. Its pointers are valid until the
- * next call for a node of this subtree.
+ * Gets the node with index `number` in ebpo_subtree_nodes: its cell, its half-spaces if planes were
+ * read, and its envelope if `polygons` is true. Its pointers are valid until the next call of this
+ * function for the same subtree.
  *
  * Threads: one at a time per subtree.
  */
@@ -209,23 +216,24 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 
 /*
  * All faces that intersect the subtree's cell, in the order of the file. Leaves may also list faces
- * that are outside the cell by a rounding error. Shared faces come first: a leaf before this
- * subtree already lists them. All other faces are owned. So if the tree is divided into disjoint
- * subtrees, exactly one of the subtrees that list a face owns the face. The tree as a whole owns
- * all faces. In a subset (ebpo_subset), faces that are only below pruned nodes are missing. Arrays
- * are valid until the subtree is closed.
+ * that are outside the cell by a rounding error. In a subset (ebpo_subset), faces that are only
+ * below pruned nodes are missing. Arrays are valid until the subtree is closed.
+ *
+ * Shared faces come first: faces that a leaf before this subtree, in the order of the file, also
+ * lists. All other faces are owned. So if the tree is divided into disjoint subtrees, exactly one
+ * of the subtrees that list a face owns the face. The whole tree owns all faces.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size;
 
-    /* Number of faces, and number of shared faces, which are first. */
+    /* Number of faces, and number of shared faces. The shared faces are 0 .. shared_count - 1. */
     uint64_t face_count, shared_count;
 
     uint64_t vertex_count;
 
     /*
-     * [vertex_count][3] coordinates in the model's unit, as stored. One of the two arrays is set,
-     * the other is NULL
+     * [vertex_count][3] coordinates in the model's unit, as stored. One of the two arrays is set;
+     * the other array is NULL
      */
     const float *xyz32;
     const double *xyz64;
@@ -233,20 +241,29 @@ typedef struct ebpo_subtree_faces {
     /* [face_count][3] vertex indices in this subtree */
     const uint32_t *faces;
 
-    /* [face_count][3][3] corners, with options.corners. One of the two arrays is set */
+    /*
+     * [face_count][3][3] coordinates of the corners of each face, with options.corners; else NULL.
+     * One of the two arrays is set
+     */
     const float *corners32;
     const double *corners64;
 
     /* [face_count] index of each face in the file, ascending */
     const uint32_t *file_faces;
 
-    /* [face_count] source indices; NULL: not requested, or not in the file (EBPO_PART_MAPS) */
+    /*
+     * [face_count] source index of each face. NULL: source indices were not requested, or the file
+     * has none (EBPO_PART_MAPS)
+     */
     const uint32_t *source;
 
-    /* [node_count + 1] index in `list` of the first face of each node; only leaves list faces */
+    /*
+     * [node_count + 1] index in `list` of the first face that each node lists; only leaves list
+     * faces
+     */
     const uint32_t *list_first;
 
-    /* Face indices in this subtree, ascending within each leaf. */
+    /* Indices of the listed faces in this subtree, leaf after leaf, ascending within each leaf. */
     const uint32_t *list;
 } ebpo_subtree_faces;
 

@@ -4,18 +4,19 @@
  *     ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
  *     options.priority = EBPO_PRIORITY_PIXELS;
  *     options.observer = &observer;
- *     options.pixels = 8;            refine until no visible cell is larger
+ *     options.pixels = 8;            refine visible cells larger than 8 pixels
  *     ebpo_view_stream_new(file, &options, &stream, &error);
  *     while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK &&
  *            end == EBPO_VIEW_NODE)
- *         draw(&node);               when node.complete, discard the parent
+ *         draw(&node);               if node.complete, discard the parent
  *
  * The root comes first, then groups of the eight children of a gray node. Children replace their
- * parent when all eight are delivered (`complete`). The nodes that are not replaced are the cut.
+ * parent when all eight are delivered (`complete`). The delivered nodes that are not replaced are
+ * the *cut* of the tree.
  *
  * At any time the cut is a conservative level of detail. Every point of the root cell is in exactly
- * one cell of the cut (except on cell faces). The solid is contained in the envelopes of the gray
- * nodes and leaves of the cut, together with its black cells.
+ * one cell of the cut (except on cell faces). The envelopes of the cut's gray nodes and leaves,
+ * together with its black cells, contain the solid.
  *
  * Sources: BP 2008, section 4.3, algorithm 9 (adaptive display); Meagher 1982 (octree enumeration
  * front to back).
@@ -31,23 +32,23 @@ extern "C" {
 #endif
 
 /*
- * Order in which gray nodes of the cut are refined. Of nodes with equal priority, the coarser level
- * is first, then the lower octcode (path from the root to the node, three bits for each level;
- * stream.h).
+ * Order in which gray nodes of the cut are refined. Nodes of equal priority are refined by level,
+ * coarse to fine, and within a level by ascending octcode (path from the root to the node, three
+ * bits for each level; stream.h).
  */
 typedef enum ebpo_priority {
     /* Level by level, by octcode: the order of the file. */
     EBPO_PRIORITY_LEVEL = 0,
 
-    /* By distance from the eye to the nearest point of the cell, the nearest first. */
+    /* By distance from the eye to the nearest point of the cell, nearest cells first. */
     EBPO_PRIORITY_DISTANCE = 1,
 
-    /* By size in the image (`pixels` of ebpo_view_node), the largest first. */
+    /* By size in the image (`pixels` of ebpo_view_node), largest cells first. */
     EBPO_PRIORITY_PIXELS = 2,
 
     /*
-     * Front to back: of two cells on a ray from the eye, the nearer one and all its descendants are
-     * first. The eight children of a node are also front to back.
+     * Front to back: of two cells on a ray from the eye, the nearer cell is refined first, with all
+     * its descendants. The eight children of a node are also delivered front to back.
      */
     EBPO_PRIORITY_FRONT_TO_BACK = 3
 } ebpo_priority;
@@ -59,7 +60,7 @@ typedef struct ebpo_observer {
     /* Position of the eye, in the model's unit. */
     double eye[3];
 
-    /* Viewing direction of any length. (0, 0, 0): all directions, all nodes are visible. */
+    /* Viewing direction of any length. (0, 0, 0): all nodes are visible, in all directions. */
     double direction[3];
 
     /*
@@ -71,7 +72,7 @@ typedef struct ebpo_observer {
     /* Vertical field of view in degrees, above 0 and below 180. */
     double fov;
 
-    /* Size of the image in pixels, from 1. */
+    /* Size of the image in pixels; each at least 1. */
     uint32_t width, height;
 } ebpo_observer;
 
@@ -82,8 +83,8 @@ typedef struct ebpo_observer {
 
 /* Treatment of gray nodes whose cells are outside the image. */
 typedef enum ebpo_unseen {
-    EBPO_UNSEEN_LAST = 0, /* refined after all visible nodes */
-    EBPO_UNSEEN_NEVER = 1 /* never refined */
+    EBPO_UNSEEN_LAST = 0, /* they are refined after all visible nodes */
+    EBPO_UNSEEN_NEVER = 1 /* they are never refined */
 } ebpo_unseen;
 
 /* Options of ebpo_view_stream_new and ebpo_view_stream_change. */
@@ -95,7 +96,7 @@ typedef struct ebpo_view_options {
     /* Order in which gray nodes are refined. */
     ebpo_priority priority;
 
-    /* The observer; copied. NULL: no observer, allowed only with EBPO_PRIORITY_LEVEL. */
+    /* The observer, which is copied. NULL: no observer; allowed only with EBPO_PRIORITY_LEVEL. */
     const ebpo_observer *observer;
 
     /* Treatment of gray nodes outside the image. */
@@ -103,17 +104,17 @@ typedef struct ebpo_view_options {
 
     /*
      * Gray nodes whose size in the image (`pixels` of ebpo_view_node) is at most this number are
-     * not refined. 0: no limit.
+     * not refined. 0: the size does not matter.
      */
     double pixels;
 
     /*
      * Gray nodes whose cells are farther from the eye than this, in the model's unit, are not
-     * refined. INFINITY: no limit.
+     * refined. INFINITY: the distance does not matter.
      */
     double distance;
 
-    /* Deepest level to deliver. -1: all. */
+    /* Deepest level to deliver. -1: all levels. */
     int level;
 
     /*
@@ -128,8 +129,8 @@ typedef struct ebpo_view_options {
     /* ---- members that ebpo_view_stream_change may not change ---- */
 
     /*
-     * planes: true: nodes have half-spaces. polygons: true: nodes have envelopes as polygons. Both
-     * are as in ebpo_stream_options. If both are false, no planes are read.
+     * planes: true if nodes have half-spaces. polygons: true if nodes have envelopes as polygons.
+     * Both are as in ebpo_stream_options. If both are false, no planes are read.
      */
     bool planes, polygons;
 
@@ -137,15 +138,15 @@ typedef struct ebpo_view_options {
     bool windings;
 
     /*
-     * Memory limit in bytes for decoded chunks, at least 1 MiB. Chunks that were removed are read
-     * again when needed. 0: no limit. The stream also takes about 10 bytes per delivered node, 4
-     * more with winding numbers, 32 per gray node of the cut, and the plane codes.
+     * Maximum memory for decoded chunks in bytes, at least 1 MiB. Chunks that were removed are read
+     * again when needed. 0: no maximum. In addition, the stream takes about 10 bytes per delivered
+     * node (14 with winding numbers), 32 bytes per gray node of the cut, and the plane codes.
      */
     uint64_t memory;
 
     /*
-     * True: reads the faces of each leaf (ebpo_view_stream_get_faces), within the limits `bytes`
-     * and `memory`. The stream then also takes one bit per face of the file.
+     * True: reads the faces of each leaf (ebpo_view_stream_get_faces); their bytes and chunks count
+     * for `bytes` and `memory`. The stream then also takes one bit per face of the file.
      */
     bool faces;
 
@@ -170,8 +171,8 @@ typedef struct ebpo_view_node {
     int level;
 
     /*
-     * True for the root, and for the last of eight siblings: all eight are delivered now, and
-     * replace their parent.
+     * True for the root, and for the last of eight siblings. All eight siblings are then delivered,
+     * and replace their parent.
      */
     bool complete;
 
@@ -188,9 +189,9 @@ typedef struct ebpo_view_node {
     double distance;
 
     /*
-     * Length in pixels that the cell's diagonal would have in the middle of the image, if it were
-     * `distance` away from the eye and parallel to the image. INFINITY: the eye is in the cell. NAN
-     * without an observer.
+     * Size of the cell in the image: length, in pixels, that the cell's diagonal would have in the
+     * middle of the image, if it were `distance` away from the eye and parallel to the image.
+     * INFINITY: the eye is in the cell. NAN without an observer.
      */
     double pixels;
 } ebpo_view_node;
@@ -207,8 +208,8 @@ typedef enum ebpo_view_end {
 typedef struct ebpo_view_stream ebpo_view_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Reads nothing yet. Other users of the file
- * are allowed, but their reads count as well (options.bytes).
+ * Makes a stream of an open file, which must stay open. Reads no data yet. Other streams and models
+ * may use the file at the same time, but their reads also count for options.bytes.
  *
  * EBPO_E_ARGUMENT: invalid options. EBPO_E_ABSENT: faces are requested, and the file has no mesh.
  *
@@ -232,8 +233,8 @@ EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
  * Reads the chunks of the node and its siblings, unless they are in memory. For a remote file,
  * chunks of the next nodes are also prefetched, within options.bytes.
  *
- * The caller may pause at any time, and may retry after EBPO_E_IO and EBPO_E_MEMORY. EBPO_E_FORMAT
- * is permanent, and so is EBPO_E_LIMIT (more than 2^32 groups of siblings).
+ * The caller may pause at any time, and may repeat the call after EBPO_E_IO and EBPO_E_MEMORY.
+ * EBPO_E_FORMAT is permanent, and so is EBPO_E_LIMIT (more than 2^32 groups of siblings).
  *
  * The sequence of nodes depends only on the file and the options. A lower limit of bytes or nodes
  * ends the same sequence earlier.
@@ -249,20 +250,20 @@ typedef struct ebpo_view_faces {
     size_t struct_size;
 
     /*
-     * face_count: number of faces. new_count: number of those faces that no earlier leaf has
-     * delivered.
+     * face_count: number of faces. new_count: number of new faces, which were not delivered with an
+     * earlier leaf.
      */
     uint64_t face_count, new_count;
 
-    /* [face_count] corners, in the model's unit */
+    /* [face_count] coordinates of the three corners, in the model's unit */
     const double (*corners)[3][3];
 
     /* [face_count] index of each face in the file, ascending */
     const uint32_t *file_faces;
 
     /*
-     * [face_count] 1: an earlier leaf has delivered this face; 0: new. A viewer that draws only the
-     * new faces draws each face once
+     * [face_count] 1: the face was delivered with an earlier leaf. 0: the face is new. A viewer
+     * that draws only new faces draws each face once
      */
     const uint8_t *repeated;
 } ebpo_view_faces;
@@ -282,8 +283,8 @@ EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
                                                 ebpo_view_faces *out);
 
 /*
- * Sets other options, for example a moved observer. The cut is kept. After the current group of
- * siblings, the next nodes are selected by the new options. On failure nothing changes. `options`
+ * Sets new options, for example after the observer has moved. The cut is kept. Nodes after the
+ * current group of siblings are selected by the new options. On failure nothing changes. `options`
  * must not be NULL.
  *
  * EBPO_E_ARGUMENT: invalid options, or a member that must not change differs (ebpo_view_options).
@@ -303,8 +304,8 @@ typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 /*
  * Visits the cut: all delivered nodes that are not replaced by their children, including white
  * nodes. The order is front to back as seen by the observer, or, without an observer, depth first
- * by octcode. `complete` is always true. Before the root is delivered, the cut has no nodes. Reads
- * nothing. `visit` must not use the stream.
+ * by octcode. In these nodes, `complete` is always true. Before the root is delivered, the cut has
+ * no nodes. Reads no data. `visit` must not use the stream.
  *
  * Threads: one at a time per stream.
  */
@@ -325,7 +326,7 @@ typedef struct ebpo_view_stats {
 
     /*
      * Size in the image (`pixels` of ebpo_view_node) of the largest visible gray node of the cut.
-     * No coarser node is visible. 0: none is visible. NAN without an observer.
+     * 0: no gray node of the cut is visible. NAN without an observer.
      */
     double pixels;
 
@@ -345,26 +346,28 @@ EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
 
 /*
  * Makes a mesh for the observer from patches of the simplified surface (EBPO_PART_SURFACE), without
- * cracks. Independent of the delivered nodes; reads the patches that it uses, and the table of all
- * patches.
+ * cracks. The result does not depend on the delivered nodes. Reads the patches that it uses, and
+ * the table of all patches.
  *
- * The patch of the root is replaced by the patches of the node's children, and so on: first the
- * visible patch with the greatest error in the image. Members of the options apply to patches as to
- * nodes: unseen, distance, level, bytes and memory. With `faces`, patches without patches below are
- * replaced by the model's faces. `priority` is ignored.
+ * The mesh begins with the patch of the root. Again and again, the visible patch with the greatest
+ * error in the image is replaced by the patches of the node's children. The options unseen,
+ * distance, level, bytes and memory apply to patches as to nodes. If the option `faces` is true,
+ * patches whose nodes have no patches below are replaced by the model's faces. The option
+ * `priority` is ignored.
  *
- * pixels: no visible patch with a greater error in the image is used, unless another option
- * prevents its replacement. The error in the image is the size in pixels of ebpo_patch.error, at
- * the distance from the eye to the nearest point of the node's cell and in the middle of the image.
- * 0: there is no limit, so the finest patches are used.
+ * Option `pixels`: no visible patch with a greater error in the image is used, unless another
+ * option prevents its replacement. The error in the image is the size in pixels of
+ * ebpo_patch.error, at the distance from the eye to the nearest point of the node's cell and in the
+ * middle of the image. If `pixels` is 0, the finest patches are used.
  *
- * out     freed by ebpo_surface_mesh_free; cleared on failure. `error` is the greatest error of
- *         the patches that were used, `pixels` the greatest error in the image of the visible
- *         ones. Both are bounds for the patches as they are stored; a vertex that was replaced to
- *         close a crack is on a coarser patch.
+ * out     freed by ebpo_surface_mesh_free; cleared on failure. `error` is the greatest error of the
+ *         patches that were used, and `pixels` is the greatest error in the image of the visible
+ *         patches. Both are bounds for the patches as they are stored; a vertex that was replaced
+ *         to close a crack is on a coarser patch
  *
- * EBPO_E_ABSENT: the file does not have the part; or `faces`, and it has no mesh. EBPO_E_LIMIT:
- * options.bytes is too small for the patch of the root. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the file does not have the part, or `faces` is true and the file has no mesh.
+ * EBPO_E_LIMIT: options.bytes is too small for the patch of the root. EBPO_E_FORMAT, EBPO_E_IO,
+ * EBPO_E_MEMORY.
  *
  * Threads: one at a time per stream. Source: format-spec/surface.md.
  */
