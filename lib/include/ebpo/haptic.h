@@ -21,16 +21,16 @@
  *
  * The *proxy* is a ball (or a point, or a tool) that follows the haptic device. Where the device
  * passes through a face, the proxy stays on the side from which it came. The proxy's centre moves
- * along segments, each of which, by exact arithmetic, intersects no face. So the proxy passes
- * through no face, at any speed, and however thin the solid is. Faces count from both sides, so
- * surfaces work like solids.
+ * along segments. Exact arithmetic ensures that no segment intersects a face, so the proxy passes
+ * through no face, at any speed, and however thin the solid is. Faces stop the proxy from both
+ * sides, so surfaces work like solids.
  *
- * A *haptic step* is one cycle of the force computation. A step uses only data in memory: a limited
+ * A *haptic step* is one cycle of the force computation. A step uses only data in memory: a bounded
  * number of faces in a box around the device. A step takes no lock, allocates no memory and reads
  * no file. A separate thread loads the next box ahead of the device, and passes the box to the
- * steps by one atomic exchange. If the device leaves the box before the next one is loaded, the
- * proxy waits at the boundary of the box (EBPO_HAPTIC_WAITING), so deadlines are kept. If no
- * further box can be loaded, because reading failed or there are too many faces, steps report
+ * steps by one atomic exchange. If the device leaves the box before the next box is loaded, the
+ * proxy waits at the boundary of the box (EBPO_HAPTIC_WAITING), so deadlines are met. If no further
+ * box can be loaded, because reading failed or there are too many faces, steps report
  * EBPO_HAPTIC_STOPPED.
  *
  * Methods: EBP 2017, section 4.5; Zilles and Salisbury 1995 (proxy that is a point, "god-object");
@@ -48,7 +48,7 @@ extern "C" {
 /* A proxy, its box of faces and the thread that loads faces. */
 typedef struct ebpo_haptic ebpo_haptic;
 
-/* Kind of the haptic object. Only the step function of this kind is allowed. */
+/* Kind of a haptic object, with the step function that is allowed for it. */
 typedef enum ebpo_haptic_kind {
     EBPO_HAPTIC_BALL = 0,  /* ebpo_haptic_step_ball */
     EBPO_HAPTIC_PROBE = 1, /* ebpo_haptic_step_probe */
@@ -60,31 +60,31 @@ typedef struct ebpo_haptic_options {
     size_t struct_size;
 
     /*
-     * Radius of the ball in the model's unit, at least 0. 0: a point. `faces` must be large enough
-     * for all faces within the radius plus `search_radius` of the device. A step tests at most 512
-     * of these faces, in the order in which the ball may touch them; the next steps continue with
-     * the other faces.
+     * Radius of the ball in the model's unit, at least 0. 0: the ball is a point. `faces` must be
+     * large enough for all faces within the radius plus `search_radius` of the device. A step tests
+     * at most 512 of these faces, in the order in which the ball may touch them; the next steps
+     * test the other faces.
      */
     double radius;
 
     /*
      * Additional distance that the proxy keeps from faces because of rounding, in the model's unit.
-     * 0: 2^-20 of the diagonal of the model's root cell. Another value must be at least 2^-30 of
-     * this diagonal, and at least 2^-42 of the coordinates and of the radius.
+     * 0: 2^-20 of the diagonal of the model's root cell. Any other value must be at least 2^-30 of
+     * this diagonal, and at least 2^-42 of the greatest coordinate and of the radius.
      */
     double skin;
 
     /*
      * Search distance for the nearest face, in the model's unit, at least 0. Faces within this
-     * distance of the ball contribute to the smooth normal; nearer faces contribute more. 0: 3
-     * times the diagonal of the root cell, divided by the square root of the number of faces; this
-     * is a few edge lengths if all edges are similar.
+     * distance of the ball contribute to `normal` of the result; nearer faces contribute more. 0: 3
+     * times the diagonal of the root cell, divided by the square root of the number of faces. This
+     * is a few edge lengths if all edges have similar lengths.
      */
     double search_radius;
 
     /*
-     * stiffness: force per unit of depth. damping: force per unit of device speed (units per
-     * second) during contact. Both are at least 0.
+     * stiffness: force per unit of depth. damping: force per unit of the device's speed during
+     * contact; the speed is in the model's unit per second. Both are at least 0.
      */
     double stiffness, damping;
 
@@ -104,8 +104,9 @@ typedef struct ebpo_haptic_options {
     uint64_t faces;
 
     /*
-     * Tool: points[point_count][3] in the tool's coordinates, 1 to 10,000; copied. Each point stays
-     * on the side of a face from which it came; points need no normals. Other kinds: NULL and 0.
+     * For a tool: [point_count][3] points in the tool's coordinates, which are copied; 1 to 10,000
+     * points. Each point stays on the side of a face from which it came; points need no normals.
+     * For a ball or a probe: NULL and 0.
      */
     const double (*points)[3];
     uint64_t point_count;
@@ -120,12 +121,13 @@ typedef struct ebpo_haptic_options {
     }
 
 /*
- * Makes a haptic object at a position and starts loading around it.
+ * Makes a haptic object at a position and starts to load the faces around the position.
  *
  * model      must outlive the object. Contexts may use the model at the same time. The model's
  *            budget limits loading (ebpo_model_options.memory)
- * position   three finite doubles, outside the solid. Ball: no face may be within the radius plus
- *            1.5 skins of the position. Tool: the same for each of its points. Probe: anywhere
+ * position   three finite doubles. Ball: outside the solid, and no face may be within the radius
+ *            plus 1.5 times `skin` of the position. Tool: the same for each of its points, with
+ *            radius 0. Probe: any position
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
@@ -146,7 +148,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
  */
 EBPO_API void ebpo_haptic_free(ebpo_haptic *haptic);
 
-/* Flags of a haptic step: bits. */
+/* Flags of the result of a haptic step, as bits. */
 typedef enum ebpo_haptic_flag {
     /* A face keeps the proxy away from the device. */
     EBPO_HAPTIC_CONTACT = 1,
@@ -162,16 +164,16 @@ typedef enum ebpo_haptic_flag {
     EBPO_HAPTIC_PATH_UNFINISHED = 4,
 
     /*
-     * The nearest face, its distance and the normal were computed from only a part of the faces
-     * within `search_radius`: the farthest faces were not tested, or some faces were not loaded.
-     * The path of the proxy is not affected.
+     * Not all faces within `search_radius` were used for the nearest face, its distance and the
+     * normal: the farthest faces were not tested, or some faces were not loaded. The path of the
+     * proxy is not affected.
      */
     EBPO_HAPTIC_FACES_OMITTED = 8,
 
     /* The device position was not finite; the previous position was used. */
     EBPO_HAPTIC_BAD_INPUT = 16,
 
-    /* Wrong step function for this kind; nothing was done. */
+    /* The step function is not that of the object's kind; nothing was done. */
     EBPO_HAPTIC_WRONG_KIND = 32,
 
     /* ebpo_haptic_step_probe: the distance is exact except for rounding. */
@@ -179,7 +181,7 @@ typedef enum ebpo_haptic_flag {
 
     /*
      * Loading has failed and ended permanently, see ebpo_haptic_check. The proxy moves only in the
-     * loaded box. Set in all later steps.
+     * loaded box. All later steps also have this flag.
      */
     EBPO_HAPTIC_STOPPED = 128
 } ebpo_haptic_flag;
@@ -200,8 +202,8 @@ typedef struct ebpo_haptic_ball_result {
     double normal[3];
 
     /*
-     * In contact: length of the vector from proxy to device; with EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_PATH_UNFINISHED, length of that part of the vector that faces prevent. Without
+     * In contact: length of the vector from proxy to device. With EBPO_HAPTIC_WAITING or
+     * EBPO_HAPTIC_PATH_UNFINISHED, only the part of this vector that faces prevent counts. Without
      * contact: minus the distance from the ball to the nearest face, or minus `search_radius` if no
      * face is within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face that was not tested
      * may be nearer.
@@ -209,9 +211,9 @@ typedef struct ebpo_haptic_ball_result {
     double depth;
 
     /*
-     * Nearest face within `search_radius`: the index as in ebpo_distance_result (EBPO_NO_FACE:
-     * none), the nearest point on the face, and the weights of the face's corners at this point,
-     * whose sum is 1.
+     * Nearest face within `search_radius`. face: index as in ebpo_distance_result; EBPO_NO_FACE: no
+     * face. point: point of the face nearest to the proxy. weight: weights of the face's corners at
+     * this point; their sum is 1.
      */
     uint64_t face;
     double point[3], weight[3];
@@ -224,16 +226,16 @@ typedef struct ebpo_haptic_ball_result {
 } ebpo_haptic_ball_result;
 
 /*
- * Computes one haptic step with the device at `device`. Takes bounded time, without locks,
- * allocation or reading. Results are reproducible, except after EBPO_HAPTIC_WAITING or
- * EBPO_HAPTIC_PATH_UNFINISHED: then the proxy's path depends on the times at which boxes were
- * loaded.
+ * Computes one haptic step with the device at the position `device`. Takes bounded time, without
+ * locks, allocation or reading. Results are reproducible, except after EBPO_HAPTIC_WAITING or
+ * EBPO_HAPTIC_PATH_UNFINISHED. After these flags, the proxy's path depends on the times at which
+ * boxes were loaded.
  *
- * The force is stiffness times the vector from device to proxy, minus damping times the device
- * velocity. If the spring pushes the device away from a face, the total force has no component
- * towards that face above 1e-7 of its length. The force is reduced if needed, so that for any
- * motion the total energy given to the device is at most the energy taken from the device, plus
- * stiffness times the square of the longest step of the device.
+ * The force is that of a spring (stiffness times the vector from device to proxy), minus damping
+ * times the device velocity. If the spring pushes the device away from a face, the component of the
+ * force towards that face is at most 1e-7 of the length of the force. The force is reduced if
+ * needed, so that for any motion the total energy given to the device is at most the energy taken
+ * from the device, plus stiffness times the square of the longest step of the device.
  *
  * Threads: one at a time per object.
  */
@@ -244,8 +246,9 @@ EBPO_API void ebpo_haptic_step_ball(ebpo_haptic *haptic, const double device[3],
 enum { EBPO_HAPTIC_PATH_MAX = 17 };
 
 /*
- * Gets the path of the proxy in the last step: the segments from path[0] to path[n - 1], which
- * intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first step.
+ * Gets the path of the proxy in the last step: n points path[0] to path[n - 1], joined by segments
+ * that intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first
+ * step.
  *
  * Threads: one at a time per object.
  */
@@ -254,8 +257,8 @@ EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
 
 /*
  * Gets the path of a tool's proxy in the last step, as ebpo_haptic_ball_path does for a ball. Each
- * item is a position and a quaternion x, y, z, w. Between two items, each point of the tool moved
- * along a segment.
+ * item of `path` is a position and a quaternion x, y, z, w. Between two items, each point of the
+ * tool moved along a segment.
  *
  * Threads: one at a time per object.
  */
@@ -266,28 +269,28 @@ EBPO_API uint32_t ebpo_haptic_tool_path(const ebpo_haptic *haptic,
 typedef struct ebpo_haptic_probe_result {
     /*
      * Signed distance, negative inside a solid. With EBPO_HAPTIC_ACCURATE: correct except for a few
-     * rounding errors of the coordinates. Without this flag: NAN, only the bounds are known.
-     * ebpo_map_colour (map.h) converts a distance to a colour.
+     * rounding errors of the coordinates. Without this flag: NAN, because only the bounds are
+     * known. ebpo_map_colour (map.h) converts a distance to a colour.
      */
     double distance;
 
     /*
-     * Bounds of the signed distance. lo = -hi: the position may be inside or outside.
+     * Bounds of the signed distance. If lo = -hi, the position may be inside or outside.
      */
     double lo, hi;
 
     /*
-     * Unit vector, outward for solids. As in ebpo_haptic_ball_result if a face is within
-     * `search_radius`; else the normal of the previous nearest face, or (0, 0, 0) if there was
-     * none.
+     * Unit vector, outward for solids. If a face is within `search_radius`, it is computed as in
+     * ebpo_haptic_ball_result. Otherwise it is the normal of the last nearest face of an earlier
+     * step, or (0, 0, 0) if there was no such face.
      */
     double normal[3];
 
-    /* Nearest face within `search_radius` as in ebpo_haptic_ball_result; else EBPO_NO_FACE. */
+    /* Nearest face within `search_radius`, as in ebpo_haptic_ball_result. */
     uint64_t face;
     double point[3], weight[3];
 
-    /* ebpo_where; EBPO_OUT for surfaces. */
+    /* Side of the position, as ebpo_where; EBPO_OUT for surfaces. */
     int32_t where;
 
     /* ebpo_haptic_flag bits */
@@ -298,14 +301,14 @@ typedef struct ebpo_haptic_probe_result {
 } ebpo_haptic_probe_result;
 
 /*
- * Computes one haptic step of a probe, which has no collisions: bounds of the distance from the
- * `position` to the model, from data in memory. The bounds combine
- *   - the near faces, and the sides of these faces on which the probe is, which are tracked by
- *   exact arithmetic: within `search_radius` of a face the result is exact except for rounding;
- *   - the first levels of the octree, at most 2^17 nodes: leaves and gray nodes bound the distance;
- *   other nodes give the side;
- *   - the exact result for a previous position of the probe, from the loading thread: since then
- *   the distance has changed by at most the length of the path.
+ * Computes one haptic step of a probe, which has no collisions. The result is bounds of the
+ * distance from the `position` to the model. The bounds combine three sources in memory:
+ *   - The near faces, and the sides of these faces on which the probe is. Exact arithmetic tracks
+ *   these sides. Within `search_radius` of a face, the result is exact except for rounding.
+ *   - The first levels of the octree, at most 2^17 nodes. Leaves and gray nodes bound the distance;
+ *   white and black nodes give the side.
+ *   - The exact result for an earlier position of the probe, which the loading thread computes. The
+ *   distance has changed since by at most the length of the probe's path.
  *
  * Time, locks, memory and reading are as in ebpo_haptic_step_ball.
  *
@@ -321,24 +324,27 @@ typedef struct ebpo_haptic_tool_result {
 
     /*
      * Force and torque for the device, along the axes of the model. The torque is about the tool's
-     * position. 0 unless EBPO_HAPTIC_CONTACT.
+     * position. Both are 0 without EBPO_HAPTIC_CONTACT.
      */
     double force[3], torque[3];
 
     /*
-     * In contact: length of the motion from proxy to device that contacts prevent, with angles as
-     * lengths (ebpo_haptic_step_tool). Else 0.
+     * In contact: length of the part of the motion from proxy to device that contacts prevent;
+     * rotations count as lengths (ebpo_haptic_step_tool). Without contact: 0.
      */
     double depth;
 
     /*
-     * The point nearest to a face, if within 2 skins: index of the point in the tool (EBPO_NO_FACE:
-     * none), the face as in ebpo_distance_result, and the unit vector from the face to the point.
+     * The point of the tool that is nearest to a face, if their distance is at most 2 times `skin`.
+     * point: index in the tool's points; EBPO_NO_FACE: there is no such point. face: index as in
+     * ebpo_distance_result. normal: unit vector from the face to the point.
      */
     uint64_t point, face;
     double normal[3];
 
-    /* Number of pairs of a point and a face within 2 skins, at most 256. */
+    /*
+     * Number of pairs of a point and a face whose distance is at most 2 times `skin`; at most 256.
+     */
     uint64_t contacts;
 
     /* Number of nodes visited in this step, plus six for each tested face. */
@@ -350,22 +356,22 @@ typedef struct ebpo_haptic_tool_result {
 } ebpo_haptic_tool_result;
 
 /*
- * Computes one haptic step of a tool with the device at `position`, rotated by the
- * quaternion `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or
- * comes closer than half a skin to a face; this is decided by exact arithmetic, as for a ball.
- * Between its points a tool has no collisions, so the spacing of points must be finer than the
- * features to feel.
+ * Computes one haptic step of a tool with the device at `position`, rotated by the quaternion
+ * `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or comes closer
+ * than half of `skin` to a face; as for a ball, exact arithmetic ensures this. Between its points a
+ * tool has no collisions, so the spacing of points must be finer than the features to feel.
  *
- * A rotation counts as its angle times the arm of the tool, the root mean square distance of the
- * points from the tool's position. Among all motions that the contacts allow, the proxy makes the
- * motion that ends nearest to the device. Force and torque are those of a spring of `stiffness` for
- * the prevented motion (for an angle, stiffness times arm^2). As in ebpo_haptic_step_ball, force
- * and torque are reduced to bound the energy; rotations count as lengths.
+ * A rotation counts as a length: its angle times the arm of the tool. The arm is the root mean
+ * square distance of the points from the tool's position. Among all motions that the contacts
+ * allow, the proxy makes the motion that ends nearest to the device. Force and torque are those of
+ * a spring for the prevented motion; its stiffness is `stiffness` for translations, and `stiffness`
+ * times arm^2 for angles. As in ebpo_haptic_step_ball, force and torque are reduced to bound the
+ * energy; rotations count as lengths.
  *
  * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near a face since their
- * last test take almost no time. If many points are near faces and the work exceeds a step, the
- * next steps continue the work (EBPO_HAPTIC_PATH_UNFINISHED), and the tool does not move until the
- * work is done.
+ * last test take almost no time. If many points are near faces, and their tests exceed the work
+ * limit of a step, the next steps continue the tests (EBPO_HAPTIC_PATH_UNFINISHED). The tool does
+ * not move until all tests are done.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
@@ -377,8 +383,9 @@ EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double position[3
                                     const double turn[4], ebpo_haptic_tool_result *out);
 
 /*
- * Places the object at another position, without collisions on the way, and waits until the
- * surroundings are loaded. A tool gets the rotation 0, 0, 0, 1. Not for use in a haptic step.
+ * Places the proxy at another position, without collisions on the way, and waits until the
+ * surroundings are loaded. A tool gets the rotation 0, 0, 0, 1. Because it waits, do not call this
+ * function in the loop of haptic steps.
  *
  * Errors are those of ebpo_haptic_new. After a failure the position is unchanged.
  *
@@ -388,10 +395,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const 
                                                      ebpo_error *error);
 
 /*
- * Returns the error that stopped the loading thread (EBPO_HAPTIC_STOPPED). Takes a lock: not for
- * use in a step.
+ * Returns the error that stopped the loading thread (EBPO_HAPTIC_STOPPED). Because it takes a lock,
+ * do not call this function in the loop of haptic steps.
  *
- * EBPO_OK: not stopped; else the errors of reading, EBPO_E_LIMIT, EBPO_E_MEMORY.
+ * EBPO_OK: the thread is not stopped. Other statuses: the errors of reading (base.h), EBPO_E_LIMIT,
+ * EBPO_E_MEMORY.
  *
  * Threads: any.
  */
@@ -404,17 +412,20 @@ typedef struct ebpo_haptic_stats {
     /* Number of steps. */
     uint64_t step_count;
 
-    /* Number of steps with each of these flags. */
+    /*
+     * Number of steps with EBPO_HAPTIC_CONTACT, EBPO_HAPTIC_WAITING, EBPO_HAPTIC_PATH_UNFINISHED
+     * and EBPO_HAPTIC_FACES_OMITTED.
+     */
     uint64_t contacts, waiting, path_unfinished, faces_omitted;
 
     /*
-     * loads: number of boxes loaded. taken: number of boxes that steps used. too_many: number of
-     * boxes that were not completed, because they had too many faces.
+     * loads: number of boxes that were loaded. taken: number of boxes that steps used. too_many:
+     * number of boxes that were not completed, because they had too many faces.
      */
     uint64_t loads, taken, too_many;
 
     /*
-     * faces: number of faces of the current box. work_max: maximum number of faces tested in a
+     * faces: number of faces in the current box. work_max: maximum number of faces tested in a
      * step.
      */
     uint64_t faces, work_max;
@@ -428,7 +439,7 @@ typedef struct ebpo_haptic_stats {
     /* Memory of the boxes in bytes. */
     uint64_t memory;
 
-    /* load_seconds: time of loading, in total. load_seconds_max: maximum for one box. */
+    /* load_seconds: total time of loading. load_seconds_max: longest time for one box. */
     double load_seconds, load_seconds_max;
 
     /* Number of steps with EBPO_HAPTIC_STOPPED. */

@@ -240,8 +240,8 @@ typedef enum ebpo_map_palette {
     EBPO_MAP_DIVERGING = 0,
 
     /*
-     * Colours by absolute distance as in EBP 2017, section 4.4: black on the surface, then red,
-     * then green, and blue for the farthest points.
+     * Colours by absolute distance as in EBP 2017, section 4.4: black on the surface, and from red
+     * over green to blue with increasing distance.
      */
     EBPO_MAP_THESIS = 1,
 

@@ -8,7 +8,7 @@
  *              ebpo_paint_remove_layer
  *   Notes      ebpo_paint_get_note, ebpo_paint_add_note, ebpo_paint_remove_note
  *   Strokes    ebpo_paint_get_stroke, ebpo_paint_add_stroke, ebpo_paint_remove_stroke
- *   A pen      ebpo_paint_draw (strokes from device positions), ebpo_paint_locate
+ *   A pen      ebpo_paint_draw (makes strokes from device positions), ebpo_paint_locate
  *   Results    ebpo_paint_cover, ebpo_paint_bake, ebpo_paint_colour_mesh, ebpo_paint_measure
  *
  *     ebpo_paint *paint = NULL;
@@ -22,13 +22,14 @@
  *     ebpo_paint_save(paint, "model.paint.h5", &error);
  *
  * format-spec/paint.md defines the file and the painted area. A *stroke* is a sequence of points on
- * faces. Each point has a ball: the point paints the part of the surface in the ball that is
- * connected to the point. Later strokes cover earlier ones. To undo the last stroke, remove it. The
- * model is never changed.
+ * faces. Each point has a ball, and paints the part of the surface that is in the ball and
+ * connected to the point. Later strokes cover earlier strokes. To undo the last stroke, remove it.
+ * The model is never changed.
  *
- * An ebpo_paint is entirely in memory, 48 bytes per point, and keeps a descriptor of its file open.
- * Memory for queries of the model is that of the model's budget, plus the memory stated for each
- * function. Texts and arrays that functions return are valid until the paint is changed or freed.
+ * An ebpo_paint is entirely in memory. It takes 48 bytes per point, and keeps a descriptor of its
+ * file open. Queries of the model use the memory of the model's budget, and the memory that each
+ * function states. Texts and arrays that functions return are valid until the paint is changed or
+ * freed.
  *
  * Application: EBP 2017, section 4.5 (painting by a haptic device).
  */
@@ -45,7 +46,7 @@ extern "C" {
 /* The layers, strokes and notes of one model. */
 typedef struct ebpo_paint ebpo_paint;
 
-/* Maximum numbers of layers, notes, strokes and points in a file. */
+/* Maximum number of layers, of notes, of strokes and of points in a file. */
 enum {
     EBPO_PAINT_LAYERS = 1024,
     EBPO_PAINT_NOTES = 4096,
@@ -68,8 +69,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_new(const ebpo_file *model, ebpo_p
 /*
  * Reads a file and makes all checks that do not need the model.
  *
- * EBPO_E_FORMAT: not a paint file, or damaged. EBPO_E_VERSION: a later version. EBPO_E_UNSUPPORTED:
- * another program wrote an unsupported layout. EBPO_E_IO.
+ * EBPO_E_FORMAT: the file is not a paint file, or is damaged. EBPO_E_VERSION: the file has a later
+ * version. EBPO_E_UNSUPPORTED: another program wrote a layout that is not supported. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -77,8 +78,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open(const char *path, ebpo_paint 
                                                    ebpo_error *error);
 
 /*
- * Reads a paint as ebpo_paint_open does, from bytes in memory that are not needed afterwards.
- * `name` is for messages and may be NULL.
+ * Reads a paint as ebpo_paint_open does, from bytes in memory. The bytes are not needed afterwards.
+ * `name` is the name of the paint in messages, and may be NULL.
  *
  * Threads: any.
  */
@@ -87,27 +88,28 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
                                                           ebpo_error *error);
 
 /*
- * Opens a file for a change, and locks it against other changes. Until the first ebpo_paint_save to
- * `path`, or ebpo_paint_free, no other process or thread can open the file with this function, and
- * no other ebpo_paint_save replaces it. So changes by several programs are sequential, and no
- * change is lost:
+ * Opens a file to change it, and locks it against other changes. The lock ends with the first
+ * ebpo_paint_save to `path`, or with ebpo_paint_free. Until then, no other process or thread can
+ * open the file with this function, and no other ebpo_paint_save replaces it. So programs change
+ * the file one after the other, and no change is lost:
  *
  *     ebpo_paint_open_to_change("model.paint.h5", model, 60, NULL, &paint, &error);
  *     ebpo_paint_add_layer(paint, &layer, NULL, &error);
  *     ebpo_paint_save(paint, "model.paint.h5", &error);
  *     ebpo_paint_free(paint);
  *
- * model      if the file does not exist, makes a new paint for this model; NULL: the file must
+ * model      model for which a new paint is made if the file does not exist; NULL: the file must
  *            exist
- * wait       maximum waiting time in seconds
- * progress   stage "waiting"; or NULL
+ * wait       maximum time, in seconds, to wait for the lock of another program
+ * progress   callback, which is called with the stage "waiting"; may be NULL
  *
- * If two programs each open two files this way, they can block each other; this ends after `wait`.
- * While the lock is held, an empty file ".NAME.lock" is in the same folder. There is no lock if the
- * file system has no locks (NFS without its lock service), the folder is not writable, or
- * ".NAME.lock" is not an empty file. Even then, ebpo_paint_save detects changes by others.
+ * If two programs each open two files in this way, they can block each other until `wait` has
+ * passed. While a program has the lock, an empty file ".NAME.lock" is in the same folder. There is
+ * no lock if the file system has no locks (NFS without its lock service), the folder is not
+ * writable, or ".NAME.lock" is not an empty file. Even without a lock, ebpo_paint_save detects
+ * changes by other programs.
  *
- * EBPO_E_IO: also if the lock is not free within `wait`. EBPO_E_CANCELLED, and the errors of
+ * EBPO_E_IO: also if the lock is not free within `wait`. EBPO_E_CANCELLED. Also the errors of
  * ebpo_paint_open and ebpo_paint_new.
  *
  * Threads: any.
@@ -120,10 +122,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
 /*
  * Writes the paint to a file, which is replaced atomically.
  *
- * A paint belongs to the file from which it was read, or else to the first file to which it was
- * saved. A save to this path fails with EBPO_E_IO if another program, or another ebpo_paint, has
- * changed or replaced the file since this paint read or saved it. Then open the file again and
- * repeat the change, or save to another path. A save to any other path replaces the file there.
+ * A paint belongs to the file from which it was read. A paint that was not read from a file belongs
+ * to the first file to which it was saved. A save to this file fails with EBPO_E_IO if another
+ * program, or another ebpo_paint, has changed or replaced the file since this paint read or saved
+ * it. In this case, open the file again and repeat the change, or save to another path. A save to
+ * any other path replaces the file at that path.
  *
  * The save compares the file with the version that this paint read or saved, and then replaces the
  * file. A lock protects both steps against all users of this library, in any process and thread.
@@ -132,7 +135,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
  * between the two steps.
  *
  * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also if the lock is not
- * free within 10 seconds, because another user has the file open to change.
+ * free within 10 seconds, because another program has opened the file to change it.
  *
  * Threads: any.
  */
@@ -151,17 +154,18 @@ typedef struct ebpo_paint_info {
     size_t struct_size;
 
     /*
-     * Program that wrote the file; content_sha256 of the model as 64 hexadecimal digits; name and
-     * unit of the model. "": unknown.
+     * generator: program that wrote the file. model_sha256: content_sha256 of the model, as 64
+     * hexadecimal digits. model_name, unit: name and unit of the model. "": unknown.
      */
     const char *generator, *model_sha256, *model_name, *unit;
 
     /*
      * 1: indices of faces are source indices (indices in the mesh that was converted). 0: indices
-     * of faces are those in the model's file.
+     * of faces are indices in the model's file.
      */
     uint64_t source_numbers;
 
+    /* Number of layers, notes, strokes, and points of all strokes. */
     uint64_t layer_count, note_count, stroke_count, point_count;
 } ebpo_paint_info;
 
@@ -175,7 +179,7 @@ typedef struct ebpo_paint_info {
 EBPO_API ebpo_status ebpo_paint_get_info(const ebpo_paint *paint, ebpo_paint_info *out);
 
 /*
- * Checks that the paint belongs to this model, or to the model of which this is a subset.
+ * Checks that the paint belongs to `model`, or to the model from which the subset `model` was made.
  *
  * EBPO_E_ARGUMENT: the paint belongs to another model, which the message names. EBPO_E_ABSENT: the
  * model has no mesh, or lacks the required source indices.
@@ -187,16 +191,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *pain
                                                           ebpo_error *error);
 
 /*
- * Checks that every point and note is on its face. Points whose face or surroundings are missing in
- * a subset pass. The checksums of the file do not ensure this, because the program that wrote the
- * file may have stored wrong positions. Functions that query the model at a point also check that
- * point. Use this function for points that are only stored.
+ * Checks that every point and note is on its face. Points whose faces or surroundings are missing
+ * in a subset are not checked. The checksums of the file do not ensure that points are on their
+ * faces, because the program that wrote the file may have stored wrong positions. Functions that
+ * query the model at a point also check that point. Use this function before you use stored points
+ * without such a query.
  *
- * context    of a matching model
- * progress   stage "checking"; or NULL
+ * context    context of a matching model (ebpo_paint_check_model)
+ * progress   callback, which is called with the stage "checking"; may be NULL
  *
- * EBPO_E_FORMAT: a point is not on its face; the message has its index. EBPO_E_ARGUMENT,
- * EBPO_E_ABSENT: as ebpo_paint_check_model. EBPO_E_CANCELLED. Also the errors of reading (base.h).
+ * EBPO_E_FORMAT: a point is not on its face; the message gives the index of the point.
+ * EBPO_E_ARGUMENT, EBPO_E_ABSENT: as for ebpo_paint_check_model. EBPO_E_CANCELLED. Also the errors
+ * of reading (base.h).
  *
  * Threads: one at a time per context.
  */
@@ -215,8 +221,8 @@ typedef struct ebpo_paint_layer {
     size_t struct_size;
 
     /*
-     * At most 255, 255, 31 and 4,095 bytes, in this order. The date is "" or valid for
-     * ebpo_is_date. A date that was read from a file may be any text, and may be kept.
+     * The texts have at most 255, 255, 31 and 4,095 bytes, in this order. The date is "" or valid
+     * for ebpo_is_date. A date that was read from a file may be any text, and may be kept.
      */
     const char *title, *author, *date, *description;
 
@@ -229,7 +235,7 @@ typedef struct ebpo_paint_layer {
     /* Opacity of the whole layer, 0 to 255. */
     uint32_t opacity;
 
-    /* 0 or 1. */
+    /* 1: the layer is visible. 0: it is not. */
     uint64_t visible;
 } ebpo_paint_layer;
 
@@ -247,7 +253,7 @@ EBPO_API ebpo_status ebpo_paint_get_layer(const ebpo_paint *paint, uint64_t numb
                                           ebpo_paint_layer *out);
 
 /*
- * Adds a layer above all others.
+ * Adds a layer above all other layers.
  *
  * number   receives the index of the new layer; may be NULL
  *
@@ -260,8 +266,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_layer(ebpo_paint *paint,
                                                         uint64_t *number, ebpo_error *error);
 
 /*
- * Replaces the properties of layer `number`. Texts of ebpo_paint_get_layer for this layer may be
- * passed.
+ * Replaces the properties of layer `number`. The texts in `layer` may be those that
+ * ebpo_paint_get_layer returned for this layer.
  *
  * Errors are those of ebpo_paint_add_layer.
  *
@@ -294,17 +300,17 @@ typedef struct ebpo_paint_point {
 
     /*
      * Barycentric weights of the second and third corner, in units of 2^-30. Their sum is at most
-     * 2^30; the rest is the weight of the first corner.
+     * 2^30; the weight of the first corner is the difference from 2^30.
      */
     uint32_t weight[2];
 
-    /* Milliseconds since `time` of the stroke. */
+    /* Time since `time` of the stroke, in milliseconds. */
     uint32_t time;
 
-    /* Share of the stroke's radius, in units of 2^-15: 1 to 2^15. */
+    /* Radius of the point's ball: share of the stroke's radius in units of 2^-15, 1 to 2^15. */
     uint16_t size;
 
-    /* Pressure of the pen; 65,535: full. */
+    /* Pressure of the pen, 0 to 65,535 (full pressure). */
     uint16_t pressure;
 
     uint32_t reserved;
@@ -316,13 +322,16 @@ typedef struct ebpo_paint_point {
 typedef struct ebpo_paint_note {
     size_t struct_size;
 
-    /* At most 255, 255, 31 and 32,767 bytes, in this order; rules as for layers. */
+    /*
+     * The texts have at most 255, 255, 31 and 32,767 bytes, in this order. Other rules are those of
+     * ebpo_paint_layer.
+     */
     const char *title, *author, *date, *body;
 
     /* Index of the layer of the note. */
     uint64_t layer;
 
-    /* Position; size, pressure and time are ignored. */
+    /* Position of the note; size, pressure and time of the point are ignored. */
     ebpo_paint_point at;
 } ebpo_paint_note;
 
@@ -366,19 +375,19 @@ typedef enum ebpo_paint_kind {
 typedef struct ebpo_paint_stroke {
     size_t struct_size; /* EBPO_PAINT_STROKE_INIT sets it */
 
-    uint64_t layer;
-    ebpo_paint_kind kind;
+    uint64_t layer;       /* index of the layer */
+    ebpo_paint_kind kind; /* effect of the stroke */
 
-    /* 0xRRGGBBAA: sRGB and opacity; 0 for an erasing stroke. */
+    /* Colour 0xRRGGBBAA: sRGB and opacity; 0 for an erasing stroke. */
     uint32_t colour;
 
-    /* Radius of points of full size, in the model's unit: 2^-200 to 2^200. */
+    /* Radius of the balls of points of full size, in the model's unit: 2^-200 to 2^200. */
     double radius;
 
-    /* Milliseconds since 1970-01-01 UTC, at most 2^53; 0: unknown. */
+    /* Time in milliseconds since 1970-01-01 UTC, at most 2^53; 0: unknown. */
     uint64_t time;
 
-    /* At least one. */
+    /* Number of points, at least 1, and the points in their order. */
     uint64_t point_count;
     const ebpo_paint_point *points;
 } ebpo_paint_stroke;
@@ -395,8 +404,8 @@ EBPO_API ebpo_status ebpo_paint_get_stroke(const ebpo_paint *paint, uint64_t num
                                            ebpo_paint_stroke *out);
 
 /*
- * Adds a stroke over the earlier ones. EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT:
- * EBPO_PAINT_STROKES strokes or EBPO_PAINT_POINTS points exist.
+ * Adds a stroke, which covers earlier strokes. EBPO_E_ARGUMENT: a member is not valid.
+ * EBPO_E_LIMIT: EBPO_PAINT_STROKES strokes or EBPO_PAINT_POINTS points exist.
  *
  * Threads: one at a time per paint.
  */
@@ -420,10 +429,10 @@ typedef struct ebpo_paint_input {
     /* Position, in the model's coordinates. */
     double place[3];
 
-    /* Pressure of the pen, 0 to 1. 0: does not paint. */
+    /* Pressure of the pen, 0 to 1. 0: the pen does not paint. */
     double pressure;
 
-    /* Milliseconds since the first sample, at most 2^32 - 1. */
+    /* Time since the first position, in milliseconds, at most 2^32 - 1. */
     double time;
 } ebpo_paint_input;
 
@@ -440,35 +449,36 @@ typedef struct ebpo_paint_pen {
     double radius;
 
     /*
-     * Maximum distance of points from the *foot* of the pen, the point of the surface nearest to
-     * the device. In the model's unit, 0 to 2^200. Points are on the part of the surface that is
-     * within this distance and connected to the foot. 0: all points are at the foot.
+     * Maximum distance of points from the *foot* of the pen, which is the point of the surface
+     * nearest to the device. In the model's unit, 0 to 2^200. Points are on the part of the surface
+     * that is within this distance and connected to the foot. 0: all points are at the foot.
      */
     double spread;
 
     /*
-     * Number of points at each step along the path (see `step`) at full pressure, 1 to 10,000. At
-     * pressure p, a step has p * density points, rounded, and at least one. If `spread` is 0, this
-     * number must be 1.
+     * Number of points of a step along the path (see `step`) at full pressure, 1 to 10,000. At
+     * pressure p, a step has p * density points, rounded, but at least one point. If `spread` is 0,
+     * this number must be 1.
      */
     uint32_t density;
 
     uint32_t reserved;
 
     /*
-     * Sizes of points at pressure 0 and 1, as shares of the radius, 2^-15 to 1; linear in between.
+     * Sizes of points at pressure 0 (size_least) and at pressure 1 (size_full), as shares of the
+     * radius, 2^-15 to 1. Sizes at other pressures are interpolated linearly.
      */
     double size_least, size_full;
 
     /*
-     * Length of a step: distance along the path between two positions at which points are made, in
-     * the model's unit, at least 2^-200. 0: half of the larger of radius and spread.
+     * Length of a step: distance along the path between two positions at which points are made. In
+     * the model's unit, at least 2^-200. 0: half of the radius, or of `spread` if that is larger.
      */
     double step;
 
     /*
-     * The pen is lifted where the device is farther from the surface than this distance; at least
-     * 0. INFINITY: the pen is never lifted.
+     * The pen is lifted where the device is farther from the surface than this distance, in the
+     * model's unit, at least 0. INFINITY: the pen is never lifted.
      */
     double within;
 
@@ -495,14 +505,14 @@ typedef struct ebpo_paint_drawn {
     size_t struct_size;
 
     /*
-     * Number of strokes, number of their points, number of steps that painted, and number of steps
-     * with the pen lifted.
+     * strokes: number of strokes. points: number of their points. steps: number of steps that
+     * painted. lifted: number of steps with the pen lifted.
      */
     uint64_t strokes, points, steps, lifted;
 
     /*
-     * Number of points that were discarded, because they were not within the spread or not on the
-     * connected part of the surface.
+     * Number of points that were discarded, because they were not within `spread` of the foot, or
+     * not on the part of the surface that is connected to the foot.
      */
     uint64_t strayed;
 } ebpo_paint_drawn;
@@ -511,17 +521,18 @@ typedef struct ebpo_paint_drawn {
 
 /*
  * Converts the path of a device to strokes, with a new stroke after each lift of the pen. The path
- * is straight between samples. At each step along the path, the pen paints at the nearest point of
- * the surface. More pressure gives more points. Equal inputs and seeds give equal points.
+ * is straight between two positions of the input. At each step along the path, the pen paints at
+ * the nearest point of the surface. More pressure gives more points. Equal inputs and seeds give
+ * equal points.
  *
- * context   of a matching model
- * input     [count], at least 1
+ * context   context of a matching model (ebpo_paint_check_model)
+ * input     [count] positions of the device, at least 1
  * drawn     receives statistics; may be NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
  * match. EBPO_E_ABSENT: the model is a subset that omits faces around the pen. EBPO_E_LIMIT: the
- * budget is too small (ebpo_model_new), or two samples are too many steps apart. Also the errors of
- * reading (base.h).
+ * budget is too small (ebpo_model_new), or there are too many steps between two positions of the
+ * input. Also the errors of reading (base.h).
  *
  * Threads: one at a time per paint and per context.
  */
@@ -531,8 +542,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_conte
                                                    ebpo_paint_drawn *drawn, ebpo_error *error);
 
 /*
- * Finds the point of the surface nearest to a position, for notes and custom pens. The point has
- * full size, pressure 0 and time 0.
+ * Finds the point of the surface nearest to a position, for notes and for pens of the caller. The
+ * point has full size, pressure 0 and time 0.
  *
  * Errors are those of ebpo_distance. EBPO_E_ARGUMENT: also if the model does not match.
  *
@@ -549,9 +560,10 @@ typedef struct ebpo_paint_options {
     size_t struct_size;
 
     /*
-     * For areas, 1 to 65,536. A partly covered part of a face is halved until its longest edge is
-     * at most r / fineness, where r is the least radius of the balls that intersect this part. With
-     * 256, the bounds of the area of a disc are within 1 %, and `value` is within 0.1 %.
+     * Accuracy of areas, 1 to 65,536. A part of a face that is partly covered is halved until its
+     * longest edge is at most r / fineness, where r is the least radius of the balls that intersect
+     * this part. With 256, the bounds of the area of a disc are within 1 % of the area, and `value`
+     * is within 0.1 %.
      */
     unsigned fineness;
 
@@ -574,22 +586,27 @@ typedef struct ebpo_paint_face {
     /* Coordinates of the three corners, as stored in the file. */
     double corner[3][3];
 
-    /* 1: this corner is covered. A face without covered corners may be covered in its middle. */
+    /*
+     * For each corner, 1: the corner is covered; 0: it is not. A face without covered corners may
+     * be covered in its middle.
+     */
     uint8_t covered[3];
 
     uint8_t reserved[5];
 } ebpo_paint_face;
 
-/* Callback. It returns false to stop the call. */
+/* Callback that gets a face. It returns false to stop the call. */
 typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*
  * Passes the faces that intersect the balls of a stroke's points, and their covered corners, to
- * `take`: each once, in the order of the file. This and the following functions take 110 bytes per
- * face, and 300 for each face that intersects the box around one point.
+ * `take`. Each face is passed once, in the order of the file. This function, ebpo_paint_bake and
+ * ebpo_paint_measure take 110 bytes per face, and 300 bytes for each face that intersects the box
+ * around one point.
  *
- * context                 of a matching model
- * points_outside_subset   receives the number of points whose faces a subset lacks; may be NULL
+ * context                 context of a matching model (ebpo_paint_check_model)
+ * points_outside_subset   receives the number of points whose faces are missing in the subset; may
+ *                         be NULL
  *
  * EBPO_E_ARGUMENT: the model does not match. EBPO_E_FORMAT: a point is not on its face.
  * EBPO_E_UNSUPPORTED: the model's coordinates are beyond 2^200. EBPO_E_LIMIT: a point's ball
@@ -613,9 +630,9 @@ typedef struct ebpo_paint_baked {
     uint64_t vertices;
 
     /*
-     * points: number of points of visible layers. points_outside_subset: number of those whose
-     * faces a subset lacks. points_without_vertex: number of those that cover no vertex, because
-     * their balls are smaller than the faces.
+     * points: number of points of visible layers. points_outside_subset: number of these points
+     * whose faces are missing in the subset. points_without_vertex: number of these points that
+     * cover no vertex, because their balls are smaller than the faces.
      */
     uint64_t points, points_outside_subset, points_without_vertex;
 } ebpo_paint_baked;
@@ -625,14 +642,14 @@ typedef struct ebpo_paint_baked {
 /*
  * Applies the visible layers to the colours of vertices.
  *
- * context   of a matching model
+ * context   context of a matching model (ebpo_paint_check_model)
  * mesh      mesh of that model, with faces, from ebpo_file_read_source_mesh
- * rgba      [vertex_count][4] in the order of the mesh. Input: the model's own colours. Output: the
- *           new colours; alpha and the colours of uncovered vertices are kept
+ * rgba      [vertex_count][4] in the order of the mesh. Input: the colours of the model. Output:
+ *           the new colours; alpha and the colours of uncovered vertices are unchanged
  * baked     receives statistics; may be NULL
  *
- * Takes, besides the mesh, 4 bytes per vertex, 72 per covered vertex, and 4 per face if source
- * indices of faces have gaps.
+ * Memory besides the mesh: 4 bytes per vertex, 72 bytes per covered vertex, and 4 bytes per face if
+ * some source indices of faces are not used.
  *
  * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also if the mesh does not match.
  * EBPO_E_CANCELLED. On failure the colours are unchanged.
@@ -645,12 +662,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo
                                                    ebpo_paint_baked *baked, ebpo_error *error);
 
 /*
- * Sets the colours of a mesh's vertices where they differ from the current ones
- * (ebpo_mesh_colours). The properties red, green and blue (or diffuse_red and so on) are set and
- * keep their types (int8 holds at most 127). A mesh without these properties gets them as uint8,
- * for all vertices. All other data is unchanged.
+ * Sets the colours of those vertices of a mesh whose colours in `rgba` differ from their current
+ * colours (ebpo_mesh_colours). The attributes red, green and blue (or diffuse_red, diffuse_green
+ * and diffuse_blue) are set and keep their types; a value of type int8 is at most 127. A mesh
+ * without these attributes gets red, green and blue as uint8, for all vertices. All other data is
+ * unchanged.
  *
- * rgba   [vertex_count][4]; alpha is ignored
+ * rgba   [vertex_count][4] new colours; alpha is ignored
  *
  * EBPO_E_ARGUMENT: the mesh has the maximum number of attributes.
  *
@@ -669,8 +687,8 @@ typedef struct ebpo_paint_area {
 
 /* Area of one colour in one layer. */
 typedef struct ebpo_paint_colour_area {
-    uint64_t layer;
-    uint32_t colour;
+    uint64_t layer;  /* index of the layer */
+    uint32_t colour; /* 0xRRGGBBAA */
     uint32_t reserved;
     ebpo_paint_area area;
 } ebpo_paint_colour_area;
@@ -679,19 +697,22 @@ typedef struct ebpo_paint_colour_area {
 typedef struct ebpo_paint_areas {
     size_t struct_size;
 
-    /* All layers together. */
+    /* Area that is painted in at least one layer. */
     ebpo_paint_area all;
 
-    /* [layer_count] and [stroke_count] areas; 0 for erasing strokes */
+    /*
+     * layers: [layer_count] area of each layer. strokes: [stroke_count] area of each stroke; 0 for
+     * erasing strokes
+     */
     ebpo_paint_area *layers, *strokes;
 
-    /* [colour_count] by layer, then by colour */
+    /* [colour_count] area of each colour in each layer, sorted by layer, then by colour */
     uint64_t colour_count;
     ebpo_paint_colour_area *colours;
 
     /*
      * faces: number of faces that intersect balls of points. points_outside_subset: number of
-     * points whose faces a subset lacks.
+     * points whose faces are missing in the subset.
      */
     uint64_t faces, points_outside_subset;
 } ebpo_paint_areas;
@@ -699,13 +720,13 @@ typedef struct ebpo_paint_areas {
 #define EBPO_PAINT_AREAS_INIT EBPO_SIZED(ebpo_paint_areas)
 
 /*
- * Measures the painted area, including invisible layers, with any opacity. Where strokes of one
- * layer overlap, the area counts for the later stroke only.
+ * Measures the painted area. Invisible layers count too, and opacity does not matter. Where strokes
+ * of one layer overlap, the area counts only for the last of these strokes.
  *
  * out   freed by ebpo_paint_areas_free
  *
- * Takes 24 bytes for each pair of a face and a point whose ball intersects the face, and 80 for
- * each such face.
+ * Memory: 24 bytes for each pair of a face and a point whose ball intersects the face, and 80 bytes
+ * for each face in such a pair.
  *
  * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also if the fineness is not valid.
  * EBPO_E_CANCELLED.

@@ -22,10 +22,10 @@
  *
  * An *instance* is a model at a pose. A *route* is a list of poses with times; an instance or a
  * camera with a route moves along it. Layers and groups are named sets of instances; an instance is
- * in at most one layer and in any number of groups. A *rule* states for pairs of instances that
- * they are ignored, or which *clearance* (minimum distance) they must have.
+ * in at most one layer and in any number of groups. A *rule* states that pairs of instances are
+ * ignored, or which *clearance* (minimum distance) they must have.
  *
- * Models, instances and cameras are numbered in the order in which they were added. Times are in
+ * Models, instances and cameras have indices in the order in which they were added. Times are in
  * seconds. Before the first time of its route, an instance has the first pose of the route. After
  * the last time of the route, it has the last pose. Poses, boxes and pairs are the same on every
  * machine.
@@ -51,8 +51,8 @@ typedef struct ebpo_scene_options {
     size_t struct_size;
 
     /*
-     * Limits in bytes: for the scene file, and for the sum of all pose files that it names. 0: 64
-     * MiB and 256 MiB.
+     * max_bytes: maximum size of the scene file in bytes; 0: 64 MiB. max_pose_bytes: maximum total
+     * size of the pose files that it names, in bytes; 0: 256 MiB.
      */
     uint64_t max_bytes, max_pose_bytes;
 
@@ -63,9 +63,9 @@ typedef struct ebpo_scene_options {
     uint64_t max_values;
 
     /*
-     * True: files named by the scene may be anywhere. False: these files must be in the scene's
-     * folder or below; their paths must be relative and without "..", and no symbolic link may lead
-     * out of the folder.
+     * True: the files that the scene names may be anywhere. False: these files must be in the
+     * scene's folder or below; their paths must be relative and without "..", and no symbolic link
+     * may lead out of the folder.
      */
     bool allow_outside;
 
@@ -80,9 +80,9 @@ typedef struct ebpo_scene_options {
 /*
  * Reads a scene file and its pose files, but no model.
  *
- * EBPO_E_FORMAT: not a scene file; the message has the line and the path of the member, such as
- * "line 12: instances[3].pose.scale". EBPO_E_VERSION: another major version. EBPO_E_LIMIT: a limit
- * of the options is exceeded. EBPO_E_IO.
+ * EBPO_E_FORMAT: the file is not a scene file; the message has the line and the path of the JSON
+ * member, such as "line 12: instances[3].pose.scale". EBPO_E_VERSION: the file has another major
+ * version. EBPO_E_LIMIT: the scene exceeds max_bytes, max_pose_bytes or max_values. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -93,7 +93,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_open(const char *path,
 /*
  * Reads a scene as ebpo_scene_open does, from `size` bytes of text.
  *
- * name     for messages
+ * name     name of the scene in messages
  * folder   base folder of relative paths; NULL: the current folder
  *
  * Threads: any.
@@ -122,8 +122,8 @@ EBPO_API void ebpo_scene_free(ebpo_scene *scene);
  *
  * name     1 to 255 bytes of UTF-8, unique among models
  * path     path or URL of an .ebpo.h5 file
- * digest   content_sha256; NULL: any
- * number   may be NULL
+ * digest   content_sha256 that the file must have; NULL: any
+ * number   receives the index of the model; may be NULL
  *
  * EBPO_E_ARGUMENT: the name is not valid.
  *
@@ -133,14 +133,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const
                                                         const char *path, const uint8_t digest[32],
                                                         uint64_t *number, ebpo_error *error);
 
-/* Index that stands for no route, no layer or no group. */
+/* Value of an index if there is no route, no layer or no group. */
 #define EBPO_SCENE_NONE UINT64_MAX
 
 /* An instance of a model. */
 typedef struct ebpo_scene_instance {
     size_t struct_size;
 
-    /* 1 to 255 bytes of UTF-8, unique among instances. */
+    /* Name of the instance: 1 to 255 bytes of UTF-8, unique among instances. */
     const char *name;
 
     /* Index of the model. */
@@ -149,7 +149,7 @@ typedef struct ebpo_scene_instance {
     /* Pose in the world. With a route: pose in the coordinates that the route moves. */
     ebpo_pose pose;
 
-    /* Index of the route, and of the layer (ebpo_scene_get_layer). EBPO_SCENE_NONE: none. */
+    /* Index of the route, and of the layer (ebpo_scene_get_layer), or EBPO_SCENE_NONE. */
     uint64_t route, layer;
 
     /*
@@ -172,10 +172,11 @@ typedef struct ebpo_scene_instance {
 
 /*
  * Adds an instance of a model. If the model is loaded, boxes computed later include the instance.
- * `number` may be NULL.
  *
- * EBPO_E_ARGUMENT: the name, model, route, layer or pose is not valid (for a loaded model
- * ebpo_pose_check tests more), or the instance is fixed and has a route.
+ * number   receives the index of the instance; may be NULL
+ *
+ * EBPO_E_ARGUMENT: the name, model, route, layer or pose is not valid (if the model is loaded, the
+ * pose must pass ebpo_pose_check), or the instance is fixed and has a route.
  *
  * Threads: one at a time per scene.
  */
@@ -189,7 +190,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_instance(ebpo_scene *scene,
 typedef struct ebpo_scene_counts {
     size_t struct_size;
 
-    /* Number of models, of instances, and so on. */
+    /* Number of models, of instances, of layers, of groups, of routes and of cameras. */
     uint64_t models, instances, layers, groups, routes, cameras;
 
     /*
@@ -198,7 +199,7 @@ typedef struct ebpo_scene_counts {
      */
     uint64_t poses, ignored, clearances, fixed;
 
-    /* First and last time of all routes. 0, 0: no instance moves. */
+    /* First and last time of all routes, in seconds. Both are 0 if no instance moves. */
     double begin, end;
 } ebpo_scene_counts;
 
@@ -215,18 +216,18 @@ EBPO_API ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_c
 typedef struct ebpo_scene_model_facts {
     size_t struct_size;
 
-    /* Texts, valid until the scene is freed. The path is as in the scene file. */
+    /* Name and path as in the scene file; both texts are valid until the scene is freed. */
     const char *name, *path;
 
-    /* content_sha256 that the file must have. All 0: not stated. */
+    /* content_sha256 that the file must have. All bytes are 0 if the scene does not state it. */
     uint8_t digest[32];
 
     /* Number of instances of the model. */
     uint64_t instances;
 
     /*
-     * True if the file of the model is open. Then `min` and `max` are the box of its faces, in the
-     * model's unit.
+     * loaded: true if the file of the model is open. In this case `min` and `max` are the corners
+     * of the box of its faces, in the model's unit.
      */
     bool loaded;
     uint8_t reserved[7];
@@ -250,13 +251,13 @@ typedef struct ebpo_scene_stats {
     /* files: number of open files. models: number of files with a model in memory. */
     uint64_t files, models;
 
-    /* Bytes of memory of these models. */
+    /* Memory of the models that `models` counts, in bytes. */
     uint64_t memory;
 
-    /* Number of bytes read, and number of reads. */
+    /* Number of bytes read from the files, and number of reads. */
     uint64_t bytes_read, reads;
 
-    /* Subtrees loaded for queries, of models that are not entirely in memory. */
+    /* Number of subtrees that were loaded for queries of models that are partly in memory. */
     uint64_t loads;
 } ebpo_scene_stats;
 
@@ -278,22 +279,24 @@ EBPO_API ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t i
                                              ebpo_scene_instance *out);
 
 /*
- * Returns the name of a layer, valid until the scene is freed; NULL: `layer` is out of range.
+ * Returns the name of a layer, or NULL if `layer` is out of range. The text is valid until the
+ * scene is freed.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer);
 
 /*
- * Returns the name of a group, valid until the scene is freed; NULL: `group` is out of range.
+ * Returns the name of a group, or NULL if `group` is out of range. The text is valid until the
+ * scene is freed.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group);
 
 /*
- * Returns the index of the nth group of an instance. EBPO_SCENE_NONE: the instance has fewer
- * groups, or `instance` is out of range.
+ * Returns the index of the nth group (from 0) of an instance. Returns EBPO_SCENE_NONE if the
+ * instance has no nth group, or if `instance` is out of range.
  *
  * Threads: any.
  */
@@ -302,12 +305,12 @@ EBPO_API uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance
 /* A perspective camera of a scene (ebpo_scene_get_camera). */
 typedef struct ebpo_scene_camera {
     size_t struct_size;
-    /* Name, valid until the scene is freed. */
+    /* Name of the camera, valid until the scene is freed. */
     const char *name;
 
     /*
-     * Positions of the eye and of the point that it looks at, and upward direction: in the world
-     * or, with a route, in the coordinates that the route moves.
+     * Position of the eye, position of the point that the eye looks at, and upward direction. They
+     * are in the world or, with a route, in the coordinates that the route moves.
      */
     double eye[3], target[3], up[3];
 
@@ -332,10 +335,10 @@ EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t cam
                                            ebpo_scene_camera *out);
 
 /*
- * Returns true if a pair is to be tested: the scene does not ignore the pair, and the instances are
- * different and not both fixed. In this case *clearance is the largest clearance (minimum distance)
- * that the rules of the scene require for the pair, in the world's unit; 0: no clearance. Returns
- * false also for indices out of range.
+ * Returns true if a pair of instances is to be tested: the scene does not ignore the pair, and the
+ * instances are different and not both fixed. In this case *clearance is the largest clearance
+ * (minimum distance) that the rules of the scene require for the pair, in the world's unit; 0: no
+ * clearance. Returns false if an index is out of range.
  *
  * Threads: any.
  */
@@ -349,8 +352,8 @@ typedef struct ebpo_load_options {
     size_t struct_size;
 
     /*
-     * Memory limit in bytes for all queried models together (ebpo_budget_new). The first call with
-     * a value other than 0 sets the limit. 0: no limit.
+     * Maximum memory, in bytes, of all queried models together (ebpo_budget_new). The first call
+     * with a value other than 0 sets this maximum. 0: no maximum.
      */
     uint64_t memory;
 
@@ -363,9 +366,9 @@ typedef struct ebpo_load_options {
 #define EBPO_LOAD_OPTIONS_INIT EBPO_SIZED(ebpo_load_options)
 
 /*
- * Opens the files of models that are not open yet, one for each path. Compares the digests and
+ * Opens those files of models that are not open yet, once for each path. Compares the digests and
  * computes the boxes. Only the headers of the files are read. Files of models without instances are
- * opened as well.
+ * also opened.
  *
  * EBPO_E_FORMAT: a file is not an .ebpo.h5 file, its digest differs from that in the scene, or a
  * link leads out of the scene's folder (ebpo_scene_options.allow_outside). EBPO_E_ARGUMENT: an
@@ -378,18 +381,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_load(ebpo_scene *scene,
                                                    ebpo_error *error);
 
 /*
- * Returns the open file of a model, owned by the scene; NULL: not loaded, or `model` is out of
- * range. Models of the same path share the file.
+ * Returns the open file of a model, which the scene owns. Returns NULL if the model is not loaded
+ * (ebpo_scene_load), or if `model` is out of range. Models with the same path share the file.
  *
  * Threads: any.
  */
 EBPO_API const ebpo_file *ebpo_scene_file(const ebpo_scene *scene, uint64_t model);
 
 /*
- * Gets the model for queries (query.h). The scene owns it, and makes it at the first call. All
- * instances of a file share one ebpo_model.
+ * Gets the ebpo_model for queries of a model (query.h). The scene owns it, and makes it at the first
+ * call. All instances of a file share one ebpo_model.
  *
- * EBPO_E_ARGUMENT: not loaded. The errors of ebpo_model_new.
+ * EBPO_E_ARGUMENT: the model is not loaded (ebpo_scene_load). Also the errors of ebpo_model_new.
  *
  * Threads: one at a time per scene.
  */
@@ -407,11 +410,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint
                                                    double time, ebpo_pose *out, ebpo_error *error);
 
 /*
- * Computes an upper bound of the distance that any point of the instance's model moves between any
- * two times in from .. to, in the world's unit. The bound also holds for posed coordinates, which
- * are rounded. INFINITY: the route jumps. 0: the instance does not move.
+ * Computes an upper bound of the distance that a point of the instance's model moves between two
+ * times in from .. to, in the world's unit. The bound is valid for all points and all pairs of
+ * times, and also for posed coordinates, which are rounded. INFINITY: the route jumps. 0: the
+ * instance does not move.
  *
- * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite.
+ * EBPO_E_ARGUMENT: the model is not loaded, a time is not finite, or `from` is after `to`.
  *
  * Threads: any.
  */
@@ -431,9 +435,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_instance_box(const ebpo_scene *sce
                                                            ebpo_error *error);
 
 /*
- * Computes a box that contains all instances at all times in from .. to. Without instances, `min`
- * is INFINITY and `max` is -INFINITY. EBP 2017, 5.6.1, uses a different box: four times the
- * extents, centred at the mean of the centres of mass.
+ * Computes a box that contains all instances at all times in from .. to. If the scene has no
+ * instances, `min` is INFINITY and `max` is -INFINITY. EBP 2017, 5.6.1, uses a different box: it
+ * has four times the extents, and its centre is the mean of the centres of mass.
  *
  * Errors are those of ebpo_scene_motion. EBPO_E_ARGUMENT: also if the model of an instance was
  * added after the last ebpo_scene_load.
@@ -451,16 +455,18 @@ typedef struct ebpo_scene_pair {
     double clearance;
 } ebpo_scene_pair;
 
-/* Callback that gets pairs, valid until it returns. It returns false to stop the call. */
+/* Callback that gets pairs, which are valid until it returns. Returns false to stop the call. */
 typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, uint64_t count);
 
 /*
- * Broad phase: finds the pairs that ebpo_scene_pair_rule allows and whose boxes
- * (ebpo_scene_instance_box) are at most their clearance apart on each axis, in ascending order of
- * a, then b. If ebpo_scene_pair_rule allows a pair, and this function does not find it, then the
- * two instances are farther apart than their clearance at all times in from .. to.
+ * Broad phase: finds the pairs for which ebpo_scene_pair_rule returns true, and whose boxes
+ * (ebpo_scene_instance_box) are at most their clearance apart on each axis. Pairs are in ascending
+ * order of a, then b. If ebpo_scene_pair_rule returns true for a pair, and this function does not
+ * find the pair, then the two instances are farther apart than their clearance at all times in from
+ * .. to.
  *
- * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_LIMIT: more than 2^23 pairs.
+ * EBPO_E_ARGUMENT: a model is not loaded, a time is not finite, or `from` is after `to`.
+ * EBPO_E_LIMIT: more than 2^23 pairs.
  *
  * Threads: any.
  */
@@ -473,10 +479,13 @@ typedef enum ebpo_clash_kind {
     EBPO_CLASH_NONE = 0,     /* no faces intersect; one instance may be inside the other */
     EBPO_CLASH_NEAR = 1,     /* no faces intersect, but some are nearer than the clearance */
     EBPO_CLASH_TOUCHING = 2, /* faces have common points, but none in the interior of both */
-    EBPO_CLASH_COPLANAR = 3, /* faces are coplanar and overlap, none cross */
+    EBPO_CLASH_COPLANAR = 3, /* faces are coplanar and overlap, but no faces cross */
     EBPO_CLASH_CROSSING = 4, /* faces cross */
 
-    /* Only with ebpo_scene_clash_options.relate, instead of the previous kinds: */
+    /*
+     * Kinds that are possible only with ebpo_scene_clash_options.relate. If one of them applies, it
+     * replaces the kinds from EBPO_CLASH_NONE to EBPO_CLASH_CROSSING.
+     */
     EBPO_CLASH_PROTRUDING = 5, /* one instance is partly inside the other, which is a solid */
     EBPO_CLASH_ENCLOSED = 6,   /* one instance is inside the other, a solid; faces may touch */
     EBPO_CLASH_DUPLICATE = 7   /* both instances are the same point set */
@@ -489,58 +498,62 @@ typedef struct ebpo_scene_clash {
     uint64_t a, b;
 
     /*
-     * A pair of intersecting faces: the pair with the lowest indices if all pairs are counted, else
-     * the pair of ebpo_collide_first. If no faces intersect: the nearest pair of faces.
+     * A pair of intersecting faces, as source indices: the pair with the lowest indices if all
+     * pairs are counted (ebpo_scene_clash_options.count), else the pair of ebpo_collide_first. If
+     * no faces intersect: the nearest pair of faces.
      */
     uint64_t face_a, face_b;
 
     /*
-     * Number of pairs of faces of each kind (ebpo_pair_kind): all with
-     * ebpo_scene_clash_options.count, else those found until `kind` was certain.
+     * Number of pairs of faces of each kind (ebpo_pair_kind). With ebpo_scene_clash_options.count,
+     * all pairs are counted; otherwise the pairs that were found until `kind` was certain.
      */
     uint64_t touching, crossing, coplanar;
 
     /*
-     * clearance: the clearance that the scene requires for the pair. distance: exact distance of
-     * the faces for EBPO_CLASH_NEAR, and if one instance is inside the other without contact; else
-     * 0.
+     * clearance: the clearance that the scene requires for the pair. distance: exact distance
+     * between the faces for EBPO_CLASH_NEAR, and if one instance is inside the other and no faces
+     * intersect; in other cases 0. Both are in the world's unit.
      */
     double clearance, distance;
 
     /* ebpo_clash_kind. Without `relate`: the greatest kind of any pair of faces. */
     int32_t kind;
 
-    /* ebpo_relation of a to b with ebpo_scene_clash_options.relate, else EBPO_RELATION_UNDECIDED.
+    /*
+     * With ebpo_scene_clash_options.relate: ebpo_relation of a to b. Without it:
+     * EBPO_RELATION_UNDECIDED.
      */
     int32_t relation;
 
     /*
-     * Number of intersection lines (ebpo_collide_polylines), with ebpo_scene_clash_options.count.
-     * UINT64_MAX: the collider's memory does not hold all segments.
+     * With ebpo_scene_clash_options.count: number of intersection lines (ebpo_collide_polylines).
+     * UINT64_MAX: the collider's memory is too small for all segments.
      */
     uint64_t contacts;
 
     /*
-     * With ebpo_scene_clash_options.locations: a common point of the two faces, or the middle of
-     * their nearest points. In the world's coordinates, approximated in doubles. NAN: not
-     * requested.
+     * With ebpo_scene_clash_options.locations: a common point of face_a and face_b, or the middle
+     * of their nearest points. In the world's coordinates, approximated in doubles. Without this
+     * option: NAN.
      */
     double location[3];
 
     /*
-     * Box that contains `location` and, with ebpo_scene_clash_options.count, all contact segments.
+     * Corners of a box that contains `location` and, with ebpo_scene_clash_options.count, all
+     * contact segments.
      */
     double location_min[3], location_max[3];
 
     /*
      * Depth of a in b, and of b in a (ebpo_collide_depth), with the tolerance
-     * ebpo_scene_clash_options.depth. The bounds 0 and INFINITY: not requested, or the other
-     * instance is a surface.
+     * ebpo_scene_clash_options.depth. The bounds are 0 and INFINITY if the depth was not requested,
+     * or if the instance that may contain the other one is a surface.
      */
     ebpo_value_bounds depth[2];
 } ebpo_scene_clash;
 
-/* Callback that gets clashes, valid until it returns. It returns false to stop the call. */
+/* Callback that gets clashes, which are valid until it returns. Returns false to stop the call. */
 typedef bool (*ebpo_scene_clashes_fn)(void *user, const ebpo_scene_clash *clashes, uint64_t count);
 
 /* Options of ebpo_scene_find_clashes. */
@@ -551,14 +564,14 @@ typedef struct ebpo_scene_clash_options {
 
     unsigned threads;
 
-    /* Counts all pairs of intersecting faces, and the intersection lines. */
+    /* True: counts all pairs of intersecting faces, and the intersection lines. */
     bool count;
 
-    /* Computes `location`, `location_min` and `location_max` of ebpo_scene_clash. */
+    /* True: computes `location`, `location_min` and `location_max` of ebpo_scene_clash. */
     bool locations;
 
     /*
-     * Computes the relation of solids (ebpo_collide_relation) for all tested pairs. Takes about 60
+     * True: computes the relation (ebpo_collide_relation) of all tested pairs. This takes about 60
      * bytes per face of both models, for each thread.
      */
     bool relate;
@@ -566,8 +579,8 @@ typedef struct ebpo_scene_clash_options {
     uint8_t reserved;
 
     /*
-     * Computes penetration depths with this tolerance, in the world's unit. Implies `relate`. 0:
-     * computes no depths.
+     * Tolerance of `depth` of ebpo_scene_clash, in the world's unit. A tolerance above 0 implies
+     * `relate`. 0: computes no depths.
      */
     double depth;
 } ebpo_scene_clash_options;
@@ -580,11 +593,12 @@ typedef struct ebpo_scene_clash_options {
  * ascending order of a, then b. If one instance is inside the other and no faces are near, the pair
  * is reported only with options.relate. The required models are made, as by ebpo_scene_model.
  *
- * tested   number of tested pairs; may be NULL
+ * tested   receives the number of tested pairs; may be NULL
  *
- * EBPO_E_ARGUMENT: not loaded, or invalid time, pose (ebpo_pose_check) or options.depth.
- * EBPO_E_ABSENT: a model has no mesh, or is a subset without required faces (`relate` requires all
- * faces). EBPO_E_LIMIT: too little memory (ebpo_load_options). Also the errors of reading (base.h).
+ * EBPO_E_ARGUMENT: a model is not loaded, or the time, a pose (ebpo_pose_check) or options.depth is
+ * not valid. EBPO_E_ABSENT: a model has no mesh, or is a subset without required faces (`relate`
+ * requires all faces). EBPO_E_LIMIT: `memory` of ebpo_load_options is too small. Also the errors of
+ * reading (base.h).
  *
  * Threads: one at a time per scene.
  */
@@ -609,23 +623,24 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_
 /* A file of the clashes at several times, while it is being written. */
 typedef struct ebpo_scene_report ebpo_scene_report;
 
-/* One time of a report, with statistics. */
+/* One time of a report, with statistics of ebpo_scene_find_clashes at this time. */
 typedef struct ebpo_scene_frame {
+    /* The time in the scene, in seconds. */
     double time;
 
     /* tested: number of tested pairs. nanoseconds: duration of the tests. */
     uint64_t tested, nanoseconds;
 
     /*
-     * During the tests of this time: bytes read, number of models made, number of subtrees loaded
+     * Number of bytes read, of models made, and of subtrees loaded during the tests
      * (ebpo_scene_stats).
      */
     uint64_t bytes_read, models, loads;
 } ebpo_scene_frame;
 
 /*
- * Begins an HDF5 file, which HDF5 1.8 and later can read. The file appears atomically at
- * ebpo_scene_report_finish. Each array has an attribute `meaning` with a description.
+ * Begins an HDF5 file, which HDF5 1.8 and later can read. The file appears atomically when
+ * ebpo_scene_report_finish is called. Each array has an attribute `meaning` with a description.
  *
  *   /instances/names       uint8 [bytes]  names in order, each terminated by 0
  *   /instances/model       int64 [i]      index in /models/names
@@ -656,7 +671,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_new(const ebpo_scene *scene
                                                          ebpo_error *error);
 
 /*
- * Adds a time with the results of ebpo_scene_find_clashes. EBPO_E_IO.
+ * Adds the results of ebpo_scene_find_clashes at one time. EBPO_E_IO.
  *
  * Threads: one at a time per report.
  */
@@ -682,24 +697,28 @@ EBPO_API void ebpo_scene_report_free(ebpo_scene_report *report);
 
 /* ---- over time ---- */
 
-/* Two instances, a < b, over a time interval. */
+/* Result of ebpo_scene_approach for two instances, a < b. */
 typedef struct ebpo_scene_approach_result {
     uint64_t a, b;
 
-    /* At all earlier times, the faces of a and b are certainly farther apart than the clearance. */
+    /*
+     * Time at which the search ended. At all earlier times of the interval, the faces of a and b
+     * are certainly farther apart than the clearance.
+     */
     double time;
 
-    /* Bounds of the distance of their faces at `time`. */
+    /* Bounds of the distance between the faces of a and b at `time`. */
     double lo, hi;
 
+    /* Clearance that the scene requires for the pair. */
     double clearance;
 
-    /* Number of evaluated times. */
+    /* Number of times at which the distance was evaluated. */
     uint64_t evaluations;
 
     /*
-     * 1: at `time` the faces are at most clearance + tolerance apart. 0: they are farther apart up
-     * to the last time, which is `time`. -1: undecided. The search ended at `time` after
+     * 1: at `time` the faces are at most clearance + tolerance apart. 0: the faces are farther
+     * apart during the whole interval; `time` is its end. -1: undecided, because the search reached
      * options.max_evaluations, or because the tolerance is finer than the rounding of coordinates.
      */
     int32_t reached;
@@ -707,7 +726,7 @@ typedef struct ebpo_scene_approach_result {
     int32_t reserved;
 } ebpo_scene_approach_result;
 
-/* Callback that gets results, valid until it returns. It returns false to stop the call. */
+/* Callback that gets results, which are valid until it returns. Returns false to stop the call. */
 typedef bool (*ebpo_scene_approaches_fn)(void *user, const ebpo_scene_approach_result *results,
                                          uint64_t count);
 
@@ -723,7 +742,7 @@ typedef struct ebpo_scene_approach_options {
      */
     double tolerance;
 
-    /* Maximum number of evaluations per pair. 0: 10,000. */
+    /* Maximum number of times at which the distance of a pair is evaluated. 0: 10,000. */
     uint64_t max_evaluations;
 
     unsigned threads;
@@ -734,12 +753,12 @@ typedef struct ebpo_scene_approach_options {
 #define EBPO_SCENE_APPROACH_OPTIONS_INIT EBPO_SIZED(ebpo_scene_approach_options)
 
 /*
- * Finds when instances first come within their clearance of each other; no time is missed. For each
- * pair of ebpo_scene_pairs (from, to), the distance is evaluated at a time. This distance and the
- * bound of ebpo_scene_motion give a later time, before which the pair cannot be near. At this later
- * time the distance is evaluated next, and so on. There is one result per pair, in ascending order
- * of a, then b. An instance that is inside another one from the beginning, without near faces,
- * counts as apart.
+ * Finds the time in from .. to at which two instances are first within their clearance of each
+ * other; no time is missed. For each pair of ebpo_scene_pairs (from, to), the distance is evaluated
+ * at time `from`. This distance and the bound of ebpo_scene_motion give a later time, before which
+ * the pair cannot be near. At this later time the distance is evaluated next, and so on. There is
+ * one result per pair, in ascending order of a, then b. If one instance is inside another instance
+ * from the beginning, and no faces are near, the instances count as apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -751,7 +770,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_approach(ebpo_scene *scene, double
                                                        ebpo_scene_approaches_fn take, void *user,
                                                        ebpo_error *error);
 
-/* Minimum distance of two instances, a < b, over a time interval. */
+/* Minimum distance between two instances, a < b, over a time interval. */
 typedef struct ebpo_scene_least {
     uint64_t a, b;
 
@@ -759,19 +778,23 @@ typedef struct ebpo_scene_least {
     double time;
 
     /*
-     * Bounds of the minimum distance of their faces over all times. They differ by at most the
-     * tolerance, unless options.max_evaluations was reached, a file lacks data, or the tolerance is
-     * finer than the rounding of coordinates.
+     * Bounds of the minimum distance between the faces over all times of the interval. They differ
+     * by at most the tolerance, unless options.max_evaluations was reached, a file lacks data, or
+     * the tolerance is finer than the rounding of coordinates.
      */
     double lo, hi;
 
+    /* Clearance that the scene requires for the pair. */
     double clearance;
 
-    /* Number of evaluated times. */
+    /* Number of times at which the distance was evaluated. */
     uint64_t evaluations;
 } ebpo_scene_least;
 
-/* Callback that gets minimum distances, valid until it returns. Its return value is ignored. */
+/*
+ * Callback that gets minimum distances, which are valid until it returns. Its return value is
+ * ignored.
+ */
 typedef bool (*ebpo_scene_least_fn)(void *user, const ebpo_scene_least *list, uint64_t count);
 
 /*
@@ -789,23 +812,22 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_least_distances(
 
 /* Queries that a packed scene must support. */
 typedef enum ebpo_scene_purpose {
-    /* ebpo_scene_find_clashes and ebpo_scene_approach; results have the face indices of the source.
-     */
+    /* ebpo_scene_find_clashes and ebpo_scene_approach. Results have source indices of faces. */
     EBPO_SCENE_FOR_COLLIDE = 0,
 
     /* Images from the scene's cameras, with cells no larger than a pixel. */
     EBPO_SCENE_FOR_VIEW = 1,
 
     /*
-     * Tests if points of instances are inside other instances. Needs only the data near other
-     * instances.
+     * Tests if points of instances are inside other instances. These tests need only the data near
+     * other instances.
      */
     EBPO_SCENE_FOR_INSIDE = 2,
 
     /*
      * As EBPO_SCENE_FOR_COLLIDE, with options.relate and options.depth of ebpo_scene_find_clashes.
-     * Needs all faces of an instance that is near another one, because any face may be part of a
-     * surface around the other instance.
+     * These queries need all faces of an instance that is near another instance, because any face
+     * may be part of a surface around the other instance.
      */
     EBPO_SCENE_FOR_RELATIONS = 3
 } ebpo_scene_purpose;
@@ -817,9 +839,10 @@ typedef struct ebpo_plan_options {
     ebpo_progress progress;
 
     /*
-     * Data of an instance is included if its distance from another instance is at most the
-     * clearance plus this margin, in the world's unit. With a larger margin, ebpo_scene_approach
-     * needs fewer evaluations. 0: for each pair, 1/32 of the longest side of the smaller box.
+     * Data of an instance is included if the distance of the data from another instance is at most
+     * the clearance plus this margin, in the world's unit. With a larger margin,
+     * ebpo_scene_approach needs fewer evaluations. 0: the margin for a pair is 1/32 of the longest
+     * side of the smaller of the two instances' boxes.
      */
     double margin;
 
@@ -842,20 +865,20 @@ typedef struct ebpo_scene_need {
 
     /*
      * EBPO_SCENE_FOR_VIEW: number of cameras. Other purposes: number of pairs that include an
-     * instance of this model's file; a pair of two such instances counts twice.
+     * instance of this model's file; a pair of two instances of this file counts twice.
      */
     uint64_t users;
 
     /*
-     * subtrees: number of the file's subtrees that intersect the box. total_subtrees: number of all
-     * subtrees of the file. 0, 0: the file is not divided into subtrees.
+     * subtrees: number of the file's subtrees that intersect the box min .. max. total_subtrees:
+     * number of all subtrees of the file. Both are 0 if the file has no table of subtrees.
      */
     uint64_t subtrees, total_subtrees;
 
     /* Size of the required chunks, each counted once, and size of the file; in bytes. */
     uint64_t bytes, file_bytes;
 
-    /* Box in the model's unit. Faces outside the box are not needed. */
+    /* Corners of a box in the model's unit. Faces outside the box are not needed. */
     double min[3], max[3];
 
     /* Deepest level that is needed, and number of levels of the file. */
@@ -875,16 +898,16 @@ typedef struct ebpo_scene_need {
 
 #define EBPO_SCENE_NEED_INIT EBPO_SIZED(ebpo_scene_need)
 
-/* Callback that gets needs, valid until it returns. Its return value is ignored. */
+/* Callback that gets needs, which are valid until it returns. Its return value is ignored. */
 typedef bool (*ebpo_scene_needs_fn)(void *user, const ebpo_scene_need *needs, uint64_t count);
 
 /*
  * Finds for each model the data that queries of a purpose can need at any time in from .. to. For
- * collisions and containment, this is the data near other instances; for images, levels. Reads only
- * headers and tables of files.
+ * collisions and containment, this is the data near other instances; for images, it is some levels.
+ * Reads only headers and tables of files.
  *
- * EBPO_E_ARGUMENT: not loaded, not from <= to, invalid purpose, or a margin below 0. The errors of
- * reading.
+ * EBPO_E_ARGUMENT: a model is not loaded, `from` is after `to`, the purpose is not valid, or the
+ * margin is below 0. Also the errors of reading (base.h).
  *
  * Threads: one at a time per scene.
  */
@@ -903,8 +926,9 @@ typedef struct ebpo_pack_options {
     double margin;
 
     /*
-     * Maximum total size of all models in bytes. If they are larger, each is reduced by the same
-     * ratio, with the smallest possible error bound (ebpo_subset). 0: no target.
+     * Maximum total size of the new models' files in bytes. If they are larger, the size of each
+     * file is reduced by the same ratio, with the least possible error bound (ebpo_subset). 0: no
+     * maximum.
      */
     uint64_t target_bytes;
 
@@ -929,17 +953,17 @@ typedef struct ebpo_scene_packed {
     uint64_t bytes, source_bytes, bytes_read;
 
     /*
-     * Error bound of the envelopes where the model was reduced, in the model's unit. 0: not
-     * reduced.
+     * Error bound of the envelopes where the model was reduced because of target_bytes, in the
+     * model's unit. 0: the model was not reduced.
      */
     double max_error;
 
-    /* content_sha256 of both files. */
+    /* content_sha256 of the new file, and of the source file. */
     uint8_t digest[32], source_digest[32];
 
     /*
-     * True: all planned queries are supported. False: some exact queries are not, because of
-     * target_bytes.
+     * True: all queries of the purpose are supported. False: some exact queries are not supported,
+     * because the model was reduced.
      */
     bool complete;
 
@@ -948,7 +972,7 @@ typedef struct ebpo_scene_packed {
 
 #define EBPO_SCENE_PACKED_INIT EBPO_SIZED(ebpo_scene_packed)
 
-/* Callback that gets packed models, valid until it returns. Its return value is ignored. */
+/* Callback that gets packed models, which are valid until it returns; its result is ignored. */
 typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models, uint64_t count);
 
 /*
@@ -956,9 +980,9 @@ typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models,
  * contains subsets of the models' files, pose files, and packed.scene.json, which is the scene with
  * these files, their digests and the digests of the source files. `take` may be NULL.
  *
- * Queries of options.purpose at times in from .. to have the same results in the new scene.
- * ebpo_scene_approach may evaluate other times, and intervals of distances beyond the clearance may
- * be wider. Queries that need more data return EBPO_E_ABSENT.
+ * Queries of options.purpose at times in from .. to have the same results in the new scene, except
+ * that ebpo_scene_approach may evaluate other times, and that intervals of distances beyond the
+ * clearance may be wider. Queries that need more data return EBPO_E_ABSENT.
  *
  * EBPO_E_ARGUMENT: as for ebpo_scene_plan; the scene was not read from a file, or was changed after
  * reading; or target_bytes is too small for a model. EBPO_E_ABSENT: with target_bytes, a file is a
