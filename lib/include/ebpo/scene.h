@@ -389,8 +389,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_load(ebpo_scene *scene,
 EBPO_API const ebpo_file *ebpo_scene_file(const ebpo_scene *scene, uint64_t model);
 
 /*
- * Gets the ebpo_model for queries of a model (query.h). The scene owns it, and makes it at the first
- * call. All instances of a file share one ebpo_model.
+ * Gets the ebpo_model for queries of a model (query.h). The scene owns the ebpo_model, and makes it
+ * at the first call. All instances of a file share one ebpo_model.
  *
  * EBPO_E_ARGUMENT: the model is not loaded (ebpo_scene_load). Also the errors of ebpo_model_new.
  *
