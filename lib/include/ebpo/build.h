@@ -190,7 +190,7 @@ typedef struct ebpo_build_options {
  * mesh is empty afterwards, also on failure. `out` is freed by ebpo_tree_free.
  *
  * report          result of ebpo_mesh_check or ebpo_mesh_prepare; copied to out->info
- * repair_record   repairs that were made; copied to out->info. NULL: none
+ * repair_record   repairs that were made; copied to out->info. NULL: no repairs
  *
  * EBPO_E_ARGUMENT: an option is out of range. EBPO_E_NOT_SOLID: see require_solid. EBPO_E_FORMAT,
  * EBPO_E_LIMIT: see ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no disk space for the

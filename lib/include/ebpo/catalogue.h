@@ -319,8 +319,8 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
  * times. On failure the results are unspecified. Errors are those of opening and querying models.
  * EBPO_E_LIMIT: a model does not fit in its share of the budget.
  *
- * A query waits while other queries use the budget. Therefore a callback of a query, such as the
- * one that opens files, must not query the same ebpo_catalogue_models.
+ * A query waits while other queries use the budget. Therefore a callback of a query, such as
+ * ebpo_catalogue_open_fn, must not query the same ebpo_catalogue_models.
  */
 
 /* Options of the queries of a catalogue. */

@@ -195,8 +195,8 @@ typedef struct ebpo_relation_result {
  * is also loaded if its model is known to have a face inside the other model and the subtree may
  * have a face outside, or the reverse: the model is then partly inside the other one.
  *
- * Errors are those of ebpo_collide_first; at the deadline the call succeeds with
- * EBPO_RELATION_UNDECIDED. EBPO_E_ABSENT: as for ebpo_inside.
+ * Errors are those of ebpo_collide_first. If the deadline passes, the call succeeds with the
+ * relation EBPO_RELATION_UNDECIDED. EBPO_E_ABSENT: as for ebpo_inside.
  *
  * Threads: one at a time per collider.
  */
@@ -598,7 +598,7 @@ typedef struct ebpo_self_intersections_options {
     ebpo_progress progress;
 
     /*
-     * PLY file to write, which is replaced atomically; NULL: none. It contains the mesh in the
+     * PLY file to write, which is replaced atomically; NULL: no file. It contains the mesh in the
      * source's order. Intersecting faces are red (255, 0, 0); other faces are grey.
      */
     const char *ply;

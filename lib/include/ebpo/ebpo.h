@@ -5,7 +5,7 @@
  *   workspace.h   memory limits
  *   memory.h      available memory
  *   mesh.h        triangle meshes: reading, checking, repairing
- *   findings.h    locations of the findings of a mesh check
+ *   findings.h    locations of findings (possible defects of a mesh)
  *   repair.h      trying repairs that make a mesh solid
  *   groups.h      named groups of faces
  *   rows.h        rows of numbers from any HDF5 file
@@ -15,7 +15,7 @@
  *   http.h        files on web servers
  *   async.h       files whose bytes arrive asynchronously
  *   query.h       point in solid, distance, rays, boxes, mass
- *   catalogue.h   queries of many models, or of the parts of one, together
+ *   catalogue.h   queries of many models, or of the parts of one model, together
  *   pair.h        relation of two faces
  *   pose.h        pose of a model in the world
  *   stream.h      levels, coarse to fine
@@ -26,7 +26,7 @@
  *   subset.h      a smaller file from a file
  *   verify.h      verifying the guarantees of a file
  *   error_bound.h error bound of a level
- *   limit.h       least possible volume of convex envelopes
+ *   limit.h       least possible volume of convex envelopes, for comparison
  *
  * Extras: headers of functions that are built on queries. They are installed unless the library was
  * configured with -Dextras=disabled.
@@ -34,7 +34,7 @@
  *   boolean.h     unions and differences of solids at poses: queries, volume, mesh
  *   collide.h     collision of two models
  *   scene.h       animated rigid instances of models
- *   map.h         maps of distance: planes, grids, two scans
+ *   map.h         maps of distances: on planes, on grids, between two scans
  *   haptic.h      haptic rendering at a steady rate
  *   paint.h       colours and notes on a model, in a separate file
  */

@@ -15,8 +15,9 @@ typedef struct ebpo_error_bound_options {
     size_t struct_size;
 
     /*
-     * Bounds are refined until hi <= (1 + tolerance) lo, or until `queries` distances have been
-     * computed, or the maximum number of distances for one node (ebpo_level_error_bound). Above 0.
+     * Bounds are refined until hi <= (1 + tolerance) lo, until `queries` distances have been
+     * computed, or until 65,536 distances have been computed for each node that determines the
+     * bounds. The tolerance is above 0.
      */
     double tolerance;
 

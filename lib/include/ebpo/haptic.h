@@ -158,8 +158,8 @@ typedef enum ebpo_haptic_flag {
 
     /*
      * The path of the proxy is incomplete, because the step reached its work limit before the end
-     * of the path. The next step continues; until then, a ball in contact stays in contact with the
-     * same faces.
+     * of the path. The next step continues the path; until then, a ball in contact stays in contact
+     * with the same faces.
      */
     EBPO_HAPTIC_PATH_UNFINISHED = 4,
 

@@ -287,7 +287,7 @@ typedef struct ebpo_mesh_report {
 
     /*
      * Edges that are not used equally often in both directions. Each of these edges also belongs to
-     * one of the three previous kinds.
+     * boundary_edges, nonmanifold_edges or misoriented_edges.
      */
     ebpo_finding unbalanced_edges;
 

@@ -107,7 +107,7 @@ EBPO_API uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], 
 #define EBPO_NO_CHILDREN UINT32_MAX
 
 /*
- * All nodes of a subtree, including white ones. Index 0 is the subtree's root; nodes are sorted by
+ * All nodes of a subtree, including white nodes. Index 0 is the subtree's root; nodes are sorted by
  * level and then by octcode, so octcodes ascend. Arrays are valid until the subtree is closed.
  */
 typedef struct ebpo_subtree_nodes {
