@@ -39,10 +39,10 @@
  * `user`: passed to the callback unchanged. Members `reserved` are 0.
  *
  * "Threads:" in a comment says which threads may call a function at the same time:
- *   any           any number of threads, also with the same arguments, as long as no thread changes
- *                 the arguments
- *   one at a time per X   one thread at a time for each object X; different objects are
- *                 independent
+ *   any                   any number of threads, also with the same arguments, as long as no thread
+ *                         changes the arguments
+ *   one at a time per X   one thread at a time for each object X; any number of threads with
+ *                         different objects
  * The caller frees an object after all threads have ended their use of the object. A function may
  * start threads. They end before the function returns, unless its comment says otherwise.
  *

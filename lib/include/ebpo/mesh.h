@@ -87,8 +87,8 @@ typedef struct ebpo_mesh {
     struct ebpo_arrangement *arrangement;
 
     /*
-     * Limits the memory for checking and building. NULL: no limit. The arrays may be allocated from
-     * the workspace or with malloc.
+     * Workspace that limits the memory for checking and building. NULL: no limit. The arrays may be
+     * allocated from the workspace or with malloc.
      */
     ebpo_workspace *workspace;
 
@@ -155,8 +155,8 @@ typedef struct ebpo_mesh_read_options {
     ebpo_progress progress;
 
     /*
-     * Limits the memory for the mesh, and for checking and building it. Free the workspace after
-     * the mesh. NULL: no limit.
+     * Workspace that limits the memory for the mesh, and for checking and building it. Free the
+     * workspace after the mesh. NULL: no limit.
      */
     ebpo_workspace *workspace;
 
