@@ -119,7 +119,7 @@ class Case:
             return f"said: {said}"
         if place.outputs and not wrong and place.files() == self.files:
             return "" # a later call failed: syncing the folder, or examining the output
-        if "of the two files only" in said: # one of two outputs is written and cannot be undone
+        if "of the two files, only" in said: # one of two outputs is written and cannot be undone
             return ""
         changed = [name for name in place.outputs if place.content(name) != old(self.command, name)]
         left = place.files() - self.before
