@@ -79,9 +79,9 @@ int munmap(void *at, size_t bytes)
     return 0;
 }
 
-/* Returns the pages of a mapped file to the system. VirtualUnlock of pages that were never locked
- * removes them from the working set of the process; Windows writes them to the file when it needs
- * their memory. */
+/* Gives the pages of a mapped file back to the system. VirtualUnlock of pages that were never
+ * locked removes them from the working set of the process; Windows writes them to the file when it
+ * needs their memory. */
 int msync(void *at, size_t bytes, int flags)
 {
     (void)flags;
