@@ -29,8 +29,8 @@ void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume
 double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int level);
 /* Returns any volume in percent of the base. */
 double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double volume);
-/* Returns the excess of `volume` over the volume of the solid, in percent of the latter volume. NAN
- * for a surface, and for a solid whose volume is 0 or not known. */
+/* Returns the excess of `volume` over the volume of the solid, in percent of the solid's volume.
+ * NAN for a surface, and for a solid whose volume is 0 or not known. */
 double facts_excess(const ebpo_info *info, const ebpo_solid_volume *solid, double volume);
 /* Returns the excess of `volume` divided by the excess of `limit`, the volume of the convex hulls.
  * NAN: one of the two volumes has no excess, or the hulls equal the solid except for rounding. */
