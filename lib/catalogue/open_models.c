@@ -53,7 +53,7 @@ struct ebpo_catalogue_held {
     ebpo_file *file;
     /* NULL: not open; atomic, because statistics are read without the lock `opening` */
     ebpo_model *_Atomic model;
-    ebpo_catalogue_numbers numbers; /* face indices, if the key has a path of them */
+    ebpo_catalogue_numbers numbers;    /* face indices, if the key has a path of them */
     ebpo_context *idle[CONTEXTS_KEPT]; /* [idle_count] contexts that no thread uses */
     unsigned idle_count;
 };
