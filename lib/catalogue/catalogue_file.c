@@ -29,8 +29,9 @@
 #include "core/hash.h"
 #include "core/os.h"
 
-/* MAX_BYTES: maximum length of a file, sufficient for some millions of models. It limits the memory
- * for reading, which is many times the length. DIGEST_LETTERS: length of a digest in letters. */
+/* MAX_BYTES: maximum length of a file in bytes, sufficient for some millions of models. The maximum
+ * limits the memory for reading, which is many times the length of the file. DIGEST_LETTERS: length
+ * of a digest in letters. */
 enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };

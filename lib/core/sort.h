@@ -45,8 +45,8 @@ EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error
 /* Sorts an array of numbers in ascending order; fast for short arrays. */
 void ebpo_sort_numbers(uint64_t *numbers, uint64_t count);
 
-/* ebpo_sort_with is qsort with a context for the comparison. It is here, because systems declare
- * qsort_r differently or do not have it. */
+/* ebpo_sort_with is qsort with a context for the comparison. Systems have such a function with
+ * different declarations (qsort_r), or do not have it. */
 
 typedef int (*ebpo_compare_with)(const void *a, const void *b, void *context);
 
