@@ -24,7 +24,7 @@ typedef struct numbering {
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
     /* for each level: number of references read so far, and written so far */
     uint64_t read[EBPO_LEVELS_MAX], written[EBPO_LEVELS_MAX];
-    bool no_memory; /* an allocation failed */
+    bool no_memory; /* true: an allocation failed */
 } numbering;
 
 /* Gives a face the next new index; returns false when out of memory. */
