@@ -146,8 +146,8 @@ static inline void ebpo_cell_bounds(const ebpo_box *box, ebpo_cell cell, double 
 static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int axis, double p)
 {
     double cells = (double)(1u << level), guess = (p - box->origin[axis]) / box->size[axis] * cells;
-    /* The guess is accurate to 2^-30 of a cell, because it has three roundings, of at most 2^20
-     * cells. */
+    /* The guess is accurate to 2^-30 of a cell, because it is rounded three times and is at most
+     * 2^20 cells. */
     uint32_t i = guess >= cells ? (1u << level) - 1 : (uint32_t)guess;
     double part = guess - (double)i;
     if (part > 0x1p-30 && part < 1 - 0x1p-30)

@@ -254,8 +254,8 @@ static bool prints_digits(float value, const char *digits, size_t count, int32_t
 }
 
 /* Decides by printing whether the float, rounded to the text's last digit, gives the text. (If the
- * text is a power of ten, such as 1000, a lower float, such as 999.7, has one digit fewer up to
- * this position, and is printed with one digit fewer.) */
+ * text is a power of ten, such as 1000, the float may be less, such as 999.7. Then it has one digit
+ * fewer before this position, and is printed with one digit fewer.) */
 static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 {
     char digits[EBPO_NUMBER_LONGEST];

@@ -65,8 +65,8 @@ static int shifted_sign(const double p[3], const double a[3], const double b[3],
     return -sign;
 }
 
-/* Returns the part, up to pi or -pi, of the interval around the argument `angle`. sign: exact sign
- * of the argument. */
+/* Returns the interval around the argument `angle`, cut at pi or -pi. sign: exact sign of the
+ * argument. */
 static ebpo_bounded cut_at_pi(double angle, double error, int sign)
 {
     double low = fabs(angle) - error;

@@ -698,8 +698,7 @@ static bool rounds_certainly(const ebpo_measured *m, double *distance)
 }
 
 /* Computes the distance of a corner of a triangle that is far away. Numbers are scaled, so that
- * none overflows. The parts of small coordinates that are lost are below 2^-1000 of the distance.
- */
+ * none overflows. Scaling may lose parts of small coordinates, below 2^-1000 of the distance. */
 static bool corner_by_pairs(const double p[3], const double triangle[3][3],
                             const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
 {

@@ -222,8 +222,8 @@ static bool on_both_sides(const int side[3])
     return above && (side[0] < 0 || side[1] < 0 || side[2] < 0);
 }
 
-/* Returns the first that exists of: the only corner on the positive side of the plane, the only
- * corner on the negative side, the only corner in the plane. */
+/* Returns the first of these corners that exists: the only corner on the positive side of the
+ * plane, the only corner on the negative side, the only corner in the plane. */
 static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };

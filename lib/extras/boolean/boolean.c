@@ -239,7 +239,7 @@ static ebpo_status add_region(ebpo_boolean *b, ebpo_status status, ebpo_error *e
 }
 
 /* Adds the half-spaces as operands, and intersects the expression with them. The model of a
- * half-space has its part around the box of the expression. */
+ * half-space contains only the part near the box of the expression. */
 static ebpo_status add_half_spaces(ebpo_boolean *b, const double *planes, uint32_t count,
                                    ebpo_error *error)
 {
@@ -349,7 +349,7 @@ static bool same_plane(const double a[3][3], const double b[3][3])
     return true;
 }
 
-/* Adds the states of operand i. sides: its winding numbers on both sides of the point. */
+/* Adds the states of operand i. sides: the operand's winding numbers there. */
 static void add_states(operand_states *o, uint32_t i, ebpo_rule rule, const ebpo_posed_sides *sides)
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),

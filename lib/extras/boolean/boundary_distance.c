@@ -163,7 +163,7 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
 /* Makes the finest world that doubles allow. */
 static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *error)
 {
-    /* the centres of the finest cells are corners of the next level, which must exist, too */
+    /* one less than the maximum, because the finest cells' centres are corners of the next level */
     int level = EBPO_BOOLEAN_LEVEL_MAX - 1;
     while (level > 0 && ebpo_world_make(w, b, level, NULL) != EBPO_OK)
         level--;
@@ -295,9 +295,9 @@ static ebpo_status measure_away_from_boundary(const measuring *m, const ebpo_bou
     return status;
 }
 
-/* Bounds the distance for a point that may be on the boundary, for example on an edge. The ball up
- * to the farther one of the nearest inner point and the nearest outer point has points of both
- * states, so the boundary is not farther away. */
+/* Bounds the distance for a point that may be on the boundary, for example on an edge. The
+ * nearest inner point and the nearest outer point have different states, so the boundary is not
+ * farther away than the farther one of these points. */
 static ebpo_status measure_unsure(const measuring *m, const ebpo_boundary_options *o,
                                   ebpo_error *error)
 {

@@ -113,7 +113,7 @@ static void join_patches(const ebpo_cut_mesh *cut, const edge_lists *e, uint32_t
         for (next = i + 1;
              next < e->begin[v + 1] && other_vertex(e->edge[next]) == other_vertex(e->edge[i]);)
             next++;
-        if (next - i == 2) /* two triangles with one direction have opposite orientations */
+        if (next - i == 2) /* the same direction in both triangles means opposite orientations */
             join_triangles(parent, triangle_of(e->edge[i]), triangle_of(e->edge[i + 1]),
                            ((e->edge[i] ^ e->edge[i + 1]) & 1) == 0);
     }
@@ -312,9 +312,9 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
 
 /* Returns true if each edge occurs in the selected triangles equally often in both directions.
  *
- * An edge that only one triangle has is not tested if its face is whole: the other face of the edge
- * is a whole face of the same component, which is not listed. If the faces of the base that are not
- * listed stay in the result (keeps_base), the difference between the selected triangles and all
+ * An edge of only one triangle is not tested if the triangle's face is whole: the other face of the
+ * edge is a whole face of the same component, and is not listed. If the faces of the base that are
+ * not listed stay in the result (keeps_base), the difference between the selected triangles and all
  * triangles of the base is tested. The base is closed, so the result is closed if this difference
  * is. */
 static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)

@@ -1,11 +1,11 @@
 /* Computes the exact volume of the result of a Boolean expression, if no face of an operand
  * intersects a face of another operand, and no operand intersects itself.
  *
- * Then each patch of connected faces is entirely in or out of every other operand. So either all
- * faces of a patch bound the result (or all faces reversed), or no face of the patch does. The
- * volumes below the bounding faces are summed without rounding (volume_sum.h), and the sum is
- * rounded once. If faces intersect, the result names a pair of intersecting faces as the reason why
- * there is no exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
+ * Then each patch of connected faces is entirely in or out of every other operand. So the result
+ * is bounded by all faces of a patch, by all of them reversed, or by none of them. The volumes
+ * below the bounding faces are summed without rounding (volume_sum.h), and the sum is rounded once.
+ * If faces intersect, the result names a pair of intersecting faces as the reason why there is no
+ * exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -224,7 +224,7 @@ static ebpo_status winding_in_front(const operand *o, unsigned worker, const dou
     return status;
 }
 
-/* Sets in *in a bit for each other operand that contains the point, a corner of a face. */
+/* Sets *in: a bit for each other operand that contains the point, which is a corner of a face. */
 static ebpo_status find_around(const operand *o, unsigned worker, const double point[3],
                                uint64_t *in, ebpo_error *error)
 {

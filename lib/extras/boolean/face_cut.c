@@ -111,8 +111,9 @@ static bool find_ends(ebpo_face_cutter *c, int which, const int side[3])
     return n > 0;
 }
 
-/* Adds the segment in which two faces in different planes intersect, if they do. side, other_side:
- * the sides of the other plane on which the corners of each face are. */
+/* Adds the segment in which two faces in different planes intersect, if they do. side: on
+ * which side of the other face's plane each corner of the face is. other_side: the same for the
+ * corners of the other face and the plane of the face. */
 static bool cut_through(ebpo_face_cutter *c, const int side[3], const int other_side[3])
 {
     uint32_t from, to;
@@ -147,10 +148,11 @@ static bool note_edge_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint
     return true;
 }
 
-/* Adds the part of the edge from p to q, of another face in the plane, that is in the face. */
+/* Adds the part of an edge that is in the face. p, q: ends of the edge, which is an edge of another
+ * face in the same plane. */
 static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo_exact_point *q)
 {
-    int of_p[3], of_q[3], count = 0; /* of_p, of_q: 1 if the point is inside edge i, -1 outside */
+    int of_p[3], of_q[3], count = 0; /* sides of edge i: 1 inner, -1 outer */
     bool added = true, p_in = true, q_in = true;
     uint32_t range[2] = { 0, 0 };
     for (int i = 0; i < 3; i++) {
@@ -181,7 +183,7 @@ static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo
     return added && (count == 0 || ebpo_arrangement_2d_add(&c->arrangement, range[0], range[1]));
 }
 
-/* Adds the parts of the edges of another face in the plane that are in the face. */
+/* Adds those parts of the other face's edges that are in the face. Both faces are in one plane. */
 static bool cut_in_plane(ebpo_face_cutter *c, uint32_t other)
 {
     if (!ebpo_grow(&c->coplanar, &c->coplanar_capacity, c->coplanar_count + 1, sizeof *c->coplanar))

@@ -31,7 +31,7 @@ typedef struct ebpo_triangulation {
     uint64_t any_capacity, next_capacity, last_capacity, inside_capacity, order_capacity;
     uint64_t *queue; /* edges to examine */
     uint64_t queue_begin, queue_end, queue_capacity;
-    double origin[2], size; /* approximate shapes use coordinates minus `origin`, over `size` */
+    double origin[2], size; /* coordinates for approximate shapes: (x - origin) / size */
 } ebpo_triangulation;
 
 /* Triangulates the convex hull of the points, which are different and not all on a line. All points

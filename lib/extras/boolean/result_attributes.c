@@ -98,7 +98,7 @@ static ebpo_status add_array(ebpo_carrying *c, const ebpo_attribute *like, uint6
     return EBPO_OK;
 }
 
-/* Adds the arrays of an operand that no earlier operand has. */
+/* Adds the arrays of an operand, except those that an earlier operand has. */
 static ebpo_status add_arrays(ebpo_carrying *c, const ebpo_file *file, uint64_t vertices,
                               uint64_t faces, ebpo_error *error)
 {

@@ -501,7 +501,7 @@ static uint64_t count_whole(const output *o, uint32_t operand)
     return count;
 }
 
-/* Returns true if the result may have coordinates beyond the range of floats: an operand has.
+/* Returns true if an operand, so perhaps the result, has coordinates beyond the range of floats.
  * Half-spaces are not tested, because the result is also in the box of the other operands. */
 static bool exceeds_floats(const ebpo_face_list *faces)
 {

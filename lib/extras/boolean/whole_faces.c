@@ -33,7 +33,7 @@ typedef struct joining {
     uint64_t *flat;         /* a bit for each face without area */
     uint64_t *touched;      /* a bit for each corner of a face that is in a pair */
     uint32_t *degree;       /* for each corner: number of edges that are listed at it */
-    uint64_t *begin; /* for each corner of a run, and the next corner: the start of its list */
+    uint64_t *begin; /* for each corner of a run and for the corner after it: start of the list */
     uint64_t begin_capacity;
     /* lists of edges: (other corner << 32 | face << 1 | direction); the direction is 1 if the face
      * has the edge from the corner with the higher number */
@@ -164,8 +164,8 @@ static void list_edges(joining *j, uint64_t first, uint64_t end)
     }
 }
 
-/* Joins faces at a run of corners. The run begins at `first`, and has as many corners as have
- * together at most `capacity` edges. Sets *end to the corner after the run. */
+/* Joins faces at a run of corners. The run begins at `first`, and is the longest run whose
+ * corners together have at most `capacity` edges. Sets *end to the corner after the run. */
 static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t capacity,
                             ebpo_error *error)
 {

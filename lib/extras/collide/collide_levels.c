@@ -95,10 +95,10 @@ static void widen_cell(double corner[8][3], double share)
 }
 
 /* Returns true if a black node certainly has a common point with the model of another node. black,
- * other: corners of both cells; other_black: the other node is black, too. If it is black, the
- * first cell must contain a corner or the middle of the other cell. If it has faces, the first cell
- * must contain the region of these faces: the other cell with a margin, by which `other` is
- * widened. */
+ * other: corners of both cells; other_black: the other node is black, too. If the other
+ * node is black, the black cell must contain a corner or the middle of the other cell. If the other
+ * node has faces, the black cell must contain the region of these faces: the other cell with a
+ * margin, by which `other` is widened. */
 static bool shares_point(const level_search *g, double black[8][3], double other[8][3],
                          bool other_black)
 {

@@ -161,7 +161,7 @@ static const char stage[] = "pairs of faces"; /* for the progress function */
 
 /* These numbers affect only how evenly the threads are used, not the result. */
 enum {
-    PARTS = 512, /* number of parts from which on parts are not divided */
+    PARTS = 512, /* if there are so many parts or more, none is divided */
     TASKS = 64   /* number of groups of parts that are distributed to threads */
 };
 

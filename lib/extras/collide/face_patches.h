@@ -27,10 +27,10 @@ void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
 /* Finds the patches of the faces that a subtree owns (a subtree owns a face if no earlier subtree
  * lists the face). Faces of a patch are connected by corners with equal coordinates. The owned face
- * i has the index subtree->first_face + i in the file; (*out)[i] is the least number of an owned
- * face in its patch. `omitted` has a bit for each face of the file; a face whose bit is set is a
- * separate patch and connects no other faces. slots: result of ebpo_face_slots. The caller frees
- * the result. */
+ * i has the index subtree->first_face + i in the file; (*out)[i] is the least i of the owned
+ * faces in the patch of this face. `omitted` has a bit for each face of the file; a face whose bit
+ * is set is a separate patch and connects no other faces. slots: result of ebpo_face_slots. The
+ * caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *omitted, uint32_t **out,
                                             ebpo_error *error);

@@ -26,8 +26,8 @@ typedef struct crossings {
     ebpo_self_intersections_options options;
     ebpo_self_intersections_fn take; /* the caller's function, or NULL, and its argument */
     void *user;
-    ebpo_tree tree;  /* the built tree; after the file is written only its mesh, which is in the
-                      * workspace */
+    ebpo_tree tree;  /* the built tree; when the file has been written, only the mesh is kept, in
+                      * the workspace */
     ebpo_file *file; /* the temporary file */
     ebpo_model *model;
     ebpo_collider *collider;

@@ -300,8 +300,8 @@ EBPO_EIGHT unsigned near_children_of_side(const ebpo_pair_walk *w, int side,
     return near_children_of(&t, (int)(q_child & 7), first, key);
 }
 
-/* Pushes the pairs of the children of `node`, a node of model `side`, with the undivided child of
- * r: the child of the other model. q: the node whose child this is. */
+/* Pushes the pairs of the children of `node`, a node of model `side`, with the child in r of the
+ * other model, which is not divided. q: the node that has this child. */
 EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int side, uint32_t node,
                               const ebpo_turned_node *q, bool first)
 {

@@ -179,9 +179,9 @@ static void reverse_pairs(subtree_pair *pair, uint64_t count)
     }
 }
 
-/* Sorts pairs by the rank of the first subtree. Among the pairs with the same first subtree, the
- * rank of the second subtree ascends or, for every second first subtree, descends. Sets subtrees[0]
- * to the number of different first subtrees. */
+/* Sorts pairs by the rank of the first subtree. Pairs with the same first subtree are a group. In
+ * the groups, the rank of the second subtree ascends and descends alternately. Sets subtrees[0] to
+ * the number of groups. */
 static void sort_back_and_forth(subtree_pairs *p)
 {
     if (p->count)

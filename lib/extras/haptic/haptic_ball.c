@@ -36,10 +36,10 @@ uint32_t ebpo_haptic_stopped(const ebpo_haptic *t)
 
 static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_IDLE; }
 
-/* Applies Coulomb friction. Without friction the proxy has slid from `from` to its position. With
- * friction it slides only by the part of this path by which the tangential force exceeds the
- * friction; it stays at `from` if the friction is greater. Both forces are proportional to lengths,
- * so lengths are compared. Returns bits of ebpo_haptic_flag. */
+/* Applies Coulomb friction. Without friction the proxy has slid from `from` to its position.
+ * Friction shortens this path: the proxy stops where the tangential force is equal to the friction,
+ * or stays at `from` if the friction is greater. Both forces are proportional to lengths, so
+ * lengths are compared. Returns bits of ebpo_haptic_flag. */
 static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const double device[3],
                                ebpo_ball_work *work)
 {

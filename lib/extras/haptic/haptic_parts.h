@@ -95,7 +95,7 @@ struct ebpo_haptic {
     double last_query[3];               /* position of the last query for a probe */
     ebpo_extent newest_allowed;         /* `allowed` of the newest box */
     double half_side;                   /* half of the side of `allowed` of the next box */
-    double speed_position[3], speed[3]; /* position at speed_time, and speed before it */
+    double speed_position[3], speed[3]; /* position at speed_time; speed before that */
     uint64_t speed_time;                /* time of the last measurement, in ns */
     pthread_t thread;
     bool has_thread;

@@ -15,8 +15,9 @@
 #include "extras/haptic/tool.h"
 #include "extras/haptic/haptic_parts.h"
 
-/* Limits of visited nodes in a search around a cluster, around a point, and for the faces around a
- * point's path; and the work of examining a face, in visited nodes. */
+/* Limits of visited nodes in a search. CLUSTER_VISITS: around a cluster; POINT_VISITS: around a
+ * point; FACE_VISITS: for the faces around a point's path. FACE_COST: work of examining a face, in
+ * visited nodes. */
 enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
 
 /* Distances in units of the skin. */

@@ -23,9 +23,8 @@ typedef struct ebpo_passive {
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n);
 
 /* Computes the force: stiffness times `depth` (the vector from device to proxy), minus `damping`
- * times `moved`, limited so that it is passive. The force never has a component against
- * `depth`. All vectors have n
- * components. */
+ * times `moved`. Limits the force so that it is passive; it never has a component against `depth`.
+ * All vectors have n components. */
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);
 

@@ -139,7 +139,8 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
 }
 
 /* Calls sift_layer for each layer of the balls [from, from + count). The copied balls are on the
- * stack after these balls. Returns their number. *sure is true if it is true for all layers. */
+ * stack after these balls. Returns the number of copied balls. *sure is true if it is true for all
+ * layers. */
 static uint64_t sift_layers(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                             bool *sure)
 {

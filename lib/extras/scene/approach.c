@@ -80,7 +80,7 @@ static bool is_reached(const approach_search *search, const ebpo_scene_approach_
 }
 
 /* Evaluates the distance at result->time, and sets the result's bounds. Fails with EBPO_E_ABSENT if
- * omitted faces may be within the clearance, unless other faces are. */
+ * omitted faces may be within the clearance and the faces in the files are not. */
 static ebpo_status approach_evaluate(const approach_search *search,
                                      ebpo_scene_evaluations *evaluations,
                                      ebpo_scene_approach_result *result, ebpo_error *error)

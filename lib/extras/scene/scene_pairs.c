@@ -48,8 +48,8 @@ static void sort_sets(ebpo_scene_instance_entry *i)
     i->set_count = kept;
 }
 
-/* Merges the rules for each pair of sets into one rule. The merged rule has their greatest
- * clearance, or ignores pairs if one of the merged rules does. */
+/* Merges the rules for each pair of sets into one rule. The merged rule has the greatest
+ * clearance of these rules, or ignores pairs if one of these rules does. */
 void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
     uint64_t kept = 0;
@@ -309,8 +309,8 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
     for (double at = from; route && at < to;) {
         double next = ebpo_scene_route_next(route, at, to);
         sum += ebpo_scene_route_step(route, at, next, extent).length;
-        /* true if `next` is the time of a key after the first one: different keys follow `at` and
-         * `next` */
+        /* true if `next` is the time of a key, but not of the first one: then the key that follows
+         * `next` is later than the key that follows `at` */
         bool ends_at_key =
             next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
                                               ebpo_scene_route_next(route, at, INFINITY);

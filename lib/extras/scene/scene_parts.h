@@ -169,8 +169,8 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_extent extent);
 
 /* Returns an upper bound of the change of the distance of two instances on one route between the
- * times `from` and `to`, including rounding; from < to. extent: each member is the sum of this
- * member of both instances' extents. */
+ * times `from` and `to`, including rounding; from < to. extent: the sum of both instances'
+ * extents, member by member. */
 double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
                                ebpo_scene_extent extent);
 
