@@ -173,8 +173,8 @@ static bool long_quotient(double *out, const decimal *d, int bits)
 
 /* Decides exactly whether `value`, the float nearest to digits / 10^e, gives the digits when it is
  * rounded to the last digit (ties to even). That is so if value * 10^e differs from the digits by
- * less than a half. The value is from 1e-27 to 1e20, where floats are normal. Sets *keeps when it
- * returns true. */
+ * less than a half. The value is from 1e-27 to 1e20, where floats are normal. *keeps: the result.
+ * Returns false if this method does not apply. */
 static bool compare_scaled(bool *keeps, float value, const decimal *d)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)

@@ -586,7 +586,8 @@ static uint32_t find_spike(outline *o, uint32_t b)
 
 /* ---- cutting ---- */
 
-/* Cuts off corner b, and writes its triangle. Marks the ears whose tests may now have other results. */
+/* Cuts off corner b, and writes its triangle. Marks the ears whose tests may now have other
+ * results. */
 static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
 {
     uint32_t a = o->previous[b], c = o->next[b];

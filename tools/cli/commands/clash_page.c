@@ -29,7 +29,7 @@ const char *clash_kind_word(int32_t kind)
     return words[kind];
 }
 
-/* Returns the severity, the highest for the worst. */
+/* Returns the severity: the worse the kind, the greater. */
 static int rank_of(const ebpo_scene_clash *m)
 {
     static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* by ebpo_clash_kind */
@@ -148,7 +148,7 @@ static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
                       : ebpo_scene_group_of(scene, c->worst.b, nth - of_a);
 }
 
-/* Returns false if the nth group is also an earlier group of the two instances. */
+/* Returns false if the nth group occurs earlier among the groups of the two instances. */
 static bool is_first_group(const clash *c, const ebpo_scene *scene, uint64_t nth)
 {
     uint64_t group = group_of(c, scene, nth);

@@ -317,8 +317,8 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
     return status;
 }
 
-/* Writes the exact result, or computes the volume and the cells. If the exact volume is known, it
- * is no error that no cells can be made. */
+/* Writes the exact result, or computes the volume and the cells. If the exact volume is known, a
+ * failure to make cells is no error. */
 static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress progress,
                                  ebpo_error *error)
 {

@@ -276,8 +276,8 @@ typedef struct collide_values {
 
 #include "cli/options/collide.inc"
 
-/* Reads the value of the option --NAME; `text` is NULL if the option was not given, and *out
- * unchanged. */
+/* Reads the value of the option --NAME. If the option was not given, `text` is NULL and *out does
+ * not change. */
 static bool read_pose(const char *name, const char *text, ebpo_pose *out)
 {
     if (!text || pose_read(text, out))
@@ -523,9 +523,9 @@ static ebpo_status share_memory(const query_session *a, const query_session *b,
 }
 
 /* Sets the memory of both models if --memory is not given. There is no limit if both models need at
- * most half of the free memory. Otherwise the limit is half of the free memory or, if more, what
- * the models need at least. Remote files keep the default budget of the library. `b` is NULL if
- * both models are the same. */
+ * most half of the free memory. Otherwise the limit is half of the free memory, or the least
+ * memory that the models need if that is more. Remote files keep the default budget of the library.
+ * `b` is NULL if both models are the same. */
 static void default_memory(const query_session *a, const query_session *b,
                            const char *const path[2], ebpo_model_options *model_options)
 {

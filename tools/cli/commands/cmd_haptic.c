@@ -32,7 +32,7 @@ enum { HAPTIC_BINS = 16 };
 
 typedef struct haptic_times {
     uint64_t step_count; /* number of steps */
-    uint64_t late;       /* steps not finished a period after their due times */
+    uint64_t late;       /* steps that end more than a period after their due times */
     double p50, p99, p99_9, p99_99, max_time; /* seconds from the start to the end of a step */
     double wake_p99_9, wake_max;              /* seconds from the due time of a step to its start */
     double cpu_p99_9, cpu_max;    /* processor time from the start to the end of a step */

@@ -21,8 +21,8 @@
 
 /* --- the points of a plane or grid --- */
 
-/* Default number of points along the longer edge of a plane; and maximum number of points of a grid
- * along an axis. */
+/* LONGER_EDGE_POINTS: default number of points along the longer edge of a plane. GRID_MAX: maximum
+ * number of points of a grid along an axis. */
 enum { LONGER_EDGE_POINTS = 1000, GRID_MAX = 1 << 20 };
 
 static int refuse_value(const char *option, const char *value, const char *expected)

@@ -299,7 +299,7 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uin
     if (v->new_layer)
         status = add_layer(j, error);
     else if (input || v->note)
-        ; /* below, because a stroke can be combined with --new-layer */
+        ; /* strokes and notes are added below; a stroke can be combined with --new-layer */
     else if (v->undo)
         status = undo_strokes(j, error);
     else if (v->remove_stroke >= 0)

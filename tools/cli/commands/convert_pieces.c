@@ -22,11 +22,11 @@
 
 /* --- names of pieces --- */
 
-/* Sizes of names in bytes, with the final 0: in file names, and in the scene. */
+/* Sizes of names in bytes, with the final 0. NAME_SIZE: in file names; SHOWN_SIZE: in the scene. */
 enum { NAME_SIZE = 96, SHOWN_SIZE = 256 };
 
-/* Lengths of the part of a name that comes from the group: in file names, and in derived names in
- * the scene, which end in a number. */
+/* Lengths of the part of a name that comes from the group. OWN_NAME_MAX: in file names; SPELT_MAX:
+ * in derived names in the scene, which end in a number. */
 enum { OWN_NAME_MAX = 40, SPELT_MAX = 220 };
 
 static bool is_safe(char c)
