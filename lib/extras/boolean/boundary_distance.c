@@ -90,8 +90,8 @@ static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queu
     return distance < s->hi ? push_waiting(q, (waiting){ distance, *c }, error) : EBPO_OK;
 }
 
-/* Lowers the upper bound to the distance of the root cell's sides. All points outside the root cell
- * are out. */
+/* If the search is for a point that is out, lowers the upper bound to the distance of the root
+ * cell's sides, because all points outside the root cell are out. */
 static void bound_by_root_sides(boundary_search *s, const ebpo_world *w)
 {
     for (int k = 0; k < 3 && s->state == EBPO_MAY_IN; k++)

@@ -152,7 +152,7 @@ static bool note_edge_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint
  * face in the same plane. */
 static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo_exact_point *q)
 {
-    int of_p[3], of_q[3], count = 0; /* sides of edge i: 1 inner, -1 outer */
+    int of_p[3], of_q[3], count = 0; /* of_p[i]: p's side of edge i: 1 inner, -1 outer */
     bool added = true, p_in = true, q_in = true;
     uint32_t range[2] = { 0, 0 };
     for (int i = 0; i < 3; i++) {

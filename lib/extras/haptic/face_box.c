@@ -253,7 +253,7 @@ double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, ui
 
 /* The nearest point of a face's edges to a point p. */
 typedef struct nearest_edge_point {
-    double square, offset[3]; /* vector from the nearest point to p */
+    double square, offset[3]; /* offset: from the nearest point to p; square: offset . offset */
     int edge;                 /* edge from corner `edge` to the next one */
     double fraction;          /* position on the edge: 0 at its first corner, 1 at its last */
 } nearest_edge_point;

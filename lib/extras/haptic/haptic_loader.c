@@ -75,8 +75,8 @@ const ebpo_probe_query *ebpo_haptic_newest_probe_query(ebpo_haptic *t)
 static const double prediction_seconds = 0.05; /* a box is made for the device's position after this
                                                 * time */
 static const double speed_seconds = 0.02;      /* time over which the speed is measured */
-/* Lengths in units of half a box's side: the greatest distance of the proxy from the middle of a
- * new box, and the motion of the middle after which another box is loaded. */
+/* Lengths in units of half a box's side. max_shift: greatest distance of the proxy from the middle
+ * of a new box. reload_shift: motion of the middle after which another box is loaded. */
 static const double max_shift = 0.6, reload_shift = 0.25;
 
 static void sleep_briefly(void)

@@ -190,7 +190,7 @@ static char *real_folder(const char *path)
  * NULL: there is not enough memory. Both folders must be absolute paths without links. */
 static char *relative_path(const char *a, const char *b)
 {
-    size_t common = 0, at = 0; /* length of the common parent folder */
+    size_t common = 0, at = 0; /* common: length of the common parent folder's path */
     for (;; at++) {
         bool ends_a = !a[at] || a[at] == '/', ends_b = !b[at] || b[at] == '/';
         if (ends_a && ends_b)

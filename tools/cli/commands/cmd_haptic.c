@@ -45,7 +45,7 @@ typedef struct haptic_times {
 /* What haptic_play_run plays. */
 typedef struct haptic_play {
     double rate;                 /* steps per second */
-    double seconds;              /* duration if the device has no number of steps */
+    double seconds;              /* duration; used if the device's step_count is 0 */
     ebpo_haptic *haptic;         /* NULL: steps do nothing */
     const haptic_device *device; /* source of positions */
     ebpo_haptic_kind kind;
@@ -205,7 +205,7 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
     case EBPO_HAPTIC_TOOL: step_tool(p->haptic, &pose, &result); break;
     }
     p->device->write(p->device->self, &result);
-    out->width_mean += result.hi - result.lo; /* a sum, until the end */
+    out->width_mean += result.hi - result.lo; /* a sum until haptic_play_run divides it */
     out->width_max = fmax(out->width_max, result.hi - result.lo);
     return true;
 }
@@ -485,7 +485,7 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
     return status;
 }
 
-static ebpo_status open_device(job *j, const double start[3], ebpo_error *error)
+static ebpo_status make_haptic(job *j, const double start[3], ebpo_error *error)
 {
     const values *v = j->v;
     ebpo_haptic_options haptic_options = EBPO_HAPTIC_OPTIONS_INIT;
@@ -583,7 +583,7 @@ static int run_job(job *j, uint64_t memory)
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
         return EXIT_FAILED;
     if (status == EBPO_OK)
-        status = open_device(j, start.position, &error);
+        status = make_haptic(j, start.position, &error);
     if (status == EBPO_OK)
         status = play_device(j, &error);
     if (status == EBPO_OK && j->v->record)

@@ -321,7 +321,7 @@ static ebpo_status begin_report(report *r, ebpo_error *error)
     return out && !r->page ? ebpo_scene_report_new(r->scene, out, &r->record, error) : EBPO_OK;
 }
 
-/* Maximum number of clashes with pictures, which are the worst clashes. */
+/* Pictures are drawn for at most this number of clashes, the worst ones. */
 enum { PICTURES_MAX = 60 };
 
 static ebpo_status write_page(report *r, ebpo_error *error)
