@@ -27,7 +27,7 @@ static bool ball_is_apart(const ebpo_cap_node *n, const double low[3], const dou
     return false;
 }
 
-/* Returns the crossings of the triangle that belongs to a stretch alone. */
+/* Returns the crossings of the stretch's own triangle, which belongs to neither of its halves. */
 static int32_t cross_triangle(const cap_segment *g, const ebpo_cap_node *n)
 {
     const ebpo_cap_tree *t = g->tree;

@@ -1,7 +1,7 @@
-/* Makes a tree over the caps of a border: groups of two nodes down to single loops, then the
- * stretches of each loop. Each node has a ball around its triangles, and sums over its triangles
- * for the bounds in cap_bounds.c. Radii, lengths and areas are upper bounds, because they are
- * enlarged by a factor of 1 + 2^-40. */
+/* Makes a tree over the caps of a border. The upper nodes are groups of loops, which are halved
+ * until they have a single loop; the nodes below are the stretches of this loop. Each node has a
+ * ball around its triangles, and sums over its triangles for the bounds in cap_bounds.c. Radii,
+ * lengths and areas are upper bounds, because they are enlarged by a factor of 1 + 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -107,9 +107,9 @@ ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats 
 
 /* --- queries --- */
 
-/* Returns true if the caller's A is the second model in the query's order: by the hashes of the
- * files' contents, then by the bits of the poses. Any order that does not depend on the caller's
- * order could be used. */
+/* Returns true if the caller's A is the second model in the query's order. The models are ordered
+ * by the hashes of the files' contents, then by the bits of the poses. Any order that does not
+ * depend on the caller's order could be used. */
 static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
 {
     int by_file = memcmp(c->model[0]->info->content_sha256, c->model[1]->info->content_sha256,

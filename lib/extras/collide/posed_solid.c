@@ -9,8 +9,8 @@
  * fractions, three segments parallel to axes lead to the query point from the point whose
  * coordinates are the nearest doubles.
  *
- * Functions do not change a posed solid: several threads may use the same
- * posed solid, each thread with a separate context.
+ * Functions do not change a posed solid: several threads may use the same posed solid, each thread
+ * with a separate context.
  * Proofs: docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
@@ -99,8 +99,7 @@ ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, cons
     if (status != EBPO_OK)
         return status;
     /* No sum overflows, because max_coordinate is at most 2^1000. 1.7321 is more than the root
-     * of 3.
-     */
+     * of 3. */
     out->moved = 1.7321 * ebpo_posing_error(&out->posing, (max_coordinate[0] + max_coordinate[1] +
                                                            max_coordinate[2]) *
                                                               margin_factor);

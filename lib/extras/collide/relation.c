@@ -343,8 +343,8 @@ static void inspect_intersecting(relation_search *r)
 
 /* --- faces without contact --- */
 
-/* Returns true if a patch without contact of model m adds no information. in: the patch is inside
- * the other model; false: it is outside the other model. */
+/* Returns true if a patch without contact of model m adds no information. in: true if
+ * the patch is inside the other model, false if it is outside the other model. */
 static bool side_adds_nothing(const relation_search *r, int m, bool in)
 {
     if (is_mixed(r))
@@ -595,8 +595,8 @@ static ebpo_status find_relation(relation_search *r, ebpo_error *error)
 
 /* Adds the loads of this query to the collider's count, and sets the collider's count of bytes. The
  * queries that this query has made have added their bytes to the count, so the count is computed
- * from its value at the beginning. count_before, read_before: at the beginning of this query, the
- * collider's count and the bytes that had been read from the files. */
+ * from its value at the beginning. At the beginning of this query, count_before was the collider's
+ * count of bytes, and read_before was the number of bytes that had been read from the files. */
 static void count_loads(const relation_search *r, uint64_t count_before, uint64_t read_before)
 {
     ebpo_collider *c = r->collision->collider;

@@ -24,7 +24,7 @@
 #include "extras/paint/paint_reach.h"
 #include "query/query_model.h"
 
-enum { FACES_MAX = 1 << 28 };
+enum { FACES_MAX = 1 << 28 }; /* greatest number of faces around a ball */
 
 void ebpo_reach_begin(ebpo_reach_search *r, ebpo_context *context)
 {
@@ -282,9 +282,9 @@ static ebpo_status find_face(ebpo_reach_search *r, const ebpo_reach_ball *ball, 
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
-    bool found_reach = find_own(r, ball->face);
-    *complete = found_reach || !subset;
-    if (!found_reach)
+    bool found_own = find_own(r, ball->face);
+    *complete = found_own || !subset;
+    if (!found_own)
         return EBPO_OK;
     ebpo_face_nearest(ball->place, (const double(*)[3])r->face[r->own].corner, &near);
     *on = near.distance <= r->tolerance;

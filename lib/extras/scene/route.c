@@ -18,7 +18,8 @@
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
 
-/* Relative rounding error of lengths after a few dozen operations, each with an error of 2^-53. */
+/* Upper bound of the relative rounding error of a length after a few dozen operations, each with an
+ * error of at most 2^-53. */
 static const double slack = 0x1p-44;
 /* Greatest absolute time. Differences of times in this range are finite. */
 static const double max_time = 0x1p1000;
@@ -28,7 +29,7 @@ void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4])
     double trace = m[0][0] + m[1][1] + m[2][2];
     int i = m[1][1] > m[0][0] ? 1 : 0;
     i = m[2][2] > m[i][i] ? 2 : i;
-    if (trace > m[i][i]) { /* the real fraction is the greatest */
+    if (trace > m[i][i]) { /* the real part is the greatest */
         quaternion[0] = m[2][1] - m[1][2];
         quaternion[1] = m[0][2] - m[2][0];
         quaternion[2] = m[1][0] - m[0][1];
