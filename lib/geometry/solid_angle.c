@@ -150,10 +150,10 @@ static ebpo_big big_length(const big_vector *a)
  */
 static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
 {
-    /* in this common unit the greater part is in [1/2, 1) */
     const ebpo_big *x = &out->turn.real, *y = &out->turn.imaginary;
     if ((x->sign == 0 && y->sign == 0) || all->sign == 0)
         return false;
+    /* in this common unit the greater part is in [1/2, 1) */
     int64_t unit =
         x->sign == 0 || (y->sign != 0 && y->exponent > x->exponent) ? y->exponent : x->exponent;
     out->error = ldexp(ebpo_big_double(all, unit), -498);

@@ -31,8 +31,8 @@ typedef struct bounded_number {
     double x, error;
 } bounded_number;
 
-/* `more` covers the rounding of the bounds themselves, and `lost` the underflow of denormal
- * results. */
+/* `more` covers the rounding of the bounds themselves, `rounding` bounds the relative error of an
+ * operation, and `lost` covers the underflow of denormal results. */
 static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
 
 static bounded_number bounded_multiply(bounded_number a, bounded_number b)

@@ -150,7 +150,7 @@ typedef struct brick {
     uint64_t low[3], high[3]; /* on each axis, indices low .. high - 1 of points in the slab */
 } brick;
 
-/* Returns the brick of the slab with this number; numbers first count along axis 0. */
+/* Returns the brick of the slab with this number; numbers increase first along axis 0. */
 static brick brick_of(const slab_job *j, uint64_t number)
 {
     const uint64_t size[3] = { j->lattice->count[0], j->lattice->count[1], j->layers };

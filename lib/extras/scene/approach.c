@@ -7,8 +7,9 @@
  * evaluation to the next. Between two evaluations the motion is shorter than the distance minus the
  * clearance, so no contact is missed.
  * The second search divides the interval of time into shorter intervals, and keeps these in a heap,
- * ordered by a lower bound of the distance in each interval. It halves the first interval of the
- * heap until the result is within the tolerance. Routes jump only at ends of intervals.
+ * ordered by a lower bound of the distance in each interval. It repeatedly halves the first
+ * interval of the heap, until the result is within the tolerance. Routes jump only at ends of
+ * intervals.
  * A result is a pair of guaranteed bounds. A search that reaches the maximum number of evaluations
  * returns its current bounds.
  *
