@@ -106,7 +106,7 @@ static void multiply_power(exact_sum *s, const ebpo_exact_angle *a, uint32_t wei
 }
 
 /* Sums the half angles of all triangles. Returns false if p is a corner of a triangle, whose half
- * angle is then undefined. */
+ * angle is then undefined, or if 512 bits do not suffice. */
 static bool sum_exactly(const ebpo_cap_tree *t, const double p[3], exact_sum *s)
 {
     *s = (exact_sum){ .turn = { ebpo_big_of(1), ebpo_big_of(0) } };
@@ -205,7 +205,7 @@ static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_
     ebpo_cap_front front;
     ebpo_cap_front_begin_all(&front, tree, &point);
     int result = decide_by_front(&front, winding, rule, w);
-    /* the front has space for few nodes */
+    /* a front has space for few nodes; these sums use as many nodes as they need */
     for (double t = 0x1p-8; t >= 0 && result < 0; t = next_tolerance(t)) {
         *w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, t), winding);
         result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);

@@ -276,7 +276,7 @@ typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
-    bool along_a, along_c; /* another edge runs from b's position towards a; towards c */
+    bool along_a, along_c; /* another edge runs from b's position towards a (or towards c) */
 } tested_ear;
 
 /* Returns 1 if the corners a, b, c turn counter-clockwise, -1 if clockwise, otherwise 0. */
@@ -611,8 +611,8 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
         o->corners[node]--;
 }
 
-/* Returns true if the ear at b may be cut. If not, the ear will be tested again when its result may
- * have changed. */
+/* Returns true if the ear at b may be cut. If not, the ear will be tested again when the result of
+ * the test may have changed. */
 static bool is_ear(outline *o, uint32_t b)
 {
     tested_ear e = ear_at(o, b);

@@ -170,9 +170,9 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks all texts, then copies them. known: the present date, which is not checked, so that a date
- * that another program wrote can be kept. owner: what has these texts, for
- * messages, such as "a layer". */
+/* Checks all texts, then copies them. known: the present date, which is accepted without a check,
+ * so that a date that another program wrote can be kept. owner: the object that has these texts,
+ * for messages, such as "a layer". */
 static ebpo_status check_texts(const char *const from[EBPO_PAINT_TEXTS],
                                const ebpo_paint_text_kind *kinds, const char *owner,
                                const char *known, char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
@@ -483,7 +483,7 @@ ebpo_status ebpo_paint_get_info(const ebpo_paint *p, ebpo_paint_info *out)
 
 ebpo_status ebpo_paint_check_model(const ebpo_paint *p, const ebpo_file *model, ebpo_error *error)
 {
-    char digest[65], whole[65]; /* of this file; of the file of which it is a subset */
+    char digest[65], whole[65]; /* digest: of this file; whole: result of name_model */
     bool maps = model->info.parts & EBPO_PART_MAPS;
     ebpo_status status = check_mesh(model, error);
     if (status != EBPO_OK)

@@ -157,7 +157,7 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
 }
 
 /* Sets the model's box. On each axis, this is the range of the faces' coordinates that the file
- * states. If the stated range is not within the root cell, it is the range of the root cell. */
+ * states, or, if the stated range is not within the root cell, the range of the root cell. */
 static void set_model_box(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {

@@ -76,7 +76,7 @@ struct ebpo_scene {
     ebpo_model_options model_options;     /* options of the models that ebpo_scene_model makes */
 };
 
-#define EBPO_SCENE_ALL_SET 0
+#define EBPO_SCENE_ALL_SET 0 /* index in `sets` of the set of all instances */
 
 /* --- names --- */
 

@@ -596,8 +596,8 @@ static void print_stats(const map_job *j)
     if (isfinite(s->percentile[0]))
         print_percentiles(s);
     if (j->v->bounds)
-        printf("  hausdorff  %.9g to %.9g, from all of its faces; %s\n", j->hausdorff.lo,
-               j->hausdorff.hi,
+        printf("  hausdorff  %.9g to %.9g, from all faces of the other model; %s\n",
+               j->hausdorff.lo, j->hausdorff.hi,
                words_plural(queries, sizeof queries, j->hausdorff.queries, "distance",
                             "distances"));
 }
