@@ -245,7 +245,7 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
     return status;
 }
 
-/* The query if model m contains a point, by the faces of model m that contain the point. */
+/* The query whether model m contains a point, by the faces of model m that contain the point. */
 typedef struct face_query {
     ebpo_two_models *two;
     int m;

@@ -23,7 +23,7 @@ typedef struct level_search {
     double lo, hi;            /* bounds of the distance of faces */
     uint64_t undecided_pairs; /* number of undivided pairs of nodes whose faces may intersect */
     bool intersects;          /* the solids or faces certainly have a common point */
-    bool may_intersect;       /* the content of an undivided pair may have a common point */
+    bool may_intersect;       /* the nodes of an undivided pair may have a common point */
 } level_search;
 
 static const char stage[] = "pairs of nodes"; /* for the progress function */
@@ -95,10 +95,10 @@ static void widen_cell(double corner[8][3], double share)
 }
 
 /* Returns true if a black node certainly has a common point with the model of another node. black,
- * other: corners of both cells; other_black: the other node is black, too. If the other
- * node is black, the black cell must contain a corner or the middle of the other cell. If the other
- * node has faces, the black cell must contain the region of these faces: the other cell with a
- * margin, by which `other` is widened. */
+ * other: corners of both cells; other_black: the other node is black, too. If the other node is
+ * black, the black cell must contain a corner or the middle of the other cell. If the other node
+ * has faces, the black cell must contain the region of these faces: the other cell with a margin,
+ * by which `other` is widened. */
 static bool shares_point(const level_search *g, double black[8][3], double other[8][3],
                          bool other_black)
 {

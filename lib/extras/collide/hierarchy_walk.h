@@ -44,7 +44,8 @@ typedef struct ebpo_turned_node {
     bool cylinders;                      /* at least one child has a cylinder */
 } ebpo_turned_node;
 
-/* Number of turned nodes of each model that a walk keeps (a cache); its logarithm to the base 2. */
+/* EBPO_TURNED_NODES: number of turned nodes of each model that a walk keeps (a cache).
+ * EBPO_TURNED_BITS: its logarithm to the base 2. */
 enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
 
 typedef struct ebpo_pair_walk ebpo_pair_walk;

@@ -44,13 +44,13 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 
 /* One of the pictures side by side. */
 typedef struct tile {
-    int level;           /* or MESH */
+    int level;           /* level of the file, or MESH */
     bool optional;       /* omit the tile if the file does not have the level */
     uint64_t face_count; /* set when the mesh is freed */
     ebpo_mesh mesh;
     ebpo_colours colours;  /* colours of the model, if it has colours */
     float *normals;        /* of the triangles of a level, for lighting; or NULL */
-    float *vertex_normals; /* or NULL */
+    float *vertex_normals; /* of the vertices of a simplified surface; or NULL */
     bool closed;           /* only front sides of faces are visible */
     char caption[64];
 } tile;

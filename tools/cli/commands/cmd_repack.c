@@ -41,8 +41,7 @@ static int check_values(const values *v, ebpo_write_options *write)
 }
 
 /* Sets the codec: that of --codec, otherwise that of the file. Fails if --zstd-level does not
- * apply.
- */
+ * apply. */
 static ebpo_status choose_codec(const values *v, const ebpo_info *info, ebpo_write_options *write,
                                 ebpo_error *error)
 {
