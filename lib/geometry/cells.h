@@ -160,7 +160,7 @@ static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int a
 }
 
 /* Finds the cell of the given level that contains p (cell faces belong to the upper cell). Returns
- * false outside the root cell. Exact: level <= grid_level. */
+ * false outside the root cell. Exact for level <= grid_level. */
 static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -176,7 +176,8 @@ static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3]
 typedef struct ebpo_locator {
     ebpo_box box;
     int level;
-    double scale[3], half; /* cells per unit of length; half of the number of cells along an axis */
+    double scale[3]; /* cells per unit of length */
+    double half;     /* half of the number of cells along an axis */
 } ebpo_locator;
 
 /* A point's position in the grid of a locator's level. */

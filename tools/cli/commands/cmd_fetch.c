@@ -167,8 +167,8 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     return status == EBPO_OK ? EXIT_OK : command_failed("fetch", &error);
 }
 
-/* Checks, before data is fetched, that neither the output is a folder nor `part` another file.
- * Returns false after a report on standard error. */
+/* Checks, before data is fetched, that the output is not a folder, and that `part` is a folder or
+ * does not exist. Returns false after a report on standard error. */
 static bool out_fits(const char *out, const char *part)
 {
     struct stat s;

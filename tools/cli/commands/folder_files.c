@@ -77,8 +77,7 @@ static bool search_folder(folder_files *f, const char *folder, const char *below
 
 /* Adds the entry `name` of folder/below if it is a model, or searches it if it is a folder. Does
  * not follow links to folders, which may form cycles. Returns false after an error that ends the
- * search.
- */
+ * search. */
 static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const char *below,
                           const char *name)
 {
