@@ -38,7 +38,7 @@ typedef enum ebpo_leaf_kind {
     EBPO_LEAF_SORTED = 8   /* as EBPO_LEAF_BOUNDED, and a thread is finding the kind */
 } ebpo_leaf_kind;
 /* Finding a free cell face takes as long as one query, and finding the kind as long as dozens of
- * queries. So the first is done at the first query of the leaf, the second at the 128th query. */
+ * queries. So the cell face is found at the leaf's first query, the kind at the 128th query. */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
 /* Values of `cell_face` for a leaf without a free cell face. EBPO_NEAR_BORDER: the leaf of a
  * surface is near the border (the edges of holes), so each query computes the generalized winding
@@ -69,8 +69,9 @@ static inline void ebpo_list(ebpo_listed_block *b, uint64_t listed)
 static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_LAST - 1); }
 static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
 
-/* A leaf. ebpo_leaf_query sets `rows`, `cell_face` and `cell_face_step` and then `kind`. The first
- * three are valid after `kind` has the corresponding value, and do not change afterwards. */
+/* A leaf. ebpo_leaf_query sets `rows`, `cell_face` and `cell_face_step` and then `kind`.
+ * `cell_face` and `cell_face_step` are valid if ebpo_leaf_is_bounded, `rows` if
+ * ebpo_leaf_has_planes (or see EBPO_NEAR_BORDER). Valid values do not change. */
 typedef struct ebpo_accel_leaf {
     uint32_t list;   /* index in ebpo_accel.list of the leaf's first entry */
     int32_t winding; /* winding number at the lowest corner, shifted (format-spec, section
@@ -78,7 +79,8 @@ typedef struct ebpo_accel_leaf {
     /* if ebpo_leaf_has_planes: number of the first row of the leaf's planes (EBPO_KIND_ROW); see
      * also EBPO_NEAR_BORDER */
     uint32_t rows;
-    _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
+    _Atomic uint8_t kind;    /* ebpo_leaf_kind; if !has_windings (ebpo_accel), always
+                              * EBPO_LEAF_GENERAL */
     _Atomic uint8_t queries; /* approximate number of queries until the kind is known */
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE or
      * EBPO_NEAR_BORDER */
@@ -100,7 +102,8 @@ static inline bool ebpo_leaf_is_bounded(ebpo_leaf_kind kind)
 typedef union ebpo_kind_row {
     float of_four[4];
     struct {
-        /* winding numbers: where the values of all planes are negative; elsewhere in the cell */
+        /* inner: winding number where the values of all planes are negative; outer: winding number
+         * elsewhere in the cell */
         int32_t inner, outer;
         uint32_t fours; /* number of groups of four planes; the last one is filled with plane 0 */
     } head;
@@ -126,7 +129,8 @@ typedef struct ebpo_leaf_kinds {
     ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
      ((number) & ((1u << EBPO_KIND_PAGE_BITS) - 1)))
 
-/* Returns the kind of a leaf. What other threads wrote before they set the kind is then visible. */
+/* Returns the kind of a leaf. What the thread that set the kind had written before is visible to
+ * the caller. */
 static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
 {
     return (ebpo_leaf_kind)atomic_load_explicit(&leaf->kind, memory_order_acquire);
@@ -148,7 +152,7 @@ static inline bool ebpo_leaf_has_planes(ebpo_leaf_kind kind)
 typedef struct ebpo_meshlet {
     uint32_t face; /* local index of the first face; the other faces have the next indices */
     uint32_t corner[3];
-    uint8_t faces, vertices; /* their numbers */
+    uint8_t faces, vertices; /* number of faces; number of vertices */
     uint8_t spare[2];
 } ebpo_meshlet;
 /* EBPO_BLOCK: lanes of a block. Slot: block number * EBPO_BLOCK + lane. */
@@ -250,7 +254,8 @@ typedef struct ebpo_accel {
     uint32_t root_bound; /* index of the hierarchy's root in `bound` */
     uint32_t shared_count;
     uint32_t *shared;      /* [shared_count] file indices of the shared faces */
-    uint64_t first_face;   /* file index of the first owned face; the others have the next ones */
+    uint64_t first_face;   /* file index of the first owned face; the other owned faces have the
+                            * next indices */
     uint32_t *face_source; /* [face_count] index of each face in the source, the mesh that was
                             * converted; NULL: the file has no source indices */
     /* Plane codes of gray nodes; NULL: has_planes is false. The gray node whose children are group
@@ -258,8 +263,8 @@ typedef struct ebpo_accel {
     uint32_t *gray_planes;
     uint32_t *gray_first; /* [gray_count + 1] */
     uint64_t gray_count;
-    /* total bytes of memory; in a whole model without the planes of leaves (ebpo_leaf_kinds), in a
-     * subtree with the most that they can take */
+    /* total bytes of memory. The planes of leaves (ebpo_leaf_kinds) are not counted in a whole
+     * model; in a subtree, the most bytes that they can take are counted. */
     uint64_t bytes;
 } ebpo_accel;
 
@@ -316,7 +321,7 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
 /* --- nodes of an accel (query_node.c), identified by ebpo_node.entry --- */
 
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
-/* Returns the child of a gray node that is not pruned. */
+/* Returns a child of a gray node. The gray node must not be pruned. */
 ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
 /* The interface by which cursors (geometry/cursor.h) read nodes of an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;

@@ -78,8 +78,8 @@ static bool has_windings(const ebpo_info *info)
     return info->solid || info->parts & EBPO_PART_BORDER;
 }
 
-/* Returns the bytes of the grid from which searches in a whole model start several levels below the
- * root: 5 for each cell of the grid. */
+/* Returns the bytes of the grid with which searches in a whole model start several levels below the
+ * root. Each grid cell takes 5 bytes. */
 static uint64_t grid_bytes(uint64_t groups)
 {
     int bits = ebpo_node_grid_bits(groups);
@@ -352,8 +352,8 @@ static inline void list_face(const walk *w, uint64_t face, listing *l)
     ebpo_list(&l->list[l->count - 1], l->last);
 }
 
-/* Fills in leaf `index` of the accel, which has this rank in its level. Its list has first the
- * references, then the leaf's new faces, whose indices are greater. */
+/* Fills in leaf `index` of the accel. `rank`: of the leaf in its level. The leaf's list has first
+ * the references, then the new faces, whose indices are greater. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t index)
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[index];
@@ -411,7 +411,8 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     if (w->slice->pruned &&
         (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
-            w->rank[depth + 1][EBPO_WHITE] += 8; /* the file stores eight white nodes for it */
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* the file stores eight white nodes in place of
+                                                  * its children */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
         return ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)group);
@@ -574,7 +575,8 @@ static uint64_t count_bytes(const ebpo_accel *s)
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
-/* Makes all parts of the accel, in stages. Checks the quota when more about the size is known. */
+/* Makes all parts of the accel, in stages. Checks the quota again whenever more is known about the
+ * size. */
 static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info,
                                ebpo_quota *space, unsigned threads, ebpo_error *error)
 {

@@ -74,7 +74,8 @@ static double max_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
 enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
 typedef struct vertices {
     pair x[3][PAIRS];
-    unsigned pairs; /* number of pairs; if the number of vertices is odd, the last one is twice */
+    unsigned pairs; /* number of pairs; if the number of vertices is odd, the last vertex is stored
+                     * twice */
 } vertices;
 
 static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
@@ -307,8 +308,8 @@ static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *o
 }
 
 /* Does the same as enclose_wide for blocks of floats, in single precision. The kernel's coordinates
- * are relative to an origin near the middle, which is the sum of two floats. The difference of this
- * origin from the middle (`off`) is added at the end. */
+ * are relative to an origin near the middle. The origin is the sum of two floats; its difference
+ * from the middle (`off`) is added at the end. */
 static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     const ebpo_accel *s = j->s;
@@ -335,8 +336,8 @@ static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder 
     out->radius2 = aside * aside;
 }
 
-/* Sets a cylinder without an axis, which contains the box, so that it excludes nothing more than
- * the box. half: half of the sides of the box. */
+/* Sets a cylinder without an axis: a ball around the box, which excludes no point of the box. half:
+ * half of the sides of the box. */
 static void set_no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[3], cylinder *out)
 {
     for (int k = 0; k < 3; k++) {

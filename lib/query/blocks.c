@@ -1,12 +1,12 @@
-/* Makes blocks, which have at most eight faces each, with the vertices that these faces share, and
- * the hierarchy over the blocks (accel.h).
+/* Makes blocks and the hierarchy over the blocks (accel.h). A block has at most eight faces, and
+ * stores vertices that these faces share only once.
  *
  * First, the layout decides which faces are in one block, and builds the hierarchy; it uses no
  * coordinates. The new faces of a node (faces that no leaf before the node lists) have consecutive
  * local indices. So neighbouring children with few new faces can share a block. The hierarchy
- * follows the octree: the blocks below an octree node are passed up to its parent until there are
- * more than eight, which are then joined in nodes of the hierarchy. Then the blocks are measured,
- * numbered and filled in parallel; block_bounds.c computes their bounds. */
+ * follows the octree: the blocks below an octree node are passed up to the node's parent. Where
+ * more than eight meet, some of them are joined in nodes of the hierarchy. Then the blocks are
+ * measured, numbered and filled in parallel; block_bounds.c computes their bounds. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

@@ -161,8 +161,8 @@ void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
 
 /* SUBTREES_NEEDED: number of subtrees for which the cache must have space. Queries along a path
  * need the current subtree, its neighbours, and memory to load the next one. SUBTREES_WANTED:
- * number for which it has space if the budget allows; the cut level is then deeper, and subtrees
- * are smaller and load faster. */
+ * number of subtrees for which the cache has space if the budget allows this. The cut level is then
+ * deeper, and subtrees are smaller and load faster. */
 enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
 
 /* Returns the counts of the whole model. */

@@ -195,7 +195,7 @@ static int cut_envelope(ebpo_context *c, const node_chain *chain)
 }
 
 /* Computes the distance to the polygons of one envelope: that of the deepest gray node that
- * contains p, at level o->level or above. */
+ * contains p, on levels 0 to o->level (-1: on all levels). */
 static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
                                         const ebpo_distance_options *o, ebpo_distance_result *out,
                                         ebpo_error *error)
@@ -251,8 +251,8 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
 }
 
 /* In a subset, fails with EBPO_E_ABSENT if an omitted part of the model may change the result.
- * After the deadline, does not fail, but widens the interval of the result by the bound of that
- * part. */
+ * After the deadline, does not fail, but lowers the lower end of the result's interval to the bound
+ * of that part. */
 static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_ranking ranking = ebpo_ranking_of(c->model, n->p, &n->far);

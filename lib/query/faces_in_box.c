@@ -221,8 +221,8 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
     return found;
 }
 
-/* Returns true in exactly one of the accels that list a face which intersects the box: in the first
- * one (find_first). `owned`: the current accel owns the face. */
+/* Several accels may list a face that intersects the box. Returns true if the current accel is the
+ * first one of these (find_first). `owned`: the current accel owns the face. */
 static bool box_walk_is_first(const box_walk *w, bool owned, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
@@ -338,8 +338,8 @@ static void pass_batch(delivery *d)
     d->count = 0;
 }
 
-/* Appends the faces that the walk found in an accel to the batch (box_walk.take), except those that
- * belong to another accel. */
+/* Appends the faces that the walk found in an accel to the batch (box_walk.take), except faces that
+ * the query takes from another accel (find_first). */
 static ebpo_status receive_triangles(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;

@@ -143,9 +143,9 @@ static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, 
     return false;
 }
 
-/* Begins to bound w_D at the centre of a cell. *variation: if no face touches the cell, 2 pi w_S at
- * any point of the cell differs from its value at the centre by at most this; if no cap touches the
- * cell, the same is true of 2 pi w_D. Returns false if there is no such bound. */
+/* Begins to bound w_D at the centre of a cell. *variation: bound of the difference between the
+ * centre and any other point of the cell: of 2 pi w_S if no face touches the cell, and of 2 pi w_D
+ * if no cap touches the cell. Returns false if there is no such bound. */
 static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variation)
 {
     const ebpo_cap_box centre = ebpo_cap_point(box->centre);

@@ -47,7 +47,7 @@ typedef struct ebpo_marked_table {
     const ebpo_box *box; /* root cell of the model */
     ebpo_cell root;      /* cell of the table's root */
     ebpo_node_table *table;
-    const ebpo_accel *accel; /* of the table; NULL: the table has no leaves */
+    const ebpo_accel *accel; /* accel with this table; NULL: the table has no leaves */
     ebpo_cell_faces_fn *cell_faces;
     int deepest;
     uint64_t bytes;

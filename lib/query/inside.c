@@ -79,7 +79,7 @@ typedef struct leaf_point {
                          * lower sides in ebpo_listed_block */
 } leaf_point;
 
-/* Sets the position of a point in the cell of a leaf at this level. */
+/* Finds the position of a point in the cell of its leaf. `level`: of the leaf. */
 static inline void find_leaf_point(int deepest, int level, const ebpo_position *position,
                                    leaf_point *out)
 {
@@ -175,8 +175,8 @@ static inline bool any_sign(four_signs mask)
     return half[0] | half[1];
 }
 
-/* Classifies the point by the signs of the leaf's planes. Returns false when a value is within the
- * rounding error. */
+/* Classifies the point by the signs of the leaf's planes. Returns false if rounding errors could
+ * change the result. */
 static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_point *in,
                         int32_t *winding)
 {
@@ -227,8 +227,8 @@ static inline void give_winding(const ebpo_context *context, int32_t winding,
     *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, rounded ? in : winding, 0 };
 }
 
-/* Decides a point of a surface. `winding`: the winding number at the point of the closed mesh of
- * the surface and its caps (faces that close its holes). */
+/* Decides a point of a surface. `winding`: winding number at the point, for the closed mesh of the
+ * surface and its caps (faces that close its holes). */
 static void decide_capped(const ebpo_context *context, const double p[3], int32_t winding,
                           ebpo_inside_result *out)
 {
@@ -346,7 +346,7 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
     return result_in_leaf(context, s, &s->leaf[index], &at, p, out, error);
 }
 
-/* Classifies a point in a white node of a surface whose mark is EBPO_MARK_IN or EBPO_MARK_OUT. */
+/* In a surface, classifies a point in a white node with the mark EBPO_MARK_IN or EBPO_MARK_OUT. */
 static inline void give_marked(const ebpo_context *context, int32_t marked, ebpo_inside_result *out)
 {
     bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
@@ -354,7 +354,7 @@ static inline void give_marked(const ebpo_context *context, int32_t marked, ebpo
                                  context->undecided ? ebpo_marked_value(marked) : in, 0 };
 }
 
-/* Classifies a point in a white node of a surface with any mark (ebpo_uniform_mark). */
+/* In a surface, classifies a point in a white node with any mark (ebpo_uniform_mark). */
 static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
                                                     const ebpo_node_table *table, uint32_t entry,
                                                     const ebpo_position *position, int level,
@@ -401,7 +401,7 @@ static inline void inside_uniform(const ebpo_context *context, const ebpo_node_t
         inside_marked(context, table, entry, position, level, p, out);
 }
 
-/* Classifies p in a subtree whose root's cell contains p; `position` is its shifted position. */
+/* Classifies p in a subtree. The root's cell must contain p. `position`: shifted position of p. */
 static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
                                   const ebpo_position *position, const double p[3],
                                   ebpo_inside_result *out, ebpo_error *error)
@@ -720,8 +720,8 @@ static ebpo_status uniform_from_file(inside_query *query, const ebpo_node *node,
 }
 
 /* Handles a gray node on the way: sets the result and *done, or moves the cursor to the child that
- * contains the point. Only after its children have been requested, it is known if a node is pruned.
- */
+ * contains the point. Whether a node is pruned is known only after its children have been
+ * requested. */
 static ebpo_status pass_gray(inside_query *query, ebpo_cursor *c, bool *done,
                              ebpo_inside_result *out, ebpo_error *error)
 {
@@ -797,9 +797,10 @@ static ebpo_status walk_nodes(inside_query *query, ebpo_inside_result *out, ebpo
     return walk_file(query, &node, out, error);
 }
 
-/* Returns the whole model if it is in memory, or the subtree that the context holds in memory, if
- * its cell contains p. Otherwise returns NULL. *entry, *level: entry and level of the node at which
- * the way down the top of the tree ends (not set for a whole model, except *entry). */
+/* Returns the whole model if it is in memory; if not, the pinned subtree of the context, if its
+ * cell contains p; otherwise NULL. *entry, *level: entry and level of the node at which the way
+ * down the top of the tree ends. For a whole model, the kind of *entry is SUBTREE_ROOT, and *level
+ * is not set. */
 static const ebpo_accel *find_held(const inside_query *query, uint32_t *entry, int *level)
 {
     const ebpo_context *c = query->context;
@@ -814,8 +815,8 @@ static const ebpo_accel *find_held(const inside_query *query, uint32_t *entry, i
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* Decides p without envelopes, if the context has all data for it in memory. (Then envelopes would
- * save no time, because loading takes the time.) Returns false if some data is missing. */
+/* Decides p without envelopes, if the context has all data for it in memory. (Envelopes save time
+ * only by avoiding loads, and here nothing is loaded.) Returns false if some data is missing. */
 static bool result_in_memory(inside_query *query, ebpo_inside_result *out, ebpo_status *status,
                              ebpo_error *error)
 {
@@ -871,8 +872,8 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
     return status;
 }
 
-/* Classifies a point from node to node: with envelopes, to a level, with a deadline, or with a
- * model that is not all in memory. */
+/* Classifies a point from node to node: with envelopes, to a level, with a deadline, or in a model
+ * that is not completely in memory. */
 static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                                const ebpo_inside_options *options, ebpo_inside_result *out,
                                ebpo_error *error)

@@ -130,11 +130,11 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
     return combine_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
-/* Compares the point where the segment's line intersects the plane of a face with `at`, a
- * coordinate on the segment's axis: returns 1 if the point's coordinate is greater, -1 if it is
- * less, 0 if this is not certain. weight[i], size[i]: the cross product of the corners of edge i,
- * and its *size. k: the corners' coordinates on the axis. `turn`: 1 if the face turns left around
- * the line, -1 if it turns right. */
+/* Let x be the coordinate, on the segment's axis, of the point where the segment's line intersects
+ * a face's plane. Returns 1 if x is greater than `at`, -1 if x is less, 0 if this is not certain.
+ * weight[i], size[i]: the cross product of the corners of edge i, and its *size. k: the corners'
+ * coordinates on the axis. `turn`: 1 if the face turns left around the line, -1 if it turns right.
+ */
 static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {
@@ -228,9 +228,10 @@ typedef struct faces_of_cell {
     bool has_boxes; /* false if the cell is too small for boxes: each box is then the whole cell */
 } faces_of_cell;
 
-/* Returns the float that is `steps` (-1, 0, 1) away, in the order of floats. -0 and +0 are two
- * neighbouring floats here. This is correct for the callers: rounding a tiny double to a float
- * gives the zero with the double's sign, so the next float is on the other side of the double. */
+/* Returns f or a neighbour of f in the order of floats. `steps`: -1 (next lower float), 0 or 1. -0
+ * and +0 are two neighbouring floats here. This is correct for the callers: rounding a tiny double
+ * to a float gives the zero with the double's sign, so the next float is on the other side of the
+ * double. */
 static inline float step_float(float f, int32_t steps)
 {
     uint32_t bits;

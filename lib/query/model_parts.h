@@ -57,10 +57,10 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
  * A skeleton has the upper nodes of a subtree's hierarchy over faces (query/accel.h): eight nodes
  * at first, which take 2 KB, whereas the subtree takes hundreds of KB. The lower bound of the
  * distance to a subtree's faces is much better from its skeleton than from its cell and envelope,
- * so searches rarely load a subtree again that has no near face. A skeleton is made when the
- * subtree is loaded, without reading more of the file, and is kept when the cache drops the
- * subtree. If a search loads a subtree and finds no near face in it, nodes near the query point are
- * added to the subtree's skeleton, so memory is used where bounds are not good enough.
+ * so searches rarely reload a subtree without a near face. A skeleton is made when the subtree is
+ * loaded, without reading more of the file, and is kept when the cache drops the subtree. If a
+ * search loads a subtree and finds no near face in it, nodes near the query point are added to the
+ * subtree's skeleton, so memory is used where bounds are not good enough.
  *
  * Skeletons give lower bounds only. Upper bounds would not help, because subtrees are searched in
  * the order of lower bounds until the next bound is beyond the found distance (nearest_subtrees.c),
@@ -110,7 +110,8 @@ enum { EBPO_SHARED_BOXES = 64 };
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double p[3], double limit,
                                     ebpo_shared_box out[EBPO_SHARED_BOXES]);
 
-/* The skeletons of a model's subtrees. `number`: index of a subtree in top->below. Any thread. */
+/* The skeletons of a model's subtrees. `number`: index of a subtree in top->below. Any thread may
+ * use them. */
 typedef struct ebpo_skeletons ebpo_skeletons;
 
 /* Makes an empty table for `count` subtrees. `space`: quota in bytes for all skeletons
@@ -122,7 +123,7 @@ void ebpo_skeletons_free(ebpo_skeletons *all);
 /* Returns how many bytes of `space` the skeletons of `count` subtrees can use at most. */
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space);
 /* Reserve bytes of the quota for other data about subtrees (deep bounds, nearest.h), and give them
- * back. The first function returns false if the quota is too small. Any thread. */
+ * back. The first function returns false if the quota is too small. Any thread may call them. */
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes);
 void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
 /* Returns the bytes of memory that are used now. */
@@ -170,7 +171,7 @@ EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_mode
 /* --- shared budgets ---
  *
  * A budget that several models share. It counts the bytes that each model takes permanently, and
- * the bytes for the caches of all models. Any thread. */
+ * the bytes for the caches of all models. Any thread may use it. */
 
 /* Return the pools of the caches of subtrees and of chunks. They are separate, because loading a
  * subtree needs memory for chunks. */

@@ -340,8 +340,8 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
         return greatest;
     for (int k = 0; k < 3; k++)
         sum += d[k] / greatest * (d[k] / greatest);
-    /* On at least one axis, p is at least FAR_COORDINATE away from the subtree's centre, in its
-     * frame. So the rounding error of the box sides is far below 2^-40 of the distance. */
+    /* On at least one axis of the subtree's frame, p is at least FAR_COORDINATE away from the
+     * centre. So the rounding error of the box sides is far below 2^-40 of the distance. */
     return greatest * sqrt(sum) * (1 - 0x1p-40);
 }
 

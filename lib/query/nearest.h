@@ -22,7 +22,7 @@ typedef struct ebpo_nearest {
     double key_limit; /* for a far point: faces with a greater key are certainly not the result */
     double limit;     /* faces that are farther away are certainly not the result */
     double upper;     /* upper bound of the distance to the model's nearest face, or INFINITY */
-    bool found;       /* there is a winner; the next six fields are valid */
+    bool found;       /* there is a winner; the fields `bounds` to `node` are valid */
     ebpo_distance_bounds bounds;     /* bounds of the winner's distance */
     ebpo_far_keys keys;              /* for a far point: bounds of the winner's key */
     double triangle[3][3];           /* corners of the winner */

@@ -2,7 +2,7 @@
  * walks from node to node of the hierarchy over blocks of faces, eight children or eight faces at a
  * time, in single precision.
  *
- * The walk only drops nodes and faces that are certainly farther than the best upper bound. All
+ * The walk drops only nodes and faces that are certainly farther than the best upper bound. All
  * other faces become candidates, which nearest.c compares.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
@@ -308,9 +308,10 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
     return true;
 }
 
-/* Visits the first block (g->first_block), if there is one. Returns the node where the walk begins:
- * the deepest ancestor of the first block compared with which the search is small (NEAR_SMALL);
- * above this node, the search hardly ever needs another child. Without a first block, the root. */
+/* Visits the first block (g->first_block), if there is one. Returns the node where the walk begins.
+ * Without a first block, this is the root. With one, this is the first node, on the way from the
+ * block up to the root, compared with which the search is small (NEAR_SMALL); above this node, the
+ * search hardly ever needs another child. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
 {
     const ebpo_bound *bound = g->s->bound;

@@ -113,7 +113,7 @@ typedef struct deep_child {
     double lower; /* lower bound of the distance */
 } deep_child;
 
-/* Returns the planes of the node with an entry of the table. */
+/* Returns the planes of the node that has this entry in the table of the deep bounds. */
 static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
 {
     uint32_t value = ebpo_entry_value(entry);

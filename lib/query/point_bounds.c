@@ -344,8 +344,8 @@ double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_
 
 /* --- faces --- */
 
-/* |y|^2 >= 2 z . y - |z|^2 for every z. The right side is linear in y, so a key with it in place of
- * |y|^2 has its minimum over the face at a corner. Here z is the corner with the least key. */
+/* |y|^2 >= 2 z . y - |z|^2 for every z. The right side is linear in y. So if it replaces |y|^2 in
+ * the key, the minimum over the face is at a corner. Here z is the corner with the least key. */
 ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
 {
     double y[3][3], key[3], greatest = 0;

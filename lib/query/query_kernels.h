@@ -102,7 +102,7 @@ typedef struct ebpo_near_search ebpo_near_search;
 struct ebpo_near_search {
     const ebpo_accel *s;
     ebpo_probe probe;
-    void *user;                              /* of the functions below */
+    void *user;                              /* data for the functions below */
     void (*judge)(ebpo_near_search *search); /* compares all waiting candidates exactly */
     bool (*late)(ebpo_near_search *search); /* returns true after the deadline; NULL: no deadline */
     /* block that is visited before all others, and the node above it; EBPO_NO_BLOCK: none */
@@ -144,8 +144,8 @@ typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL }
 
 typedef struct ebpo_ray_search ebpo_ray_search;
 
-/* A face that the ray may hit, at a t of at least `low` (in the frame). `facing`: if the line
- * certainly goes through the face's interior, as in ebpo_ray_intersection; otherwise 0. */
+/* A face that the ray may hit, at a t of at least `low` (in the frame). `facing`: as in
+ * ebpo_ray_intersection if the line certainly goes through the face's interior, otherwise 0. */
 typedef struct ebpo_ray_candidate {
     float low;
     uint32_t slot;
@@ -173,12 +173,12 @@ struct ebpo_ray_search {
      * whose longest coordinate is 2^-12 to 2^12; the origin, moved along the ray to t = `moved`; a
      * bound of the origin's error. */
     double direction[3], origin[3], error;
-    /* Set by the kernels, with one float for each axis and an unused fourth float: the origin for
-     * the nearer and for the farther sides of boxes, moved by the error so that no box is missed;
-     * the inverse of the direction. */
+    /* Set by the kernels. Each of the next three arrays has one float for each axis and an unused
+     * fourth float. near_from, far_from: the origin for the nearer and for the farther sides of
+     * boxes, moved by the error so that no box is missed. inverse: of the direction. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
-    double inverse_double[4]; /* inverse of the direction, small coordinates replaced */
+    double inverse_double[4]; /* inverse of the direction; small coordinates were replaced */
     /* byte offsets in ebpo_bound: of the nearer sides of boxes on each axis, and of the farther
      * ones */
     const uint8_t (*side_at)[3];
@@ -202,9 +202,10 @@ typedef struct ebpo_axis_segment {
     double from[3];
     double to;
     int axis;
-    /* Extent of the segment in the cell, in sixteenths of the cell, encoded as the box of an
-     * ebpo_listed_block, but with the upper side and 15 minus the lower side for each axis.
-     * EBPO_REACH_ALL: the segment may intersect all boxes. */
+    /* Extent of the segment in the cell, in sixteenths of the cell, encoded almost as the box of an
+     * ebpo_listed_block: for each axis, the upper side is stored in place of the lower side, and 15
+     * minus the lower side in place of 15 minus the upper side. EBPO_REACH_ALL: the segment may
+     * intersect all boxes. */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)
@@ -226,15 +227,15 @@ static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint
 typedef struct ebpo_inside_kernels {
     /* Returns the sum of the certain crossings (ebpo_axis_crossing) of the segment with a leaf's
      * listed faces. The segment must be in the leaf's cell. Appends the slots of faces that are not
-     * certain to `open` (capacity: 8 for each block), and adds their number to *open_count. These
-     * include every face that contains the segment's end at `to` or `from`. */
+     * certain to `open` (capacity: 8 for each block), and adds their number to *open_count. Every
+     * face that contains an end of the segment is one of these. */
     int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     ebpo_cell_faces_fn *cell_faces;
 } ebpo_inside_kernels;
 
 /* These functions walk through search->s, and call search->judge when many candidates wait. After
- * the walk, the faces that still wait may be the nearest face, or hit. */
+ * the walk, the caller must test the candidates that still wait. */
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;

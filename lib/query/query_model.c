@@ -196,9 +196,8 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
 }
 
 /* Returns the deepest level of the cells into which ebpo_holes_mark splits nodes near the border.
- * At this level, the few undecided cells at each edge of the border are a few percent of the root
- * cell.
- */
+ * At this level, the undecided cells at all edges of the border together fill a few percent of the
+ * root cell. */
 static int split_level(const ebpo_model *m)
 {
     enum { CELLS_FOR_EDGE = 64, LEAST = 7 };

@@ -30,7 +30,7 @@ struct ebpo_model {
     bool default_memory; /* no budget was given, and the file is remote */
     ebpo_query_kernels kernels;
     ebpo_accel *whole;   /* the whole model in memory; NULL: the model is loaded in parts */
-    bool results_inside; /* true: `whole` has its mesh, and an inside */
+    bool results_inside; /* true: the whole model is in memory with its mesh, and has an inside */
     ebpo_holes *holes;   /* for a surface with its border (the edges of its holes); or NULL */
     /* If the model is loaded in parts: */
     ebpo_top *top;              /* levels 0 .. cut level */
@@ -80,12 +80,13 @@ struct ebpo_context {
     uint64_t queue_count, queue_capacity;
     uint32_t *marks;       /* [subtrees] state in the current query (nearest_subtrees.c) */
     uint32_t query_number; /* of the current query */
-    /* number of subtrees that distance queries searched; number that all queries loaded */
+    /* numbers of subtrees that distance queries searched, and that all queries loaded */
     uint64_t searched, loaded;
     ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */
     ebpo_polytope *cutting;         /* [2] temporary envelopes, which are too large for a small
                                      * stack; NULL before the first use */
-    /* The last query that prefetched: false if there is none; its point and search distance. */
+    /* has_prefetched: some query has prefetched; the next two fields are the point and the search
+     * distance of the last such query. */
     bool has_prefetched;
     double prefetched_from[3], prefetched_distance;
     /* The face that the last distance query found, from which the next ebpo_distance starts if its
@@ -112,9 +113,9 @@ EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t cou
 EBPO_MUST_USE ebpo_status ebpo_model_has_capacity(const ebpo_model *model, const ebpo_node *leaf,
                                                   ebpo_error *error);
 
-/* Returns the key in the cache of the subtree top->below[below], with or without the planes of its
- * nodes. (The subtree is loaded without planes if possible: few queries need them, and they take
- * separate reads.) */
+/* Returns the cache key of the subtree top->below[below], with or without the planes of its nodes.
+ * (The subtree is loaded without planes if possible: few queries need them, and they take separate
+ * reads.) */
 static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
 
 /* Returns the data of the file (EBPO_NEEDS_...) that a subtree needs, with or without planes. */
@@ -130,8 +131,8 @@ static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below
     return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
 }
 
-/* Returns the key in the cache of the subtree for the current query. A query that needs no planes
- * uses the subtree with planes if the cache has it. */
+/* Returns the subtree's cache key for the current query. A query that needs no planes uses the
+ * subtree with planes if the cache has it. */
 static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
 {
     uint64_t full = ebpo_subtree_key(below, true);

@@ -118,7 +118,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    /* Only the subtree's table may show that the node is pruned. */
+    /* That the node is pruned may be known only now, from the subtree's table. */
     if (ebpo_node_is_subtree_root(node))
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;

@@ -22,7 +22,7 @@ static inline bool ebpo_node_is_subtree_root(const ebpo_node *node)
 EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node,
                                            ebpo_error *error);
 
-/* Returns a child of a gray node that is not of the kind SUBTREE_ROOT. */
+/* Returns a child of a gray node. The gray node must not be of the kind SUBTREE_ROOT. */
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant);
 
 /* Source of nodes for cursors (geometry/cursor.h). The cursor's holder is an ebpo_context, which
@@ -48,8 +48,8 @@ static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double
     return (ebpo_ranking){ model, ebpo_model_box(model), p, far && far->far ? far : NULL };
 }
 
-/* Returns the lower bound of a node: the greater one of `parent`, the bound of its parent, and the
- * bound from its cell and planes. */
+/* Returns the lower bound of a node: the greater one of `parent` (its parent's bound) and the bound
+ * from its cell and planes. */
 double ebpo_rank_node(const ebpo_ranking *ranking, const ebpo_node *node, double parent);
 /* Returns the lower bound of the root. */
 double ebpo_rank_root(const ebpo_ranking *ranking);
@@ -57,7 +57,7 @@ double ebpo_rank_root(const ebpo_ranking *ranking);
  * one. */
 double ebpo_rank_cell(const ebpo_ranking *ranking, ebpo_cell cell, const uint32_t *codes,
                       uint32_t count, double enough);
-/* Returns an upper bound for the farthest point of a cell (ebpo_cell_far, or its key). */
+/* Returns an upper bound of the distance (ebpo_cell_far) or key of a cell's farthest point. */
 double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
 
 /* A node and its lower bound. */

@@ -3,8 +3,8 @@
  *
  * A model that is loaded in parts always has the top in memory; queries go down through the top to
  * the subtrees. The same struct, read with envelopes only, serves as deep bounds, which have some
- * levels below the cut level (nearest.h). It does not change after it was read; any thread may use
- * it. */
+ * levels below the cut level (nearest.h). A top does not change after it was read; any thread may
+ * use it. */
 #include "query/holes.h"
 #include "query/model_parts.h"
 

@@ -106,7 +106,8 @@ static void add_face(near_band *band, const near_face *face)
         band->near[band->count++] = *face;
 }
 
-/* Adds a face to the candidates, unless it is empty, beyond the limit or in an earlier band. */
+/* Adds the face of a slot to the candidates, unless the slot is empty, or the face is beyond the
+ * limit or in an earlier band. */
 static void try_face(near_band *band, const ebpo_accel *s, uint32_t slot)
 {
     near_face face;

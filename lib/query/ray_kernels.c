@@ -2,7 +2,7 @@
  * accel (acceleration structure of a subtree, accel.h), and filters eight faces at a time, in
  * single precision.
  *
- * The kernel only drops faces that the ray certainly misses, or certainly hits beyond the limit of
+ * The kernel drops only faces that the ray certainly misses, or certainly hits beyond the limit of
  * t (a hit is at origin + t * direction). If the kernel reports a certain hit, the face is also hit
  * in exact arithmetic. All faces that are not dropped become candidates, which rays.c tests
  * exactly.
@@ -142,9 +142,9 @@ EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b
     return out;
 }
 
-/* For the three edges of eight faces (u, v, w): twice the signed area of the triangle, in x and y,
- * that the edge forms with the ray. Their least and greatest values, and a bound of their rounding
- * error. */
+/* u, v, w: for each of the three edges of eight faces, twice the signed area of the triangle that
+ * the edge forms with the ray, in x and y. least, greatest: the least and the greatest of u, v and
+ * w. error: bound of the rounding error of u, v and w. */
 typedef struct edges {
     f8 u, v, w, least, greatest, error;
 } edges;
@@ -173,8 +173,8 @@ EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
 /* Results for the faces of a block; masks have a bit for each lane. */
 typedef struct ray_lanes {
     float low[8], high[8]; /* bounds of t of possible hits */
-    unsigned alive, sure;  /* faces that may be hit, that are certainly hit, between 0 and the limit
-                            */
+    unsigned alive, sure;  /* alive: faces that may be hit at a t of 0 to the limit; sure: faces
+                            * that certainly are */
     /* faces through whose interior the ray's line certainly goes, from the front or from the back
      */
     unsigned front, back;

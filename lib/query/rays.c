@@ -607,8 +607,8 @@ static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
     }
 }
 
-/* Sorts the rays that are not completed along the Morton curve. If there is no memory for this, the
- * rays are evaluated in the given order. */
+/* Sorts the uncompleted rays along the Morton curve. If there is no memory for this, the rays are
+ * evaluated in the given order. */
 static void put_in_order(batch *b, const ebpo_model *m)
 {
     ebpo_box box = ebpo_model_box(m);

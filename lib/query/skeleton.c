@@ -116,9 +116,9 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
             keep_child(k, s, &top->bound.child[lane]);
 }
 
-/* Adds the node of the largest child with owned faces that is not in the skeleton: its node
- * improves the bounds most. Returns false if there is none. `shared_end`: index of the first node
- * after the nodes of shared faces. */
+/* Of the children that have owned faces and whose nodes are not in the skeleton, finds the largest
+ * child, and adds its node, which improves the bounds most. Returns false if there is none.
+ * `shared_end`: index of the first node after the nodes of shared faces. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t shared_end)
 {
     double largest = -1;
@@ -442,7 +442,8 @@ static uint64_t table_bytes(uint64_t count)
     return sizeof(ebpo_skeletons) + count * sizeof(ebpo_skeleton *);
 }
 
-/* Returns a number of nodes that all skeletons can have, at least one. */
+/* Returns the initial number of nodes of each skeleton: as many as the quota allows for all
+ * skeletons, at least 1 and at most BEGIN_NODES. */
 static unsigned nodes_each(uint64_t count, uint64_t space)
 {
     unsigned nodes = BEGIN_NODES;

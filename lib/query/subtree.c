@@ -118,7 +118,7 @@ static ebpo_status reserve_space(ebpo_subtree *s, uint64_t planes, ebpo_error *e
 
 /* --- one level --- */
 
-/* Position in a level's arrays: how many nodes of each type, planes and leaf planes were copied. */
+/* How many items of a level were copied: nodes of each type, planes, and leaf planes. */
 typedef struct level_position {
     uint64_t rank[4], plane, leaf_plane;
 } level_position;
@@ -542,7 +542,7 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
 {
     const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
     ebpo_octcode found = ebpo_cursor_octcode(c);
-    /* Only after its children have been requested, it is known if the node is pruned. */
+    /* Whether the node is pruned is known only after its children have been requested. */
     ebpo_status status = ebpo_cursor_children(c, &child, error);
     if (status != EBPO_OK)
         return status;
