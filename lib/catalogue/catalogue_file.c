@@ -428,8 +428,8 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-/* Reads the text of the file, which the caller frees. Sets c->file_bytes to its length. If the file
- * is a pipe, fails without waiting for a writer. */
+/* Reads the file's text, which the caller frees. Sets c->file_bytes to its length. If the file is a
+ * pipe, fails without waiting for a writer. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;

@@ -31,7 +31,7 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c);
 /* An open model, lent to a thread. */
 typedef struct ebpo_catalogue_held ebpo_catalogue_held;
 
-/* Runs a query, in a context of the model that belongs to the calling thread. */
+/* Runs a query. The context is one of the model, and belongs to the calling thread. */
 typedef ebpo_status (*ebpo_catalogue_query)(ebpo_context *context, const ebpo_catalogue_held *model,
                                             void *user, ebpo_error *error);
 

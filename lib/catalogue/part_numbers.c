@@ -16,7 +16,7 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-/* Maximum number of bytes of the header and of the bytes before the header. */
+/* Maximum number of bytes from the beginning of the file to the end of the header. */
 enum { HEAD_MAX = 4096 };
 
 static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *error, const char *what)
