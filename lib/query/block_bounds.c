@@ -255,7 +255,7 @@ typedef struct cylinder {
 } cylinder;
 
 /* Chooses the axis along the mean normal of the faces. The axis is rounded towards zero, so the
- * decoded axis is never longer than 1. The formula of ebpo_bound_cylinder is valid only then. */
+ * decoded axis is never longer than 1, as the formula of ebpo_bound_cylinder requires. */
 static void choose_axis(const extent *e, ebpo_bound_cylinder *b, int lane, cylinder *out)
 {
     double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
@@ -376,8 +376,8 @@ static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const exten
     return out;
 }
 
-/* Returns the longest side of the box of all children, which is at least 2^-18 of the largest
- * coordinate of this box. */
+/* Returns the longest side of the box of all children. This side is at least 2^-18 of the box's
+ * largest coordinate. */
 static double size_of(const ebpo_bound *b)
 {
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));

@@ -1,5 +1,5 @@
-/* Makes blocks and the hierarchy over the blocks (accel.h). A block has at most eight faces, and
- * stores vertices that these faces share only once.
+/* Makes blocks and the hierarchy over the blocks (accel.h). A block has at most eight faces and the
+ * vertices of these faces.
  *
  * First, the layout decides which faces are in one block, and builds the hierarchy; it uses no
  * coordinates. The new faces of a node (faces that no leaf before the node lists) have consecutive

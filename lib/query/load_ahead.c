@@ -227,7 +227,7 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
 /* Returns true if consecutive points are far apart. Such points are evaluated along the curve even
  * if the whole model is in memory. Along the curve, the data for the next point is often in the
  * processor's caches, and the next search starts from the previous point's result, which is close.
- * The points of a path already have such an order. */
+ * Consecutive points of a path are close to each other in the given order. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
     const double mean_least = 0x1p-5; /* least mean distance, as a share of the box's side */

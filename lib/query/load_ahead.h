@@ -50,10 +50,10 @@ typedef struct ebpo_batch {
     uint64_t searched;    /* hints were sent for all subtrees that this number of points may need */
     uint32_t *below;      /* [capacity] subtrees of the next hint */
     uint64_t below_count, capacity;
-    bool pending;             /* bytes for some points are not available yet */
-    uint64_t first_pending;   /* turn of the first such point */
-    uint64_t pending_home;    /* home of the last such point */
-    ebpo_error pending_error; /* error of the first such point */
+    bool pending;             /* there are pending points: their bytes are not available yet */
+    uint64_t first_pending;   /* turn of the first pending point */
+    uint64_t pending_home;    /* home of the last pending point */
+    ebpo_error pending_error; /* error of the first pending point */
 } ebpo_batch;
 
 /* Begins a batch. Before the call, the caller sets context, points, count, done, as_given and

@@ -230,7 +230,8 @@ static void scale_point(const frame *f, const double p[3], double out[3])
         out[k] = p[k] * f->factor[0] * f->factor[1];
 }
 
-/* Adds the caps. Their triangles are those of the discs (geometry/cap_triangles.h), turned. */
+/* Adds the caps. Their triangles are those of the discs (geometry/cap_triangles.h) with the
+ * opposite orientation. */
 static void add_caps(moments *m, const frame *f, const ebpo_border_loops *loops)
 {
     const double *point = loops->point;

@@ -14,7 +14,7 @@
 #include "geometry/vec3.h"
 #include "query/measure_caps.h"
 
-/* Returns point i minus the first point, with coordinates multiplied by both factors. */
+/* Sets `out` to point i minus the first point, with coordinates multiplied by both factors. */
 static void relative_point(const double *point, uint64_t i, const double factor[2], double out[3])
 {
     for (int k = 0; k < 3; k++)

@@ -102,8 +102,7 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  * much as it saves. Their memory counts towards the quota of skeletons. */
 
 /* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
- * levels below the cut level. Returns no error, because later queries fail if the file cannot be
- * read. */
+ * levels below the cut level. Reports no error: if the file cannot be read, later queries fail. */
 void ebpo_deep_bounds_make(ebpo_model *model);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep

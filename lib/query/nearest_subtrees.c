@@ -304,10 +304,10 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
 
 /* --- bounds from skeletons ---
  *
- * A face is listed by every subtree whose cell it intersects, and owned by one of them. To search a
- * face that extends through a cell face only once, it is searched in its owner only. In the queue,
- * a subtree S first has the bound of its cell, which is a bound for the parts of its faces within
- * the cell. When the queue returns S, the owned faces of S get a second entry in the queue. For the
+ * A face is listed by every subtree whose cell it intersects, and owned by one of them. A face that
+ * several subtrees list is searched in its owner only, so it is searched once. In the queue, a
+ * subtree S first has the bound of its cell, which is a bound for the parts of its faces within the
+ * cell. When the queue returns S, the owned faces of S get a second entry in the queue. For the
  * shared faces of S that may be within the limit, the subtrees that may own these faces get
  * entries, whose bounds are valid for all faces of the owner, also outside its cell. If one of
  * these owners has no skeleton, S itself is searched.

@@ -6,8 +6,8 @@
 #include "geometry/cells.h"
 #include "query/accel.h"
 
-/* Returns the length of the cell's diagonal, rounded up so far that it is an upper bound of the
- * distance of any point of the cell to a face that the cell's node lists. */
+/* Returns the length of the cell's diagonal, enlarged so that no point of the cell is farther away
+ * from a face that the cell's node lists. */
 double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell);
 
 /* Returns true if p is certainly outside one of the half-spaces (`count` plane codes) of a cell's

@@ -109,7 +109,7 @@ struct ebpo_near_search {
     uint32_t first_block, first_node;
     float best;   /* faces at a greater distance, in the frame, are not the result */
     float limit2; /* nodes with a greater squared lower bound are skipped */
-    int count;    /* of waiting candidates */
+    int count;    /* number of waiting candidates */
     ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
     uint32_t top; /* number of visits that remained at the deadline */
     ebpo_visit stack[EBPO_VISITS_MAX];
@@ -190,7 +190,7 @@ struct ebpo_ray_search {
     float blur; /* distance at which other rounding errors equal the origin's error */
     double moved, limit_scale; /* limit_scale: converts t of the ray to t in the frame */
     float bound, surely;       /* in the frame: `limit`, rounded up; t_max, rounded down */
-    int count;                 /* of waiting candidates */
+    int count;                 /* number of waiting candidates */
     ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
 };
 
