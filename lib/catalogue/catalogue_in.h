@@ -124,7 +124,7 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a
                                                    ebpo_catalogue_query run_query, void *user,
                                                    ebpo_error *error);
 
-/* Returns EBPO_E_ABSENT if all models of the catalogue are only caps, so that there is no surface
+/* Returns EBPO_E_ABSENT if all models of the catalogue consist of caps, so that there is no surface
  * for rays and distances. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error);
 
