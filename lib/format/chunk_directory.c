@@ -16,9 +16,9 @@
 #include "format/file_in.h"
 #include "mesh/attributes.h"
 
-/* Numbers of arrays in both lists (format-spec/subtrees.md, section 3). */
+/* Numbers that both lists use for arrays (format-spec/subtrees.md, section 3). */
 enum {
-    LEVEL_NUMBERS = 64,      /* numbers for each level */
+    LEVEL_NUMBERS = 64,      /* numbers reserved for each level */
     MESH_NUMBERS = 4096,     /* first number of the root's arrays */
     TABLE_NUMBERS = 4112,    /* first number of the tables of subtrees */
     ATTRIBUTE_NUMBERS = 8191 /* number of the header of attributes; attribute arrays follow */
@@ -371,15 +371,15 @@ static ebpo_status list_fails(const ebpo_file *file, const char *what, const cha
     return long_chunk_fail(file, EBPO_A_CHUNK_DIRECTORY, what, path, error);
 }
 
-/* Stores the location of the next chunk of the array with this number in the list. For an array
- * with a single chunk, compares the location with that in the array's header. */
+/* Stores the location of the next chunk of array `number`. For an array with a single chunk,
+ * compares the location with that in the array's header. */
 static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location chunk,
                               ebpo_error *error)
 {
     int level;
     ebpo_array_id id = find_array(number, &level);
     if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
-        return EBPO_OK; /* a gap, an unknown part, or an unlisted array */
+        return EBPO_OK; /* bytes between chunks, or an array that is not known or not listed */
     ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
                        : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
                                                 : &l->file->root_array[id];
@@ -401,8 +401,8 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
     return EBPO_OK;
 }
 
-/* Allocates an array's table of chunks. Adds the array's chunks to *chunks, and first checks that
- * the list has at least *chunks rows. */
+/* Adds the array's number of chunks to *chunks, and checks that the list has at least *chunks rows.
+ * Then allocates the array's table of chunks. */
 static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
                                ebpo_error *error)
 {

@@ -39,7 +39,7 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
 
 /* --- rows of both lists: format-spec/subtrees.md, section 3 --- */
 
-/* Array number of a row of the chunk directory that describes bytes between chunks. */
+/* Array number in rows of the chunk directory that stand for bytes between chunks. */
 #define EBPO_ROW_NO_ARRAY UINT32_MAX
 
 /* Returns the number that both lists use for an array. */

@@ -179,7 +179,7 @@ static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_
     blocks[(*count)++] = (uint32_t)block;
 }
 
-/* Lists the blocks of the shared vertices (those that earlier faces use first) of a face. */
+/* Lists the blocks of a face's shared vertices (vertices that earlier faces use first). */
 static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own, uint64_t face)
 {
     for (int k = 0; k < 3; k++) {
@@ -216,9 +216,9 @@ static int compare_descending(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-/* Sorts the blocks in descending order. Writes to `out` the number of blocks from each of these
- * blocks to block `from`. Omits blocks after `from`, which the subtree owns. Returns the number of
- * values in `out`. */
+/* Sorts the blocks in descending order. Writes the difference `from` - block for each block to
+ * `out`. Omits blocks after `from`, which the subtree owns. Returns the number of values in `out`.
+ */
 static uint64_t sort_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
 {
     uint64_t written = 0;
@@ -249,7 +249,7 @@ static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_
 enum {
     DEFAULT_FACES = 1024, /* default number of faces in a subtree */
     LEAST_FACES =
-        131072, /* a file has subtrees by default if its mesh has at least as many faces */
+        131072, /* a file has subtrees by default if its mesh has at least this number of faces */
     /* subtrees after which pages of the workspace are released; the rows of a subtree in all arrays
      * take tens of kilobytes */
     SUBTREES_A_TIME = 128
@@ -306,8 +306,7 @@ static uint64_t first_group(const counting *c, uint64_t subtree, int level)
                                                : level_sum(c, subtree, level - 1, EBPO_S_GRAY);
 }
 
-/* Adds to the columns of a level, `sum`, the items of a subtree's leaves, which have the ranks
- * [leaf, end). */
+/* Adds the items of a subtree's leaves, ranks [leaf, end), to `sum`, the columns of the level. */
 static void count_leaves(const counting *c, const ebpo_level *level, uint64_t leaf, uint64_t end,
                          uint64_t *sum)
 {
@@ -375,8 +374,8 @@ static void count_faces(const counting *c)
     }
 }
 
-/* Adds to *used, the number of vertices that faces before *face use, the number of vertices that
- * the faces [*face, end) use first. Moves *face to `end`. */
+/* *used: number of vertices that the faces before *face use. Adds the number of vertices that the
+ * faces [*face, end) use first, and moves *face to `end`. */
 static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *used)
 {
     EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)
@@ -423,7 +422,7 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
         shared_blocks_use(&blocks, &c->tree->mesh, &own);
         if (!ebpo_grow(&c->sums->shared, &c->sums->shared_capacity,
                        c->sums->shared_count + blocks.face_blocks + blocks.vertex_blocks +
-                           1, /* so that `shared` is not NULL without blocks */
+                           1, /* so that `shared` is never NULL */
                        sizeof *c->sums->shared))
             status = ebpo_fail_memory(error, c->sums->shared_count * sizeof *c->sums->shared);
         else
@@ -620,7 +619,7 @@ static void add_by_subtree(ordering *o, const choice *c)
 }
 
 /* Orders the chunks of a file with subtrees: first the chunks that locate subtrees, then nodes from
- * coarse to deep levels, and the mesh, source indices and attributes. */
+ * coarse to deep levels, then the mesh, source indices and attributes. */
 static void order_subtrees(ordering *o)
 {
     const ebpo_info *info = &o->plan->info;

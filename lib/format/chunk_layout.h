@@ -17,7 +17,7 @@ typedef struct ebpo_subtree_sums {
     uint32_t cols;     /* number of columns */
     uint64_t *before;  /* [subtrees + 1][cols] sums of the columns before each subtree */
     uint32_t *counts;  /* [subtrees][cols] /subtrees/counts */
-    uint64_t *index;   /* [chunks of counts][cols] sums before each chunk of counts */
+    uint64_t *index;   /* [chunks][cols] sums before each chunk of /subtrees/counts */
     uint32_t *shared;  /* [shared_count] rows of /subtrees/shared_chunks */
     uint64_t shared_count, shared_capacity;
 } ebpo_subtree_sums;
@@ -43,7 +43,7 @@ typedef struct ebpo_array_out {
     /* native integers, row by row; NULL for arrays with a special coding */
     const void *values;
     uint8_t value_size;
-    ebpo_h5_id handle; /* of the array in the file, while it is written */
+    ebpo_h5_id handle; /* HDF5 handle of the array, while the file is written */
     bool columns;      /* for attributes: true if written as columns */
     /* for attributes: array of the mesh that has the same rows (EBPO_A_VERTICES or EBPO_A_FACES);
      * EBPO_A_ATTRIBUTE: neither */

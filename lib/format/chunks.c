@@ -52,7 +52,7 @@ static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
 /* Returns the chunk's number of a key. */
 static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
 
-/* Returns the rows of a chunk without the padding of the last chunk. */
+/* Returns the number of rows of a chunk, without padding. */
 static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t remaining = array->shape.rows - chunk * array->shape.chunk_rows;
@@ -142,7 +142,7 @@ static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array,
     }
 }
 
-/* Adds the chunks [begin, end) of an array that are not in memory to the hints. */
+/* Adds to the hints those chunks of [begin, end) of an array that are not in memory. */
 static void hint_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
                          uint64_t end)
 {
@@ -521,7 +521,7 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 
 /* --- rows of plain arrays --- */
 
-/* Converts integers as in the file to native integers of `size` bytes. */
+/* Converts integers of the file to native integers of `size` bytes. */
 static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t count,
                            uint8_t *values, size_t size)
 {
@@ -586,7 +586,7 @@ ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                              uint64_t rows, size_t size, void *values_out, ebpo_error *error)
 {
     void *values = NULL;
-    /* check the request before memory is allocated by its size */
+    /* check the request first, because it determines the size of the memory */
     ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
     if (status == EBPO_OK && rows) {
         const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);

@@ -18,9 +18,9 @@
 
 enum {
     PLAIN_FACE_ROWS = 4096, /* faces in a chunk of a file without subtrees */
-    /* number of chunks with PLAIN_FACE_ROWS faces in a file with subtrees. /mesh/faces_index has a
-     * row for each of these chunks; in a file without subtrees it has only the first of these rows
-     */
+    /* number of chunks that PLAIN_FACE_ROWS faces take in a file with subtrees. There
+     * /mesh/faces_index has a row for each chunk; without subtrees it has every SKIPPED-th of these
+     * rows */
     SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK
 };
 
@@ -54,10 +54,10 @@ static uint64_t encode_zigzag(uint64_t value, unsigned size)
                      : value << 1 ^ (0 - (value >> 63));
 }
 
-/* Recodes the first row of a chunk of differences, so that it continues the previous chunk. Writes
- * this row to `joined`: if `continues` is true (both chunks are parts of the same larger chunk in a
- * file without subtrees), as the difference from the last row of the previous chunk. Keeps the
- * values of the chunk's last row in digest->last. */
+/* Recodes the first row of a chunk of differences as in a file without subtrees, and writes it to
+ * `joined`. `continues`: true if this chunk and the previous one belong to one larger chunk of that
+ * file; the row is then the difference from the last row of the previous chunk. Keeps the values of
+ * this chunk's last row in digest->last. */
 static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool continues,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {

@@ -21,7 +21,7 @@ void ebpo_face_colours_free(ebpo_face_colours *colours);
 
 /* Reads the colours of the corners of `count` faces into out[count][3][3]: red, green and blue.
  * `vertices`: [count][3] vertices of the faces. The file must have colours. Call this function only
- * once for each `colours`, because it keeps the values there. */
+ * once for each `colours`, which keeps the values. */
 EBPO_MUST_USE ebpo_status ebpo_face_colours_read(ebpo_face_colours *colours, ebpo_chunks *chunks,
                                                  const uint32_t *faces, const uint32_t *vertices,
                                                  uint64_t count, uint8_t *out, ebpo_error *error);

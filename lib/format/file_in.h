@@ -31,7 +31,7 @@ struct ebpo_idle_reader {
 /* Idle chunk readers for reuse, as creating a decoder takes longer than decoding a chunk. The file
  * keeps a few of them, which count toward no budget. */
 typedef struct ebpo_idle_readers {
-    pthread_mutex_t lock; /* protects the following fields */
+    pthread_mutex_t lock; /* protects `first` and `count` */
     ebpo_idle_reader *first;
     unsigned count;
 } ebpo_idle_readers;

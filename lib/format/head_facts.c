@@ -2,7 +2,7 @@
  * A fact is one attribute. The tables in the first part have one row for each attribute. Writing
  * and reading loop over these rows, and so agree on names and types. A reader rejects a newer
  * version and unknown required parts before it reads anything else. Then the functions check_...
- * test ranges of values, and sums over the levels, before memory of these sizes is allocated.
+ * test ranges of values, and sums over the levels, before these values determine sizes of memory.
  * Source: format-spec/README.md, section 5. */
 #include <inttypes.h>
 #include <math.h>
@@ -714,7 +714,7 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
             "the file has format version %d.%d, but this library reads version %d; use a newer "
             "library",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
-    char words[32] = ""; /* only this text distinguishes files of the draft and of version 1.0 */
+    char words[32] = ""; /* only this text distinguishes a draft from version 1.0 */
     if (status == EBPO_OK)
         status = ebpo_head_get_text(in, root, "/", "format_version", words, sizeof words, error);
     if (status == EBPO_E_ABSENT)
@@ -726,8 +726,8 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* Sets the bit of a part in *found (bit i: part_words[i]). A known part may be in the list of
- * required or in that of optional parts, but only once. An unknown required part is an error. */
+/* Sets the bit of a part in *listed (bit i: part_words[i]). A known part may be in either list,
+ * required or optional parts, but only once. An unknown required part is an error. */
 static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, unsigned *listed,
                              ebpo_error *error)
 {
@@ -860,8 +860,8 @@ static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info
     return status;
 }
 
-/* Reads the number of dropped faces, which may be absent. A number above 0 shows that dropping was
- * requested, which the file does not state. */
+/* Reads the number of dropped faces, which may be absent. The file does not state whether dropping
+ * was requested; a number above 0 shows it. */
 static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                ebpo_error *error)
 {

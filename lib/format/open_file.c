@@ -1,5 +1,5 @@
 /* Opens a file: reads the header, and checks that every array is present in the shape that the
- * counts in the header require. head_facts.c checks each count before memory is allocated by it.
+ * counts in the header require. head_facts.c checks each count before it determines a size of memory.
  * The decoded size of the arrays is limited relative to the file size. The second part opens files
  * that other programs have rewritten with another HDF5 layout. libhdf5 copies such a file in a
  * separate process with limits of memory, time and bytes written. The copy is opened like any other
@@ -507,7 +507,7 @@ ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(e
 
 enum {
     PIECE = 4 << 20,         /* bytes of one read of a download */
-    BYTES_A_SECOND = 4 << 20 /* of the file: least speed of copying, for the limit of time */
+    BYTES_A_SECOND = 4 << 20 /* least speed of copying, for the limit of time */
 };
 
 /* A temporary file that libhdf5 opens by its name. fd: -1 if there is no file. */

@@ -261,7 +261,7 @@ static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leave
     return EBPO_OK;
 }
 
-/* Decodes the face indices of leaves. r->span must be that of the references. */
+/* Decodes the face indices of leaves. r->span must locate the references. */
 static ebpo_status decode_faces(const reading *r)
 {
     ebpo_level *out = r->out;
@@ -280,8 +280,8 @@ static ebpo_status decode_faces(const reading *r)
     return status;
 }
 
-/* Checks an array that has been read. Also decodes face indices after the references, the last of
- * their arrays. */
+/* Checks an array that has been read. If it is the references, the last array with data of faces,
+ * also decodes the face indices. */
 static ebpo_status finish_array(const reading *r, int id)
 {
     switch (id) {

@@ -51,7 +51,7 @@ typedef struct refs_job {
 
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
 {
-    uint64_t above = first; /* each reference is stored as a distance below `above` */
+    uint64_t above = first; /* a reference is stored as the number of faces between it and `above` */
     for (uint64_t k = 0; k < count; k++) {
         if (refs[k] >= above)
             return false;
@@ -489,9 +489,9 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
 }
 
 /* Computes the position of each item in the order of source indices. The indices are distinct and
- * below `limit`. The caller frees *position. Uses one bit for each possible index, and not more,
- * because a header may state a limit far above the number of items; the system allocates no memory
- * for pages of zeros. */
+ * below `limit`. The caller frees *position. A header may state a limit far above the number of
+ * items, so a set of bits marks the indices: one bit for each possible index is little, and the
+ * system allocates no memory for pages of zeros. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **position, ebpo_error *error)
 {
@@ -622,7 +622,8 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, &read, error);
     if (status == EBPO_OK && (!maps || file->info.repair_record.welded_vertices))
-        /* attributes of other elements (edges, ...) refer to vertices by source indices */
+        /* attributes of other elements (edges, ...) refer to vertices by source indices, which are
+         * not the indices in this mesh */
         ebpo_attributes_drop_others(out->attributes);
     if (source_order)
         *source_order = status == EBPO_OK && maps;
@@ -703,8 +704,8 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         return status;
     content_job j = { .file = file, .one_thread = read };
     j.one_thread.threads = 1;
-    /* order of reading: a remote file from its begin to its end; a local file backwards, because
-     * threads should begin with the largest arrays, which are at the end */
+    /* A remote file is read from its beginning to its end. A local file is read backwards, so that
+     * threads begin with the largest arrays, which are at the end. */
     bool remote = ebpo_input_prefetches(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present && ebpo_content_has(&file->info, (ebpo_array_id)id))

@@ -112,8 +112,8 @@ void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
 {
     if (!ebpo_hints_wanted(e) || !array->present || e->failed)
         return;
-    /* not tried again after a failure, because each attempt makes all retries of a failed request;
-     * the later read reports the error */
+    /* After a failure, the next calls do not locate chunks again, because each attempt would repeat
+     * all retries of the failed request. The later read reports the error. */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
@@ -461,8 +461,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     j.reader = ebpo_alloc_zero(threads, sizeof *j.reader);
     if (!j.reader)
         return ebpo_fail_memory(error, threads * sizeof *j.reader);
-    /* chunks that a thread takes at a time: about four times for each thread, so that runs are long
-     */
+    /* chunks that a thread takes at a time: about a quarter of its share, so that runs are long */
     uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;

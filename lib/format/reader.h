@@ -38,7 +38,7 @@ void ebpo_hint_tree(const ebpo_file *file);
  * subtrees' roots, the sums before the subtrees, and the chunk offsets. Does nothing unless the
  * file has subtrees and states the size of these data (top_bytes). */
 void ebpo_hint_top(const ebpo_file *file);
-/* Returns true if chunks are collected: the source prefetches, or another reason in `hints`. */
+/* Returns true if chunks are collected: for the source, or because of `local` or `counts_bytes`. */
 bool ebpo_hints_wanted(const ebpo_hints *hints);
 /* Sends hints for the collected chunks, and clears the collection. */
 void ebpo_hint_all(ebpo_hints *hints);
@@ -79,7 +79,7 @@ EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_arr
                                            const ebpo_read_options *options, ebpo_rows_fn take,
                                            void *context, ebpo_error *error);
 
-/* Reads an array of integers into new memory from the workspace of the options, `size` bytes each.
+/* Reads an array as integers of `size` bytes into new memory from the workspace of the options.
  * `values_out` is the address of the pointer; the pointer is NULL when the array is absent. */
 EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
                                            const ebpo_read_options *options, size_t size,

@@ -493,8 +493,8 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
     return EBPO_OK;
 }
 
-/* Checks a leaf's references: faces that an earlier leaf lists first, in ascending order. `first`:
- * the leaf's first new face (no earlier leaf lists it). */
+/* Checks that a leaf's references ascend and are less than `first`, the leaf's first new face (no
+ * earlier leaf lists it). */
 static ebpo_status check_refs(const ebpo_check *check, int level, const uint32_t *refs,
                               uint64_t count, uint64_t first, ebpo_error *error)
 {

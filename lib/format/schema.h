@@ -45,7 +45,7 @@ typedef enum ebpo_per {
     EBPO_PER_PATCH,         /* patch of the simplified surface */
     EBPO_PER_PATCH_BYTE,    /* byte of the triangle codes of all patches */
     EBPO_PER_PATCH_VERTEX,  /* vertex of any patch */
-    EBPO_PER_PATCH_COLOUR,  /* vertex with a colour of any patch */
+    EBPO_PER_PATCH_COLOUR,  /* vertex of any patch, if the vertices have colours */
     EBPO_PER_SUBTREE_CHUNK, /* chunk of /subtrees/counts */
     EBPO_PER_SUBTREE,
     EBPO_PER_SHARED_BLOCK, /* chunk of faces or vertices that a subtree uses, but that precedes it
@@ -130,7 +130,7 @@ enum { EBPO_INDEX_TYPES, EBPO_INDEX_GRAY, EBPO_INDEX_LEAVES, EBPO_INDEXES };
 typedef struct ebpo_array_spec {
     const char *name; /* within /levels/NN, or the full path */
     ebpo_per per;
-    uint32_t needs; /* any of these bits */
+    uint32_t needs; /* conditions, EBPO_NEEDS_...; one of them suffices */
     uint8_t cols;   /* 0: one dimension */
     uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
@@ -139,7 +139,7 @@ typedef struct ebpo_array_spec {
     uint8_t since;     /* first minor version of the format with this array */
     uint8_t held_size; /* size of an element in ebpo_level; 0: ebpo_level lacks the array */
     uint16_t held;     /* offset in ebpo_level of the pointer to the array */
-    uint16_t bytes;    /* arrays of the root: offset in ebpo_stored_sizes of the counter of bytes */
+    uint16_t bytes;    /* arrays of the root: offset of the counter of bytes in ebpo_stored_sizes */
     const char *coding; /* value of the array's attribute `coding` */
     const char *about;  /* value of the array's attribute `about` */
 } ebpo_array_spec;

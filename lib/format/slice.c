@@ -249,7 +249,7 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
                         ? chunks->vertices_before[view.begin / view.array->shape.chunk_rows]
                         : 0;
     /* one past the largest vertex: of the faces in this chunk before the owned faces; of the owned
-     * faces. Vertex indices are below 2^32 - 2 */
+     * faces. Vertex indices are below 2^32 - 2, so adding 1 does not overflow */
     uint32_t end_before = 0, end_owned = 0;
     for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
         end_before = corners[i] + 1 > end_before ? corners[i] + 1 : end_before;
@@ -511,8 +511,8 @@ typedef struct walk {
 } walk;
 
 /* Visits a group and the groups below it. Checks that the new faces of the leaves, in depth-first
- * order, are one range without gaps. This range is the owned faces: sets first_face, from the first
- * leaf, and face_count of the slice. */
+ * order, are one range without gaps. These are the owned faces: sets first_face and face_count of
+ * the slice. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];

@@ -92,8 +92,8 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level,
 /* For remote files: adds to `hints` the chunks of the subtrees [first, first + count) that are not
  * in memory. These are the chunks with nodes below the subtrees' roots, of the arrays that `needs`
  * requires. With EBPO_NEEDS_MESH, also the chunks of the faces that the leaves list, and with
- * EBPO_NEEDS_MAPS the chunks of the source indices of these faces. `faces` is false: no faces, and
- * nodes only down to `last_level`. Reads the table's rows. May omit chunks, which are then read
+ * EBPO_NEEDS_MAPS the chunks of the source indices of these faces. If `faces` is false: no faces,
+ * and nodes only down to `last_level`. Reads the table's rows. May omit chunks, which are then read
  * without a hint. */
 void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, uint64_t count,
                         uint32_t needs, int last_level, bool faces);

@@ -4,8 +4,8 @@
  * Most triangles share an edge with a recent triangle. The coder and the decoder keep the last
  * edges and the last vertices; a byte of the code names an edge and the third vertex of a triangle.
  * Vertices are numbered in the order in which the triangles use them first. The position of a
- * vertex is stored as the difference from a prediction: the fourth corner of the parallelogram that
- * the triangle on the other side of the edge begins. Source: format-spec/surface.md. */
+ * vertex is stored as the difference from a prediction: the fourth corner of a parallelogram. Its
+ * other corners are the triangle on the other side of the edge. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -33,12 +33,12 @@ enum {
 
 /* --- state of coder and decoder --- */
 
-/* A directed edge, as the next triangle at this edge has it. */
+/* An edge, in the direction that it has in the next triangle at this edge. */
 typedef struct recent_edge {
     uint32_t from, to, beyond; /* beyond: third vertex of the triangle that has the edge */
 } recent_edge;
 
-/* Recent edges and vertices; the encoder and the decoder have the same after each triangle. */
+/* Recent edges and vertices. After each triangle, they are equal in the encoder and the decoder. */
 typedef struct recent {
     recent_edge edge[EDGES];   /* the last edge first */
     uint32_t vertex[VERTICES]; /* the last vertex first */
@@ -107,8 +107,8 @@ typedef struct coder {
     const ebpo_patch_source *in;
     ebpo_patch_rows *out;
     recent recent;
-    /* [slots] hash table of directed edges: an edge's corner in in->triangle where it begins; NONE:
-     * free */
+    /* [slots] hash table of directed edges: index in in->triangle of the corner where the edge
+     * begins; NONE: a free slot */
     uint32_t *corner;
     uint64_t slots;
     bool *done;       /* [triangles] true: the triangle is encoded */

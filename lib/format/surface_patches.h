@@ -30,7 +30,7 @@ typedef struct ebpo_patch_rows {
     uint8_t *normal, *colour;
 } ebpo_patch_rows;
 
-/* Encodes a patch, with its vertices in another order. Returns EBPO_E_MEMORY if memory is short. */
+/* Encodes a patch. Changes the order of its vertices. Returns EBPO_E_MEMORY if memory is short. */
 EBPO_MUST_USE ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *out,
                                             ebpo_error *error);
 void ebpo_patch_rows_free(ebpo_patch_rows *rows);

@@ -36,7 +36,7 @@
 /* The lists that have a row for each chunk. */
 typedef enum chunk_list {
     CHUNK_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
-    /* /subtrees/chunk_directory: stored sizes in file order, with chunk offsets as running sums */
+    /* /subtrees/chunk_directory: stored sizes in file order; their running sums are chunk offsets */
     CHUNK_SIZES,
     CHUNK_LIST_COUNT
 } chunk_list;
@@ -195,7 +195,7 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
 {
     ebpo_plan *plan = h->plan;
     h->out.codec_level = h->codec_level;
-    /* the number of links of the root group: /levels, /mesh, /maps, and what the file has */
+    /* links of the root group: /levels, /mesh, /maps, and optional groups and arrays */
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
                        3 + (h->list[CHUNK_CHECKSUMS].shape.rows != 0) +

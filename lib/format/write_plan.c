@@ -370,8 +370,9 @@ static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t r
     return low;
 }
 
-/* Encodes rows of leaf_refs. Each reference is stored as its distance below the previous one, minus
- * 1; the first of a leaf, below the leaf's first new face. */
+/* Encodes rows of leaf_refs. A leaf's references are stored from the last to the first. A reference
+ * is stored as the number of faces between it and the next greater reference of the leaf; the last
+ * reference, as the number of faces between it and the leaf's first new face. */
 static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uint64_t row,
                         uint64_t rows, uint8_t *encoded)
 {
