@@ -62,7 +62,7 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     uint32_t low = 0, high = 0;
     size_t words = bytes / 2;
     while (words) {
-        /* the sums of 360 words fit 32 bits, before they are folded to 16 bits */
+        /* the sums of at most 360 words fit 32 bits; then they are folded to 16 bits */
         size_t run = words > 360 ? 360 : words;
         words -= run;
         for (; run; run--, data += 2) {

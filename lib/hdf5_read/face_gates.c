@@ -23,7 +23,7 @@ enum {
     IS_LEFT,   /* end of the newest open edge that starts at b */
     IS_RIGHT,  /* start of the newest open edge that ends at a */
     BY_NUMBER, /* a number follows in the stream `low` */
-    AT_OPEN    /* from here on: start of an open edge; AT_OPEN means the newest edge */
+    AT_OPEN    /* AT_OPEN + n: start of an open edge; n = 0 is the newest edge */
 };
 /* The first byte of a vertex number, in the stream `low`. Below LOW_END: the number. Below
  * TWO_BYTES_END: a second byte follows in the stream `more`. TWO_BYTES_END: four bytes follow in
@@ -45,7 +45,7 @@ static uint32_t edge_to(uint64_t e) { return (uint32_t)(e >> 32); }
 
 static void start_edges(open_edges *o) { o->begin = o->end = o->seen = 0; }
 
-/* Moves the list to the front of its array if the array has no space after it for the edges of a
+/* Moves the list to the front of its array if there is no space after the list for the edges of a
  * face. Called before each face. */
 static void reserve_space(open_edges *o)
 {
@@ -121,7 +121,7 @@ static void open_all(open_edges *o, const uint32_t *face)
 }
 
 /* Updates the open edges after face (a, b, c). Its gate (a, b) is already closed. `kind`: kind of
- * c. `at`: for IS_LEFT and IS_RIGHT, position of the open edge that gave c, which is also closed.
+ * c. `at`: for IS_LEFT and IS_RIGHT, position of the open edge that gave c; closes this edge too.
  */
 static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
                        uint32_t c)
@@ -364,8 +364,8 @@ static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
     return seen;
 }
 
-/* Finds the beginnings of the streams. The number of faces without a gate in `gate` determines the
- * lengths of `third` and, with the kinds in `third`, of `low`. */
+/* Finds the beginnings of the streams. The stream `gate` has the number of faces without a gate.
+ * This number determines the length of `third` and, with the kinds in `third`, that of `low`. */
 static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
 {
     size_t without_gate = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;

@@ -53,7 +53,7 @@ static const char missing[] = "the chunk is missing",
                   damaged[] = "the array's chunk index is damaged: the checksum differs",
                   beyond[] = "the array's chunk index is beyond the end of the file";
 
-/* Reads a layout of version 4 with chunks, from the flags on. Results as read_layout. */
+/* Reads a layout of version 4 with chunks, from the flags on. Returns what read_layout returns. */
 static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *foreign)
 {
     enum { SINGLE_FILTERED = 2 };
@@ -103,7 +103,7 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
 }
 
 /* Checks and stores the offset and size of chunk i. `mask`: bits of the filters that the chunk
- * lacks. Returns an error text, or NULL, as the functions read_... and check_... below. */
+ * lacks. Like the functions read_... and check_... below, returns an error text or NULL. */
 static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
                                 uint32_t mask)
 {
@@ -141,7 +141,7 @@ static const char *read_implicit(ebpo_head_chunks *t)
     const ebpo_head_layout *l = t->layout;
     const char *wrong = t->filtered ? contradicts : NULL;
     for (uint64_t i = 0; i < t->count && !wrong; i++) {
-        uint64_t begin = EBPO_NO_ADDRESS; /* also if the sum exceeds 64 bits */
+        uint64_t begin = EBPO_NO_ADDRESS; /* stays so if the sum exceeds 64 bits */
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;

@@ -12,7 +12,7 @@
 #include "hdf5_read/head_parts.h"
 
 enum {
-    FIRST_BYTES = 131072, /* holds all headers */
+    FIRST_BYTES = 131072, /* sufficient for all headers */
     /* size of the window for all other bytes: headers that were added later, and chunk indexes
        whose range is not known */
     WINDOW_BYTES = 131072

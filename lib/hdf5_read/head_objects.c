@@ -23,7 +23,7 @@ enum {
     MESSAGES_MAX = 8192
 };
 
-static const char *const damaged_block = "the object's header is beyond the end of the file";
+static const char *const beyond_end = "the object's header is beyond the end of the file";
 
 bool ebpo_head_sound(const uint8_t *block, uint64_t size)
 {
@@ -97,7 +97,7 @@ static bool read_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uin
         return ebpo_refuse(s, "the object's header is too large");
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, before + size + 4);
     if (!block)
-        return ebpo_refuse(s, damaged_block);
+        return ebpo_refuse(s, beyond_end);
     if (!ebpo_head_sound(block, before + size + 4))
         return ebpo_refuse(s, "the checksum of the object's header differs");
     ebpo_head_note_range(s, at, before + size + 4);
@@ -117,7 +117,7 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     uint64_t size = at < end && end - at < PREFIX_MAX ? end - at : PREFIX_MAX;
     const uint8_t *prefix = ebpo_head_bytes_at(&s->bytes, at, size);
     if (!prefix)
-        return ebpo_refuse(s, damaged_block);
+        return ebpo_refuse(s, beyond_end);
     if (size >= 4 && prefix[0] == 1 && prefix[1] == 0)
         return ebpo_refuse_foreign(s, "an object's header is of version 1, without a checksum");
     ebpo_head_cursor c = { prefix, prefix + size, false };
@@ -131,7 +131,7 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     ebpo_cursor_take(&c, (flags & 0x20 ? 16 : 0) + (flags & 0x10 ? 4 : 0));
     uint64_t bytes = ebpo_cursor_uint(&c, 1u << (flags & 3));
     if (c.cut)
-        return ebpo_refuse(s, damaged_block);
+        return ebpo_refuse(s, beyond_end);
     *gap = flags & 4 ? 2 : 0; /* 4: messages have a creation order */
     return read_block(s, h, at, (uint64_t)(c.at - prefix), bytes, *gap);
 }
@@ -146,7 +146,7 @@ static bool read_continuation(ebpo_head_state *s, ebpo_head_header *h, uint64_t 
         return ebpo_refuse(s, "the object's header continues at an invalid address");
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, size);
     if (!block)
-        return ebpo_refuse(s, damaged_block);
+        return ebpo_refuse(s, beyond_end);
     if (memcmp(block, "OCHK", 4) != 0)
         return ebpo_refuse(s, "the object's header continues at an invalid address");
     return read_block(s, h, at, 4, size - 8, gap);

@@ -35,8 +35,8 @@ static bool has_signature(ebpo_head_state *s)
 }
 
 /* Reads the superblock, which locates the root group and states the end of the file. Returns false
- * if the superblock is refused, with the reason in the refusal, or if it is damaged or not HDF5;
- * then there is no refusal. */
+ * if the superblock is refused (s->refusal has the reason), or if it is damaged or not HDF5
+ * (s->refusal has no reason). */
 static bool read_superblock(ebpo_head *head)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
