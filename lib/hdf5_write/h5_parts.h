@@ -46,7 +46,7 @@ hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
 typedef struct ebpo_h5_sink {
     hid_t id;                /* libhdf5's registration of the driver */
-    int fd;                  /* of the file; -1: the bytes are in `memory` */
+    int fd;                  /* descriptor of the file; -1: the bytes are in `memory` */
     uint8_t *memory;         /* [capacity] */
     uint64_t capacity, size; /* size: of the file or of the used memory, in bytes */
     /* status of the first failure */

@@ -36,7 +36,7 @@ typedef struct dataset {
     uint64_t bytes_max;           /* limit for all rows */
     double fill;                  /* value of the columns that the dataset lacks */
     uint64_t first, end;          /* the requested rows [first, end) */
-    hid_t file, set, space, type; /* while the dataset is open */
+    hid_t file, set, space, type; /* valid while the dataset is open */
     hsize_t size[2];              /* rows and columns of the dataset */
 } dataset;
 

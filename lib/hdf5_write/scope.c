@@ -32,8 +32,8 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
 }
 
 enum {
-    /* size of a buffer for a message of libhdf5: in this message, a path precedes the error number,
-     * which is needed */
+    /* size of a buffer for a message of libhdf5; large enough for the error number, which follows a
+     * path */
     CAUSE_BYTES = 8192,
     CAUSE_SHOWN = 160 /* greatest length of libhdf5's message in a message of this library */
 };

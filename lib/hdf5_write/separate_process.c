@@ -151,7 +151,7 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
         close(ends[0]);
         run_work(work, user, limits, address_space, ends[1]);
     }
-    int fault = errno; /* the reason of a failure, because the calls below overwrite errno */
+    int fault = errno; /* kept, because the calls below overwrite errno */
     ebpo_h5_leave(&scope);
     close(ends[1]);
     int reported = child > 0 ? read_all(ends[0], &r, sizeof r) : 0;
