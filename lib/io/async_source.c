@@ -49,7 +49,7 @@ struct ebpo_async {
     uint64_t wanted_count, wanted_capacity;
     ebpo_range *needed; /* the last result of ebpo_async_needed */
     uint64_t needed_capacity;
-    uint64_t *running; /* [running_count] begin of the running operations, in ascending order */
+    uint64_t *running; /* [running_count] times at which running operations began, ascending */
     uint64_t running_count, running_capacity;
     uint64_t unlisted; /* number of running operations that are not listed, for lack of memory */
 };
@@ -272,7 +272,7 @@ static void async_prefetch(void *user, const ebpo_range *ranges, size_t count)
     for (size_t i = 0; i < count; i++)
         if (!is_available(a, ranges[i].offset, ranges[i].offset + ranges[i].size) &&
             !record_wanted(a, ranges[i]))
-            break; /* if memory is short, the range has no hint */
+            break; /* memory is short: the remaining ranges have no hint */
     pthread_mutex_unlock(&a->lock);
 }
 
@@ -406,7 +406,7 @@ static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end, c
     for (ebpo_range m = first_missing(a, begin, end); m.size;
          m = first_missing(a, m.offset + m.size, end)) {
         if (m.offset < HEAD_BYTES && m.offset + m.size > HEAD_BYTES)
-            /* no extent has bytes on both sides, because the head is never removed */
+            /* no extent crosses the end of the head, because only later bytes may be removed */
             m.size = HEAD_BYTES - m.offset;
         if (!insert_extent(a, m.offset, m.offset + m.size, bytes + (m.offset - begin)))
             return ebpo_fail_memory(error, m.size);

@@ -12,7 +12,7 @@
 
 typedef struct ebpo_file_lock {
     int fd;       /* descriptor of the lock file; -1: not held */
-    int slot;     /* in the registry of unfinished files (unfinished.h); -1: none */
+    int slot;     /* index in the registry of unfinished files (unfinished.h); -1: none */
     long process; /* id of the process that took the lock; a child process must not release it */
     char *path;
 } ebpo_file_lock;

@@ -1,11 +1,11 @@
 /* Caches fetched parts of a file on a server, in memory and in a folder on disk. The ranges in
  * memory are in order and without overlaps. One request fetches a range, which stays in memory
- * while the limit allows. Ranges that were read least recently are dropped first, ranges with a
- * prefetch hint that are not read yet last. The cache folder, if the caller has named one, contains
- * blocks (parts of equal size) as files with a SHA-256, whose names contain a digest of URL and
- * version. Blocks are written under temporary names, so any number of processes may share the
- * folder. When the folder's limit is reached, the blocks that were used least recently are removed.
- * Missing or damaged blocks are fetched from the server. */
+ * while the limit allows. Ranges that were read least recently are dropped first; ranges with a
+ * prefetch hint that are not read yet are dropped last. The cache folder, if the caller has named
+ * one, contains blocks (parts of equal size) as files. A block's file has a SHA-256, and its name
+ * contains a digest of URL and version. Blocks are written under temporary names, so any number of
+ * processes may share the folder. When the folder's limit is reached, the blocks that were used
+ * least recently are removed. Missing or damaged blocks are fetched from the server. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>

@@ -36,9 +36,9 @@ void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
 /* A cache of ranges reads a file's bytes in ranges, also before they are needed. One request
- * fetches a range. A range stays in memory while the limit allows. When ranges must be dropped,
- * those that were read least recently are dropped first, and those with a prefetch hint that are
- * not read yet last. */
+ * fetches a range. A range stays in memory while the limit allows. When ranges must be dropped, the
+ * ranges that were read least recently are dropped first. Ranges with a prefetch hint that are not
+ * read yet are dropped last. */
 
 enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request in bytes */
 

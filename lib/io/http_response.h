@@ -33,7 +33,7 @@ typedef struct ebpo_http_response {
     bool encoded;    /* Content-Encoding, other than identity */
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
-    char type[EBPO_HTTP_TYPE_BYTES]; /* "text/html", in lower case */
+    char type[EBPO_HTTP_TYPE_BYTES]; /* content type in lower case: "text/html" */
     uint64_t header_bytes;           /* size of all heads, including those of redirects */
 } ebpo_http_response;
 

@@ -143,7 +143,7 @@ struct ebpo_transfers {
     pthread_mutex_t *lock;
     pthread_cond_t *done; /* signalled when a request ends */
     CURLM *multi;
-    struct curl_slist *headers, *bare_headers; /* headers with and without the caller's headers */
+    struct curl_slist *headers, *bare_headers; /* bare_headers: without the caller's headers */
     pthread_t thread;
     bool running; /* the thread was started */
     ebpo_slot slots[EBPO_SLOTS_MAX];
@@ -335,7 +335,7 @@ static bool set_up_slot(ebpo_slot *s)
 }
 
 enum {
-    CHECK_MS = 100, /* milliseconds between checks of `stop` and for stalls */
+    CHECK_MS = 100, /* milliseconds between checks of `stop`, and between checks for stalls */
     IDLE_MS = 60000 /* greatest waiting time without running requests */
 };
 static const double PAUSE_FIRST = 0.2, PAUSE_MAX = 8, PAUSE_BY_SERVER_MAX = 60; /* seconds */
@@ -520,7 +520,7 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
     return *by_server ? (double)retry_after : pause;
 }
 
-/* Prepares a slot for the next attempt of a request: the bytes that are still missing. */
+/* Prepares a slot for the next attempt of a request, which is for the bytes still missing. */
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
     char range[64];

@@ -29,7 +29,7 @@ typedef struct ebpo_request {
     ebpo_http_version version;       /* version of the file, set if `first` is true */
     char type[EBPO_HTTP_TYPE_BYTES]; /* content type of the response */
     /* Private to http_transfer.c. */
-    struct ebpo_request *next; /* in the queue */
+    struct ebpo_request *next; /* next request in the queue */
     unsigned failures;         /* number of failed attempts */
     double due;                /* time of the next attempt, in seconds of ebpo_seconds */
     double deadline; /* end of the time limit; 0: no reader waits and nothing was sent yet */

@@ -41,7 +41,7 @@ typedef struct ebpo_publish {
     FILE *stream;    /* NULL until first used */
     char *buffer;    /* buffer of the stream */
     int fd;          /* descriptor of the temporary file */
-    int slot;        /* in the registry of unfinished files (unfinished.h) */
+    int slot;        /* index in the registry of unfinished files (unfinished.h) */
     int mode;        /* mode of the target when ebpo_publish_begin was called; -1: no such file */
     bool expects;    /* true: the target must still have the version `expected` at the commit */
     bool locked;     /* true: the caller holds the target's lock (file_lock.h) */
@@ -89,10 +89,11 @@ FILE *ebpo_publish_stream(ebpo_publish *publish);
  */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
-/* Same as ebpo_publish_commit for two files that belong together: replaces both files, or, on
- * failure, none (unless only the sync of the folder failed). On file systems without atomic
- * exchange, the first file may be replaced although the second file cannot be. Two programs that
- * replace the same pair take turns, so the two files are always from the same program. */
+/* Same as ebpo_publish_commit for two files that belong together. On success, both files are
+ * replaced; on failure, neither (unless only the sync of the folder failed). On file systems
+ * without atomic exchange, the first file may be replaced although the second file cannot be. Two
+ * programs that replace the same pair take turns, so the two files are always from the same
+ * program. */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second,
                                                    ebpo_error *error);
 

@@ -170,9 +170,9 @@ static void settle_making(char **made)
     }
 }
 
-/* Returns the text after the process id in a name that settle_making has made. Returns NULL if this
- * process exists, or if `file` is another name. `name`: [kept] beginning of the name. `system`:
- * system_number(). */
+/* Returns the text after the process id in `file`, a name that settle_making has made. Returns NULL
+ * for any other name, or if the process with this id exists. `name`: [kept] beginning of the name.
+ * `system`: system_number(). */
 static const char *suffix_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
 {
     char *end;
@@ -185,7 +185,7 @@ static const char *suffix_of_dead(const char *file, const char *name, size_t kep
     return dead ? end + 1 : NULL;
 }
 
-/* Removes the files in a folder, but no folders, which the library does not make there. */
+/* Removes the files in a folder, but not folders, because the library makes no folders there. */
 static void empty_folder(int fd)
 {
     DIR *d = fdopendir(fd);
@@ -217,9 +217,8 @@ static void remove_one(int parent, const char *file, const char *suffix)
         (void)unlinkat(parent, file, AT_REMOVEDIR);
 }
 
-/* Removes abandoned unfinished folders for `folder` with their content: folders of this user that a
- * process of this system has made which has ended. Files that cannot be examined or removed stay.
- */
+/* Removes abandoned unfinished folders for `folder` with their content: folders of this user, made
+ * by processes of this system that have ended. Files that cannot be examined or removed stay. */
 static void remove_stale_folders(const char *folder)
 {
     int saved = errno;
