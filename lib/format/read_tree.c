@@ -51,7 +51,8 @@ typedef struct refs_job {
 
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
 {
-    uint64_t above = first; /* a reference is stored as the number of faces between it and `above` */
+    /* a reference is stored as the number of faces between it and `above` */
+    uint64_t above = first;
     for (uint64_t k = 0; k < count; k++) {
         if (refs[k] >= above)
             return false;

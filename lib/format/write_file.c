@@ -36,7 +36,7 @@
 /* The lists that have a row for each chunk. */
 typedef enum chunk_list {
     CHUNK_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
-    /* /subtrees/chunk_directory: stored sizes in file order; their running sums are chunk offsets */
+    /* /subtrees/chunk_directory: stored sizes in file order, whose running sums are offsets */
     CHUNK_SIZES,
     CHUNK_LIST_COUNT
 } chunk_list;
