@@ -501,8 +501,9 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
     }
 }
 
-/* Returns the subtree of a row of an array of the mesh, of source indices, or of a level below the
- * subtrees' roots. Rows before the first subtree count as rows of the first subtree. */
+/* Returns the subtree to which a row belongs. `id`: an array of the mesh, of source indices, or of a
+ * level below the subtrees' roots. Rows before the first subtree count as rows of the first
+ * subtree. */
 static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)
 {

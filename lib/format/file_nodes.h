@@ -12,8 +12,8 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, cons
                                                  ebpo_error *error);
 
 /* Reads the children of a gray node: the group's types, and the rank of the group's first node of
- * each type (indexed by ebpo_node_type) in the next level. The types of a pruned node are 0, which
- * only occurs in files with info.pruned. */
+ * each type (indexed by ebpo_node_type) in the next level. If the node is pruned, the types are 0;
+ * only files with info.pruned have pruned nodes. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray,
                                                uint16_t *types, uint64_t ranks[4],
                                                ebpo_error *error);
@@ -25,8 +25,8 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_nod
                                              uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
                                              ebpo_error *error);
 
-/* Reads the winding number of a white, black or leaf node (leaf: at the lowest corner). Solids
- * only. */
+/* Reads the winding number of a white, black or leaf node (leaf: at the lowest corner). Returns
+ * EBPO_E_NOT_SOLID for a surface without EBPO_PART_BORDER. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
                                               int32_t *winding, ebpo_error *error);
 

@@ -288,9 +288,9 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
     return status == EBPO_OK ? open_arrays(file, head, error) : status;
 }
 
-/* Compares the content checksum of a file whose chunks have no checksum, such as `h5repack -f NONE`
- * writes; does nothing for other files. Called before any data are returned, because nothing else
- * detects a changed chunk of such a file. */
+/* Compares the content checksum if the file's chunks have no checksums (`h5repack -f NONE` writes
+ * such files); does nothing for other files. Called before any data are returned, because nothing
+ * else detects a changed chunk without a checksum. */
 static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
 {
     return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE

@@ -163,7 +163,7 @@ static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array
     return NULL;
 }
 
-/* Checks that attribute array n has as many rows as all preceding arrays of its element ("vertex",
+/* Checks that attribute array n has as many rows as each preceding array of its element ("vertex",
  * "material"). Returns the error's text or NULL. */
 static const char *check_element(const ebpo_file *file, uint64_t n)
 {

@@ -328,7 +328,7 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
 }
 
 /* Decodes a chunk of gates to high-water codes (hdf5_read/coding.h), and sets the padding to 0.
- * Uses the coder's buffer for shuffling, because gates are single bytes and not shuffled. */
+ * The gates are first in coder->scratch, which is free because single bytes are not shuffled. */
 static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
                                 ebpo_error *error)

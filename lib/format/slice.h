@@ -70,7 +70,7 @@ typedef struct ebpo_slice_size {
     uint64_t refs;      /* references of leaves to faces that an earlier leaf already lists */
     uint64_t new_faces; /* owned faces */
     uint64_t shared;    /* maximum number of shared faces */
-    uint64_t planes;    /* planes of gray nodes, if these planes are requested; else 0 */
+    uint64_t planes;    /* planes of gray nodes and of leaves, each only if requested */
 } ebpo_slice_size;
 /* Computes the sizes of the slice that ebpo_slice_read would read for the node `root`. Reads no
  * faces. */

@@ -12,8 +12,8 @@
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
 
-/* The three arrays of a level that are read. SKIP: number of faces between the new faces of the
- * previous leaf of the level and those of a leaf. NEW: number of new faces of a leaf. */
+/* The three arrays of a level that are read. SKIP: number of faces between the new faces of a
+ * leaf and those of the previous leaf of the level. NEW: number of new faces of a leaf. */
 enum { TYPES, SKIP, NEW, LISTS };
 
 /* State of a visit of all leaves of a subtree. */

@@ -662,11 +662,11 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* Reads the row of leaf_index, or of the table, that precedes a leaf. For the leaves of the level
- * before the row, sets row[0] to the end of the new faces (one past the last), row[1] to the number
- * of references, and row[2] to the number of leaf planes. If the row is of the table, sets *from to
- * the subtree's first leaf of the level, and checks the row's sums: of faces if `faces` is true, of
- * planes if it is false. */
+/* Reads the row of leaf_index, or of the table, that precedes a leaf. The values are those of the
+ * leaves of the level before the row: row[0] is the end of their new faces (one past the last),
+ * row[1] counts their references, and row[2] their planes. If the row is of the table, sets *from
+ * to the subtree's first leaf of the level, and checks the row's sums: of faces if `faces` is true,
+ * of planes if it is false. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {

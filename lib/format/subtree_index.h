@@ -46,8 +46,8 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 
 /* Adds to `keys` the chunks of the table that are not in memory and are needed to find an item of a
  * level. `per` is the kind of item: EBPO_PER_GROUP, EBPO_PER_GRAY or EBPO_PER_LEAF. Returns true if
- * there are such chunks. If it returns false, *first is the first item of this kind in the subtree
- * of `item`. Also returns true on errors, which the later read reports. */
+ * there are such chunks, and on errors, which the later read reports. If the function returns
+ * false, *first is the first item of this kind in the subtree of `item`. */
 bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
                                 ebpo_chunk_keys *keys, uint64_t *first);
 
@@ -59,7 +59,7 @@ void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t c
 /* --- ranks: sums from the preceding row of an index array or of the table, plus a count of the
  * items since this row --- */
 
-/* Sums rows of an unsigned array. Returns EBPO_E_FORMAT when the sum exceeds 2^62. */
+/* Sums rows of an unsigned array. Returns EBPO_E_FORMAT when the sum is 2^62 or more. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                           uint64_t row, uint64_t rows, uint64_t *sum,
                                           ebpo_error *error);

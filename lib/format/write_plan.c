@@ -342,8 +342,8 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
 
 /* --- encoding rows --- */
 
-/* Encodes rows of leaf_skip: the number of faces between the new faces of the previous leaf of the
- * level and those of each leaf. */
+/* Encodes rows of leaf_skip: for each leaf, the number of faces between its new faces and those of
+ * the previous leaf of the level. */
 static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint64_t row,
                          uint64_t rows, uint8_t *encoded)
 {

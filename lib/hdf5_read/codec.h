@@ -44,10 +44,10 @@ EBPO_MUST_USE ebpo_status ebpo_zstd_decode(ebpo_chunk_coder *coder, const uint8_
 void ebpo_zstd_coder_clear(ebpo_chunk_coder *coder);
 
 /* Checks a frame for two kinds of errors that zstd does not report. Returns the error's text or
- * NULL. First, a bit is set that RFC 8878 requires to be 0 and that most versions of zstd ignore
- * (bit 4 of the frame's descriptor, and the two lowest bits of the modes of each section of
- * sequences). Second, a block repeats its byte only once; zstd writes a raw byte instead. Also
- * returns NULL if the frame cannot be parsed, because decoding reports this error. */
+ * NULL. First, a bit is set that must be 0 (RFC 8878), but that most versions of zstd ignore: bit 4
+ * of the frame's descriptor, or one of the two lowest bits of the modes of a section of sequences.
+ * Second, a block repeats its byte only once; zstd writes a raw byte instead. Also returns NULL if
+ * the frame cannot be parsed, because decoding reports this error. */
 const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes);
 
 /* Returns true if a frame has a checksum of its content. A frame without a checksum is rejected,

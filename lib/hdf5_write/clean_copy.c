@@ -150,7 +150,7 @@ static bool has_filter(hid_t plist, int id)
     return false;
 }
 
-/* Returns true if libhdf5 has all filters of the array. Otherwise omits the array, with the name of
+/* Returns true if libhdf5 has all filters of the array. Otherwise omits the array; the reason names
  * the missing filter. */
 static bool can_decode(copying *c, const array_copy *a)
 {

@@ -37,8 +37,8 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id);
 EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
                                          uint64_t head_bytes, unsigned links, ebpo_error *error);
 /* Closes the file and reopens it; none of its objects may be open. Metadata that are allocated
- * afterwards are stored in one contiguous range of `metadata_bytes` bytes, which is allocated at
- * the end of the file with the first of these metadata. */
+ * afterwards are stored in one contiguous range of `metadata_bytes` bytes. HDF5 allocates this
+ * range at the end of the file when it allocates the first of these metadata. */
 EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes,
                                          ebpo_error *error);
 /* ebpo_h5_root opens the root group for its attributes. ebpo_h5_make_group creates a group with

@@ -704,7 +704,7 @@ static bool is_to_be_stored(const ebpo_cached_range *range)
                                 range->request.status == EBPO_OK));
 }
 
-/* Stores one range on disk that has been fetched but not read, so that its bytes are not lost when
+/* Stores on disk one range that has been fetched but not read, so that its bytes are not lost when
  * the process ends. Returns false if there is no such range. Releases the lock while it writes. */
 static bool store_one(ebpo_range_cache *p)
 {
@@ -780,7 +780,7 @@ static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, u
     return status;
 }
 
-/* Requests all cached ranges of [begin, end) at the same time. */
+/* Requests the cached ranges of [begin, end) at the same time, as far as the limit allows. */
 static void begin_read(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = find_range(p, begin); i < p->count && p->range[i]->begin < end;

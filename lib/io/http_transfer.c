@@ -723,9 +723,9 @@ static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
                                                                     : t->slot_count;
 }
 
-/* Lock held. Removes the next request that can start from the queue and returns it, or NULL. Ends
- * requests that have waited too long. Shortens *wait to the seconds until the next request is due.
- */
+/* Lock held. Removes from the queue the next request that can start, and returns this request, or
+ * NULL if there is none. Ends requests that have waited too long. Shortens *wait to the seconds
+ * until the next request is due. */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
 {
     for (ebpo_request **at = &t->queue; *at;) {

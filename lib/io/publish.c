@@ -143,7 +143,7 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
         if (publish->fd >= 0) {
-            /* so that processes that remove abandoned files see that this file is in use */
+            /* shows other processes, which remove abandoned files, that this file is in use */
             (void)flock(publish->fd, LOCK_EX | LOCK_NB);
             return EBPO_OK;
         }

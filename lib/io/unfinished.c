@@ -112,8 +112,8 @@ void ebpo_remove_stale_files(const char *folder, const char *name)
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
 /* Returns a number that identifies this namespace of process ids (container) until the machine is
- * restarted, so that processes of other machines are not taken for ended processes of this machine.
- * Returns 0 if the number is not known. */
+ * restarted. With this number, processes of other machines are not taken for ended processes of
+ * this machine. Returns 0 if the number is not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
