@@ -1,5 +1,5 @@
 /* Declares the lists of all chunks of a file. The chunk directory gives the offset and stored size
- * of each chunk (format-spec/subtrees.md), the list of chunk checksums gives its checksum
+ * of each chunk (format-spec/subtrees.md). The list of chunk checksums gives the chunk's checksum
  * (checksums.md). A chunk is the unit of compression in HDF5. */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H

@@ -366,7 +366,7 @@ static void count_faces(const counting *c)
     for (uint64_t i = 0; i < c->sums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         owned_faces(c, i, &first, &end);
-        first = end < at || first == UINT64_MAX ? at : first; /* if the subtree has no leaves */
+        first = end < at || first == UINT64_MAX ? at : first; /* the subtree has no leaves: `at` */
         end = end < first ? first : end;
         to[EBPO_S_FACES_BEFORE] = from[EBPO_S_FACES_BEFORE] + first - at;
         to[EBPO_S_FACES] = from[EBPO_S_FACES] + end - first;
@@ -501,8 +501,8 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
     }
 }
 
-/* Returns the subtree to which a row belongs. `id`: an array of the mesh, of source indices, or of a
- * level below the subtrees' roots. Rows before the first subtree count as rows of the first
+/* Returns the subtree to which a row belongs. `id`: an array of the mesh, of source indices, or of
+ * a level below the subtrees' roots. Rows before the first subtree count as rows of the first
  * subtree. */
 static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)

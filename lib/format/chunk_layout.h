@@ -38,7 +38,7 @@ typedef struct ebpo_array_out {
     ebpo_array_id id;
     int level;
     char path[EBPO_PATH_BYTES];
-    ebpo_shape shape; /* before ebpo_stored_shape */
+    ebpo_shape shape; /* of the values; ebpo_stored_shape gives the shape in the file */
     bool gates; /* true: faces that are stored as gates across edges (hdf5_read/face_gates.h) */
     /* native integers, row by row; NULL for arrays with a special coding */
     const void *values;

@@ -44,8 +44,8 @@ static inline int ebpo_content_of(ebpo_array_id id, bool solid)
 }
 
 /* Digest of one array, computed chunk by chunk. Files with subtrees have chunks with fewer rows
- * than other files. So that the digest is the same, these chunks are joined to chunks as in other
- * files, and codes that restart with each chunk are recoded. */
+ * than other files. So that the digest is the same, these chunks are combined into chunks as large
+ * as those of other files, and codes that restart with each chunk are recoded. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
     uint64_t last[3]; /* running sums of the components at the end of the previous chunk */

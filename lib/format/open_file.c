@@ -85,7 +85,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
         snprintf(a->path, sizeof a->path, "%s", ebpo_schema_former(id));
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
-    /* for remote files and files with a chunk directory, locates only a single chunk now */
+    /* in remote files and files with a chunk directory, several chunks are located later */
     uint64_t max_chunks = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =

@@ -243,9 +243,8 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
 }
 
 /* Converts leaf_first of the leaves [begin, begin + leaves) to the first new face of each leaf. In
- * the file, a leaf has a skip: the number of faces between the new faces of the previous leaf of
- * this level and its own new faces. `end`: one past the last new face of the leaf before leaf
- * `begin`. */
+ * the file, a leaf has a skip: the number of faces between its new faces and those of the previous
+ * leaf of this level. `end`: one past the last new face of the leaf before leaf `begin`. */
 static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leaves, uint64_t end)
 {
     ebpo_level *out = r->out;
@@ -302,7 +301,7 @@ static ebpo_status read_array(const reading *r, int id)
     ebpo_status status = EBPO_OK;
     if (type >= 0 && is_wanted_array(r, id))
         status = read_column(r, id, type);
-    else if (list && ebpo_level_array(r->out, list->counts)) /* also reads lists without items */
+    else if (list && ebpo_level_array(r->out, list->counts)) /* also for lists without items */
         status = read_list(r, id, list);
     return status == EBPO_OK ? finish_array(r, id) : status;
 }

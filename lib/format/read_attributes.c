@@ -110,7 +110,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     char coding[EBPO_HEAD_CODING_BYTES];
     *a = (ebpo_array_in){ .id = EBPO_A_ATTRIBUTE, .level = number };
     ebpo_attribute_path(number, a->path);
-    /* for remote files and files with a chunk directory, locates only a single chunk now */
+    /* in remote files and files with a chunk directory, several chunks are located later */
     uint64_t max_chunks = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     ebpo_status status =
         ebpo_head_read_array(head, a->path, max_chunks,

@@ -21,9 +21,9 @@
 #include "hdf5_read/coding.h"
 
 /* Converts leaf_first from skips, as in the file, to the first new face of each leaf. A new face of
- * a leaf is a face that no earlier leaf lists. A skip is the number of faces between the last new
- * face of the previous leaf of the level and the first new face of this leaf. `number`: number of
- * the level, also in the functions below. */
+ * a leaf is a face that no earlier leaf lists. A skip is the number of faces between the new faces
+ * of a leaf and those of the previous leaf of the level. `number`: number of the level, also in the
+ * functions below. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {

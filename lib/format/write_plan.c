@@ -110,7 +110,7 @@ static const char *check_names(const ebpo_attribute *a)
 
 /* --- attributes: codings, chosen by the compressed size of a few samples --- */
 
-enum { SAMPLES = 8, SAMPLE_BYTES = 16384 /* of each sample, at most */ };
+enum { SAMPLES = 8, SAMPLE_BYTES = 16384 /* greatest size of a sample */ };
 
 /* Returns the compressed size of a sample; 0 on failure. `columns`: true: encodes the values as
  * differences within columns; false: as plain values. */

@@ -1,7 +1,7 @@
 /* Provides the scope of each use of libhdf5 (h5_parts.h): locks a mutex, because Debian's serial
  * build is not thread-safe, and switches off HDF5's error printing. Also provides functions that
- * are used within a scope: they make errors that name file, object and libhdf5's innermost reason,
- * and open untrusted files. Registers the library's filter. */
+ * are used within a scope: to make errors that name file, object and libhdf5's innermost reason,
+ * and to open untrusted files. Registers the library's filter. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>

@@ -17,8 +17,8 @@ enum { DEFAULT_LEVEL = 3 };
 static const uint64_t CHUNK_MAX = UINT32_MAX;
 
 /* Returns 0, HDF5's sign of failure, and reports the reason to libhdf5. The plugin does not report
- * it: programs with a private libhdf5, such as h5py, could not load a plugin that calls HDF5's
- * error functions. */
+ * the reason: programs with a private libhdf5, such as h5py, could not load a plugin that calls
+ * HDF5's error functions. */
 static size_t short_of_memory(void)
 {
 #ifndef EBPO_FILTER_IN_PLUGIN

@@ -146,8 +146,9 @@ static int compare_use(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Returns a time: if all removable extents that were last used up to this time are removed, the
- * memory limit is met, as far as possible. Returns 0 if no extent can be removed. */
+/* Returns the time of last use up to which removable extents must be removed to meet the memory
+ * limit. If removing all of them does not suffice, returns the time of the newest one. Returns 0 if
+ * no extent can be removed. */
 static uint64_t find_removal_time(const ebpo_async *a)
 {
     uint64_t count = 0, last = 0, excess = a->held - a->memory;

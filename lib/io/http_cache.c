@@ -812,7 +812,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
     }
     for (uint64_t i = find_range(p, at);
          status != EBPO_OK && i < p->count && p->range[i]->begin < end; i++)
-        /* after an error, this reader does not wait for these requests, nor return their errors */
+        /* after an error, this reader does not wait for these requests or return their errors */
         p->range[i]->demanded = p->range[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);
