@@ -35,8 +35,8 @@ typedef struct query_holding {
     uint64_t free_memory;    /* bytes, before the model was made */
     uint64_t subtrees;       /* number of subtrees; 0: the whole model was loaded at first */
     uint64_t queries;        /* number of queries so far; protected by counts_lock */
-    double query_seconds; /* time of these queries, including loads, summed over all threads;
-                           * protected by counts_lock */
+    double query_seconds;    /* time of these queries, including loads, summed over all threads;
+                              * protected by counts_lock */
 } query_holding;
 
 /* Opens the model. Returns an exit code; errors have been reported. Call query_holding_close in any
