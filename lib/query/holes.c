@@ -77,6 +77,7 @@ typedef struct marking {
     bool has_memory;      /* false: the lists are incomplete, because memory was not available */
     uint64_t split_capacity, near_capacity, disc_capacity;
     uint64_t bytes;       /* how many more bytes may be added to the table */
+    uint64_t terms;       /* number of terms of all sums of bounds so far */
     ebpo_cap_front front; /* for bounds of w_D that are refined step by step */
 } marking;
 
@@ -102,12 +103,22 @@ static void begin_front(marking *w, const ebpo_cap_box *box, const near_discs *n
                          near->end - near->begin, near->far);
 }
 
-/* Returns true if |w_D| is certainly below t and 1 - t. `angles`: bounds of 2 pi w_D. */
-static bool is_small(const marking *w, ebpo_bounded angles)
+/* Returns the bounds of 2 pi w_D that were begun. */
+static ebpo_bounded sum_front(marking *w, bool *apart)
+{
+    w->terms += w->front.count;
+    return ebpo_cap_front_sum(&w->front, apart);
+}
+
+/* Returns 1 if |w_D| is certainly below t and 1 - t, 0 if more refinements cannot show this, else
+ * -1. `angles`: bounds of 2 pi w_D. */
+static int is_small(const marking *w, ebpo_bounded angles)
 {
     const double t = fmin(w->holes->rule.threshold, 1 - w->holes->rule.threshold);
     ebpo_bounded b = ebpo_cap_winding_of(angles, 0);
-    return fabs(b.middle) + b.error < t - 0x1p-40;
+    return fabs(b.middle) + b.error < t - 0x1p-40   ? 1
+           : fabs(b.middle) - b.error > t - 0x1p-41 ? 0
+                                                    : -1;
 }
 
 /* Returns true if a single disc of the list is large compared with the box. */
@@ -135,12 +146,12 @@ static bool caps_touch(const marking *w, ebpo_cell cell)
 static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, int steps)
 {
     bool apart;
+    int small;
     begin_front(w, box, near);
     do {
-        if (is_small(w, ebpo_cap_front_sum(&w->front, &apart)))
-            return true;
-    } while (steps-- > 0 && ebpo_cap_front_refine(&w->front));
-    return false;
+        small = is_small(w, sum_front(w, &apart));
+    } while (small < 0 && steps-- > 0 && ebpo_cap_front_refine(&w->front));
+    return small == 1;
 }
 
 /* Begins to bound w_D at the centre of a cell. *variation: bound of the difference between the
@@ -162,15 +173,15 @@ static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
 {
     double variation;
     bool apart;
+    int small;
     if (!begin_at_centre(w, box, &variation))
         return false;
     do {
-        ebpo_bounded b = ebpo_cap_front_sum(&w->front, &apart);
+        ebpo_bounded b = sum_front(w, &apart);
         b.error += variation;
-        if (is_small(w, b))
-            return true;
-    } while (ebpo_cap_front_refine(&w->front));
-    return false;
+        small = is_small(w, b);
+    } while (small < 0 && ebpo_cap_front_refine(&w->front));
+    return small == 1;
 }
 
 /* Returns 1 if all points of a cell without faces are certainly inside, 0 if all are outside, else
@@ -183,7 +194,7 @@ static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, cons
     bool apart;
     begin_front(w, box, near);
     do {
-        ebpo_bounded b = ebpo_cap_winding_of(ebpo_cap_front_sum(&w->front, &apart), winding);
+        ebpo_bounded b = ebpo_cap_winding_of(sum_front(w, &apart), winding);
         int result =
             apart ? ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error) : -1;
         if (result >= 0)
@@ -194,7 +205,7 @@ static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, cons
     ebpo_cell_bounds(w->m->box, cell, low, high);
     winding += ebpo_holes_crossings(w->holes, low, box->centre);
     do {
-        ebpo_bounded b = ebpo_cap_front_sum(&w->front, &apart);
+        ebpo_bounded b = sum_front(w, &apart);
         b.error += variation;
         b = ebpo_cap_winding_of(b, winding);
         int result = ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error);
@@ -278,6 +289,19 @@ static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf
     return (int32_t)index;
 }
 
+/* Returns the marked entry of a cell whose points may have different results. Other arguments: as
+ * for mark_cell. `near`: the cell's list. */
+static int32_t mark_undecided(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
+                              const near_discs *near)
+{
+    int32_t index = split_cell(w, cell, winding, leaf, near);
+    if (index >= 0)
+        return ebpo_marked_entry(index, EBPO_MARK_SPLIT);
+    index = store_near(w, cell, near, winding);
+    return index >= 0 ? ebpo_marked_entry(index, EBPO_MARK_LISTED)
+                      : ebpo_marked_entry(winding, EBPO_MARK_NEAR);
+}
+
 /* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf (`leaf`).
  * `winding`: for a cell without faces, k at its lowest corner; for a leaf, the value that its
  * ebpo_near_cell gets (see mark_leaf). */
@@ -286,7 +310,7 @@ static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
 {
     const ebpo_cap_box box = box_of(w, cell);
     const near_discs near = narrow_list(w, &box, parent);
-    int32_t result = -1, index = -1, marked;
+    int32_t result = -1, marked;
     if (near.decided)
         result = !leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, winding);
     else if (w->has_memory)
@@ -294,14 +318,8 @@ static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                  : is_far_leaf(w, cell, &box, &near) ? 0
                                                      : -1;
     w->fits = w->fits && abs(winding) < 1 << 25;
-    if (result >= 0)
-        marked = ebpo_marked_entry(winding, (ebpo_uniform_mark)result);
-    else if ((index = split_cell(w, cell, winding, leaf, &near)) >= 0)
-        marked = ebpo_marked_entry(index, EBPO_MARK_SPLIT);
-    else if ((index = store_near(w, cell, &near, winding)) >= 0)
-        marked = ebpo_marked_entry(index, EBPO_MARK_LISTED);
-    else
-        marked = ebpo_marked_entry(winding, EBPO_MARK_NEAR);
+    marked = result >= 0 ? ebpo_marked_entry(winding, (ebpo_uniform_mark)result)
+                         : mark_undecided(w, cell, winding, leaf, &near);
     w->lists.count = near.begin;
     return marked;
 }
@@ -319,7 +337,7 @@ static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const n
         leaf->kind = EBPO_LEAF_GENERAL;
         leaf->cell_face = EBPO_NEAR_BORDER;
         leaf->rows = (uint32_t)(touched && caps < 0 ? ebpo_marked_entry(0, EBPO_MARK_NEAR)
-                                                    : mark_cell(w, cell, caps, true, &near));
+                                                    : mark_undecided(w, cell, caps, true, &near));
         w->m->cell_faces(s, s->list + leaf->list, cell);
     }
     w->lists.count = near.begin;
@@ -359,8 +377,7 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_di
     }
 }
 
-ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
-                            ebpo_error *error)
+ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, ebpo_error *error)
 {
     ebpo_node_table *table = marked->table;
     marking *w = ebpo_alloc_zero(1, sizeof *w);
@@ -377,6 +394,7 @@ ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *ma
     w->lists.count = all.end;
     mark_node(w, &table->root, marked->root, &all);
     bool fits = w->fits;
+    holes->terms += w->terms;
     free(w->lists.entry);
     free(w);
     if (table->grid) { /* the grid has copies of entries, so it is made again */

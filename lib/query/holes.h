@@ -15,7 +15,8 @@
 typedef struct ebpo_holes {
     ebpo_cap_tree caps;
     ebpo_cap_rule rule;
-    _Atomic uint64_t ties; /* number of decisions that were ties (ebpo_cap_decision) */
+    _Atomic uint64_t ties;  /* number of decisions that were ties (ebpo_cap_decision) */
+    _Atomic uint64_t terms; /* number of terms of all sums of bounds for marks so far */
 } ebpo_holes;
 
 /* Reads the border of a file with EBPO_PART_BORDER. */
@@ -52,7 +53,7 @@ typedef struct ebpo_marked_table {
     int deepest;
     uint64_t bytes;
 } ebpo_marked_table;
-EBPO_MUST_USE ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
+EBPO_MUST_USE ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked,
                                           ebpo_error *error);
 /* Returns the bytes that ebpo_holes_mark has added to a table. */
 uint64_t ebpo_holes_marked_bytes(const ebpo_node_table *table);

@@ -15,6 +15,7 @@
 #include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
 #include "model_file.h"
+#include "query/query_model.h"
 #include "scratch.h"
 #include "solids.h"
 
@@ -56,6 +57,9 @@ static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *e
 }
 
 /* ---- models ---- */
+
+/* Limit of the terms of sums of bounds for each leaf (ebpo_holes.terms). */
+enum { TERMS_OF_LEAF = 126 };
 
 /* The same file in memory, with subtrees below level 1, and read node by node. */
 enum { WHOLE, PARTS, NODES, WAYS };
@@ -411,6 +415,28 @@ START_TEST(test_levels_agree_or_are_undecided)
 }
 END_TEST
 
+/* Marks take most of the time to open a surface with many holes; the number of terms of their sums
+ * does not depend on the machine. */
+START_TEST(test_marks_take_few_terms)
+{
+    uint64_t leaves = 0, kept = 0, state = 3;
+    holed h;
+    ebpo_mesh mesh = ebpo_test_torus(3, 1, 96, 48);
+    for (uint64_t f = 0; f < mesh.face_count; f++)
+        if (ebpo_test_random(&state) % 100 >= 4)
+            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
+    mesh.face_count = kept;
+    holed_make(&h, mesh, EBPO_RULE_NONZERO, 0.5);
+    const ebpo_info *info = ebpo_file_info(h.file);
+    for (int level = 0; level < info->level_count; level++)
+        leaves += info->level[level].leaf_count;
+    uint64_t terms = h.model->holes->terms;
+    ck_assert_msg(terms > leaves && terms < TERMS_OF_LEAF * leaves, "%llu terms for %llu leaves",
+                  (unsigned long long)terms, (unsigned long long)leaves);
+    holed_free(&h);
+}
+END_TEST
+
 /* A subset keeps the border: its results are those of the whole file, or it refuses. */
 START_TEST(test_subset_keeps_border)
 {
@@ -504,6 +530,7 @@ TEST_SUITE(holes)
     tcase_add_test(shapes, test_invalid_queries_are_refused);
     tcase_add_test(shapes, test_border_is_added_to_file);
     tcase_add_test(shapes, test_levels_agree_or_are_undecided);
+    tcase_add_test(shapes, test_marks_take_few_terms);
     tcase_add_test(shapes, test_subset_keeps_border);
     tcase_add_test(shapes, test_solid_has_integer_bounds);
     suite_add_tcase(suite, shapes);
