@@ -21,7 +21,7 @@ import run
 
 COLUMNS = ("text", "--json", "errors", "progress", "pipes")
 # Commands without a progress line: short, of a given duration, or printing results continuously.
-NO_PROGRESS = ("info", "levels", "view", "bench", "haptic")
+NO_PROGRESS = ("info", "levels", "view", "bench", "haptic", "serve")
 
 
 def tests():

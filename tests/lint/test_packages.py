@@ -38,7 +38,8 @@ LIBRARIES = {
     "qhull_r": ("libqhull-dev", "qhull", "qhull"),
     "check": (None, None, None),  # tests are not built in packages
 }
-OPTIONAL = "usr/lib/TRIPLET/libebpo.a"  # only with -Ddefault_library=both
+OPTIONAL = {"usr/lib/TRIPLET/libebpo.a",  # only with -Ddefault_library=both
+            "usr/share/ebpo/viewer"}  # only if it was built before
 
 
 def introspect(what):
@@ -78,7 +79,7 @@ def lists():
 
 def check_lists():
     takers = collections.defaultdict(list)
-    paths = sorted(set(installed()) - {OPTIONAL})
+    paths = sorted(set(installed()) - OPTIONAL)
     for package, pattern in lists():
         if not pattern.startswith("usr/"):  # of the sources
             if not list(root.glob(pattern)):

@@ -1,0 +1,477 @@
+/* ebpo serve: serves models and the web viewer to browsers of this machine.
+ *
+ * All paths that can be requested are in a table, which is made at the start with the files open.
+ * Requests do not open files, so no request leads to another file. */
+#include "ebpo_config.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/remote_args.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/folder_files.h"
+#include "cli/render/thumbnail.h"
+#include "cli/serve/http_request.h"
+#include "cli/serve/http_server.h"
+
+enum { PICTURE_WIDTH = 320, PICTURE_HEIGHT = 240, ADDRESS_MAX = 1024 };
+
+typedef struct values {
+    int64_t port, max_expansion;
+    const char *viewer;
+    bool json, quiet;
+} values;
+
+#include "cli/options/serve.inc"
+
+static const values standard = { .port = 8080 };
+
+/* A path that can be requested. */
+typedef struct served {
+    char *path; /* decoded */
+    http_content content;
+    struct model *pictured; /* model whose picture is the content; NULL: other content */
+} served;
+
+typedef struct model {
+    char *path;            /* of the file */
+    char *name;            /* last part of the path */
+    char *address;         /* path of its request below "/models/", encoded */
+    uint64_t faces, bytes; /* of the file */
+    pthread_mutex_t lock;  /* guards the picture */
+    bool drawn;
+    void *png; /* NULL: it could not be drawn */
+    size_t png_bytes;
+} model;
+
+typedef struct site {
+    const values *v;
+    served *entry;
+    size_t entries, capacity;
+    model **model;
+    size_t models, model_capacity;
+    char start[ADDRESS_MAX + 64]; /* address of the first page, from "/" on */
+    char *list;                   /* of models, for the viewer */
+    size_t list_bytes;
+} site;
+
+/* --- the table --- */
+
+/* Adds a path. Takes ownership of `path` and of the content's file, also on failure. */
+static bool add_entry(site *s, char *path, const http_content *content, model *pictured)
+{
+    if (path && s->entries == s->capacity) {
+        size_t capacity = s->capacity ? 2 * s->capacity : 64;
+        served *wider = realloc(s->entry, capacity * sizeof *wider);
+        if (wider) {
+            s->entry = wider;
+            s->capacity = capacity;
+        }
+    }
+    if (!path || s->entries == s->capacity) {
+        free(path);
+        if (content->file >= 0)
+            close(content->file);
+        return false;
+    }
+    s->entry[s->entries++] = (served){ path, *content, pictured };
+    return true;
+}
+
+/* Opens a regular file. Returns false with errno. */
+static bool open_content(const char *path, const char *type, http_content *out)
+{
+    struct stat st;
+    *out = (http_content){ .type = type, .file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK) };
+    if (out->file < 0)
+        return false;
+    if (fstat(out->file, &st) != 0 || !S_ISREG(st.st_mode)) {
+        close(out->file);
+        errno = EINVAL;
+        return false;
+    }
+    out->size = (uint64_t)st.st_size;
+    snprintf(out->tag, sizeof out->tag, "\"%jx-%jx-%jx.%lx\"", (uintmax_t)st.st_ino,
+             (uintmax_t)st.st_size, (uintmax_t)st.st_mtim.tv_sec, (long)st.st_mtim.tv_nsec);
+    return true;
+}
+
+static int find_content(void *user, const char *path, bool has_query, http_content *out);
+
+/* --- the viewer --- */
+
+static const char *type_of(const char *name)
+{
+    static const char *const types[][2] = {
+        { ".html", "text/html; charset=utf-8" },
+        { ".js", "text/javascript; charset=utf-8" },
+        { ".css", "text/css; charset=utf-8" },
+        { ".wasm", "application/wasm" },
+        { ".svg", "image/svg+xml" },
+    };
+    for (size_t i = 0; i < sizeof types / sizeof *types; i++)
+        if (words_end_with(name, types[i][0]))
+            return types[i][1];
+    return NULL;
+}
+
+/* Finds the viewer: where it is installed, or beside the program in the folder of a build. */
+static void find_viewer(const site *s, char out[PATH_MAX])
+{
+    char program[PATH_MAX];
+    const char *const places[] = { EBPO_VIEWER_FROM_BIN, "viewer" };
+    if (s->v->viewer || !realpath("/proc/self/exe", program)) {
+        snprintf(out, PATH_MAX, "%s", s->v->viewer ? s->v->viewer : "viewer");
+        return;
+    }
+    for (size_t i = sizeof places / sizeof *places; i-- > 0;) {
+        char index[2 * PATH_MAX + 16];
+        int folder = places[i][0] == '/' ? 0 : (int)(strrchr(program, '/') - program + 1);
+        int n = snprintf(index, sizeof index, "%.*s%s", folder, program, places[i]);
+        snprintf(out, PATH_MAX, "%s", index);
+        snprintf(index + n, sizeof index - (size_t)n, "/index.html");
+        if (access(index, R_OK) == 0)
+            return;
+    }
+}
+
+static int add_viewer_file(site *s, const char *folder, const char *name, const char *type)
+{
+    char *path = NULL, *request = NULL;
+    http_content content;
+    int code = EXIT_OK;
+    if (asprintf(&path, "%s/%s", folder, name) < 0)
+        return command_no_memory("serve");
+    if (!open_content(path, type, &content)) {
+        fprintf(stderr, "ebpo serve: %s: cannot be opened: %s\n", path, strerror(errno));
+        code = EXIT_FAILED;
+    } else {
+        if (asprintf(&request, "/%s", strcmp(name, "index.html") == 0 ? "" : name) < 0)
+            request = NULL;
+        if (!add_entry(s, request, &content, NULL))
+            code = command_no_memory("serve");
+    }
+    free(path);
+    return code;
+}
+
+/* Adds the files of the viewer that lie directly in its folder. */
+static int add_viewer(site *s)
+{
+    char folder[PATH_MAX];
+    http_content content;
+    find_viewer(s, folder);
+    DIR *d = opendir(folder);
+    int code = EXIT_OK;
+    for (const struct dirent *e; d && code == EXIT_OK && (e = readdir(d));)
+        if (e->d_name[0] != '.' && type_of(e->d_name))
+            code = add_viewer_file(s, folder, e->d_name, type_of(e->d_name));
+    if (d)
+        closedir(d);
+    if (code == EXIT_OK && find_content(s, "/", true, &content) != HTTP_OK) {
+        fprintf(stderr,
+                "ebpo serve: %s: the viewer is not in this folder; give its folder with --viewer, "
+                "or make it from the sources of ebpo by 'sh tools/npm/build.sh build-npm' and 'npm "
+                "ci && npm run build' in tools/web, then install ebpo again\n",
+                folder);
+        code = EXIT_FAILED;
+    }
+    return code;
+}
+
+/* --- models --- */
+
+/* Returns text as a part of an address: other characters become %XX. The caller frees it. */
+static char *encode_name(const char *name)
+{
+    char *text = malloc(3 * strlen(name) + 1), *to = text;
+    for (; text && *name; name++) {
+        unsigned char c = (unsigned char)*name;
+        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+            strchr("-._~", c))
+            *to++ = (char)c;
+        else
+            to += sprintf(to, "%%%02X", c);
+    }
+    if (text)
+        *to = 0;
+    return text;
+}
+
+static model *new_model(site *s, const char *path)
+{
+    if (s->models == s->model_capacity) {
+        size_t capacity = s->model_capacity ? 2 * s->model_capacity : 16;
+        model **wider = realloc(s->model, capacity * sizeof *wider);
+        if (!wider)
+            return NULL;
+        s->model = wider;
+        s->model_capacity = capacity;
+    }
+    model *m = calloc(1, sizeof *m);
+    if (!m)
+        return NULL;
+    pthread_mutex_init(&m->lock, NULL);
+    const char *slash = strrchr(path, '/');
+    m->path = strdup(path);
+    m->name = strdup(slash ? slash + 1 : path);
+    char *encoded = m->name ? encode_name(m->name) : NULL;
+    if (!encoded || asprintf(&m->address, "%zu/%s", s->models, encoded) < 0)
+        m->address = NULL;
+    free(encoded);
+    s->model[s->models++] = m;
+    return m->path && m->address ? m : NULL;
+}
+
+/* Adds the paths of a model and of its picture. Takes ownership of the content's file. */
+static bool add_model_entries(site *s, model *m, const http_content *content)
+{
+    char *path = NULL;
+    size_t number = s->models - 1;
+    if (asprintf(&path, "/models/%zu/%s", number, m->name) < 0)
+        path = NULL;
+    if (!add_entry(s, path, content, NULL))
+        return false;
+    if (!EBPO_HAVE_PNG)
+        return true;
+    http_content picture = { .type = "image/png", .file = -1 };
+    if (asprintf(&path, "/models/%zu.png", number) < 0)
+        path = NULL;
+    return add_entry(s, path, &picture, m);
+}
+
+static int add_model(site *s, const char *path)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    remote_values how = REMOTE_VALUES_INIT;
+    http_content content;
+    how.max_expansion = s->v->max_expansion;
+    if (!command_requires_hdf5("serve", path))
+        return EXIT_FAILED;
+    ebpo_status status = remote_open(&file, path, &how, &error);
+    if (status != EBPO_OK)
+        return command_failed("serve", &error);
+    if (!open_content(path, "application/x-hdf5", &content)) {
+        fprintf(stderr, "ebpo serve: %s: cannot be opened: %s\n", path, strerror(errno));
+        ebpo_close(file);
+        return EXIT_FAILED;
+    }
+    model *m = new_model(s, path);
+    if (m) {
+        m->faces = ebpo_file_info(file)->face_count;
+        m->bytes = content.size;
+    } else {
+        close(content.file);
+    }
+    ebpo_close(file);
+    return m && add_model_entries(s, m, &content) ? EXIT_OK : command_no_memory("serve");
+}
+
+/* Adds the models below a folder. Files that are not models are reported and omitted. */
+static int add_folder(site *s, const char *folder)
+{
+    folder_files files;
+    size_t before = s->models;
+    int code = folder_files_find(&files, "serve", folder) ? EXIT_OK : EXIT_FAILED;
+    for (size_t i = 0; i < files.count && code == EXIT_OK; i++) {
+        char *path = NULL;
+        if (asprintf(&path, "%s/%s", folder, files.path[i]) < 0)
+            code = command_no_memory("serve");
+        else
+            (void)add_model(s, path);
+        free(path);
+    }
+    if (code == EXIT_OK && s->models == before) {
+        fprintf(stderr, "ebpo serve: %s: no model is below this folder\n", folder);
+        code = EXIT_FAILED;
+    }
+    folder_files_free(&files);
+    return code;
+}
+
+static int add_operand(site *s, const char *path)
+{
+    struct stat st;
+    if (strncmp(path, "http://", 7) == 0 || strncmp(path, "https://", 8) == 0)
+        return command_usage("serve",
+                             "%s: files of other servers cannot be served; open the "
+                             "address in the viewer, or fetch the file",
+                             path);
+    return stat(path, &st) == 0 && S_ISDIR(st.st_mode) ? add_folder(s, path) : add_model(s, path);
+}
+
+/* --- the list of models --- */
+
+static void print_models(const site *s, json *j, bool for_viewer)
+{
+    json_array(j, for_viewer ? NULL : "models");
+    for (size_t i = 0; i < s->models; i++) {
+        const model *m = s->model[i];
+        size_t length = strlen(m->name);
+        char *name = strndup(m->name, words_end_with(m->name, ".ebpo.h5") ? length - 8 : length);
+        json_object(j, NULL);
+        json_text(j, "name", name ? name : m->name);
+        json_text(j, "file", for_viewer ? m->address : m->path);
+        json_uint(j, "faces", m->faces);
+        json_uint(j, "bytes", m->bytes);
+        if (for_viewer && EBPO_HAVE_PNG) {
+            char picture[40];
+            snprintf(picture, sizeof picture, "%zu.png", i);
+            json_text(j, "picture", picture);
+        }
+        json_end(j);
+        free(name);
+    }
+    json_end(j);
+}
+
+/* Adds the list of models, and sets the address of the first page: of the only model, or of the
+ * list. */
+static int add_list(site *s)
+{
+    json j;
+    FILE *f = open_memstream(&s->list, &s->list_bytes);
+    if (!f)
+        return command_no_memory("serve");
+    json_begin(&j, f);
+    print_models(s, &j, true);
+    json_finish(&j);
+    if (fclose(f) != 0)
+        return command_no_memory("serve");
+    http_content content = {
+        .type = "application/json", .file = -1, .bytes = s->list, .size = s->list_bytes
+    };
+    if (s->models == 1 && strlen(s->model[0]->address) < ADDRESS_MAX)
+        snprintf(s->start, sizeof s->start, "/?file=models/%s", s->model[0]->address);
+    else
+        snprintf(s->start, sizeof s->start, "/?samples=models/index.json");
+    return add_entry(s, strdup("/models/index.json"), &content, NULL) ? EXIT_OK
+                                                                      : command_no_memory("serve");
+}
+
+/* --- requests --- */
+
+/* Draws the picture of a model when it is first requested. */
+static int find_picture(model *m, http_content *out)
+{
+#if EBPO_HAVE_PNG
+    pthread_mutex_lock(&m->lock);
+    if (!m->drawn) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        m->drawn = true;
+        if (thumbnail_draw(m->path, PICTURE_WIDTH, PICTURE_HEIGHT, &m->png, &m->png_bytes,
+                           &error) != EBPO_OK)
+            (void)command_failed("serve", &error);
+    }
+    pthread_mutex_unlock(&m->lock);
+#endif
+    out->bytes = m->png;
+    out->size = m->png_bytes;
+    return m->png ? HTTP_OK : HTTP_FAILED;
+}
+
+static int find_content(void *user, const char *path, bool has_query, http_content *out)
+{
+    const site *s = user;
+    if (strcmp(path, "/") == 0 && !has_query) {
+        out->location = s->start;
+        return HTTP_FOUND;
+    }
+    for (size_t i = 0; i < s->entries; i++)
+        if (strcmp(s->entry[i].path, path) == 0) {
+            *out = s->entry[i].content;
+            return s->entry[i].pictured ? find_picture(s->entry[i].pictured, out) : HTTP_OK;
+        }
+    return HTTP_NOT_FOUND;
+}
+
+/* --- the command --- */
+
+static bool print_address(const site *s, int port)
+{
+    char address[64];
+    snprintf(address, sizeof address, "http://127.0.0.1:%d/", port);
+    if (s->v->json) {
+        json j;
+        json_begin(&j, stdout);
+        json_object(&j, NULL);
+        json_text(&j, "address", address);
+        print_models(s, &j, false);
+        json_finish(&j);
+    } else {
+        printf("%s\n", address);
+        if (!s->v->quiet)
+            fprintf(stderr, "ebpo serve: serves %zu model%s to this machine; Ctrl-C ends it\n",
+                    s->models, s->models == 1 ? "" : "s");
+    }
+    return command_flush("serve");
+}
+
+static int serve_site(site *s)
+{
+    int port = (int)s->v->port, listener = http_server_listen(&port);
+    if (listener < 0) {
+        fprintf(stderr,
+                "ebpo serve: port %d of 127.0.0.1 cannot be used: %s; choose another one with "
+                "--port, or 0 for a free one\n",
+                port, strerror(errno));
+        return EXIT_FAILED;
+    }
+    if (!print_address(s, port)) {
+        close(listener);
+        return EXIT_FAILED;
+    }
+    if (http_server_run(listener, find_content, s))
+        return EXIT_OK;
+    fprintf(stderr, "ebpo serve: the server cannot run: %s\n", strerror(errno));
+    return EXIT_FAILED;
+}
+
+static void free_site(site *s)
+{
+    for (size_t i = 0; i < s->entries; i++) {
+        if (s->entry[i].content.file >= 0)
+            close(s->entry[i].content.file);
+        free(s->entry[i].path);
+    }
+    for (size_t i = 0; i < s->models; i++) {
+        pthread_mutex_destroy(&s->model[i]->lock);
+        free(s->model[i]->path);
+        free(s->model[i]->name);
+        free(s->model[i]->address);
+        free(s->model[i]->png);
+        free(s->model[i]);
+    }
+    free(s->entry);
+    free(s->model);
+    free(s->list);
+}
+
+static int run_serve(void *given, const char **operand)
+{
+    site s = { .v = given };
+    int code = add_viewer(&s);
+    for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_OK; i++)
+        code = add_operand(&s, operand[i]);
+    if (code == EXIT_OK)
+        code = add_list(&s);
+    if (code == EXIT_OK)
+        code = serve_site(&s);
+    free_site(&s);
+    return code;
+}
+
+const command command_serve = { &spec, sizeof standard, &standard, run_serve };

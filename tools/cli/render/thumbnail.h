@@ -1,0 +1,12 @@
+/* Draws a small picture of a model. */
+#ifndef EBPO_TOOLS_THUMBNAIL_H
+#define EBPO_TOOLS_THUMBNAIL_H
+
+#include <ebpo/ebpo.h>
+
+/* Draws the model as a PNG in memory, which the caller frees: by its simplified surface, the mesh
+ * if it is small, or else the envelopes of a level. */
+EBPO_MUST_USE ebpo_status thumbnail_draw(const char *path, int width, int height, void **png,
+                                         size_t *size, ebpo_error *error);
+
+#endif

@@ -1,0 +1,51 @@
+/* Parses requests of HTTP/1.1 (RFC 9110, RFC 9112) for files. Refuses everything that the server
+ * does not need: other methods, bodies, absolute addresses, names of other hosts. */
+#ifndef EBPO_TOOLS_HTTP_REQUEST_H
+#define EBPO_TOOLS_HTTP_REQUEST_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { HTTP_HEAD_MAX = 16384, HTTP_PATH_MAX = 4096 };
+
+/* Status codes of responses. */
+enum {
+    HTTP_OK = 200,
+    HTTP_PARTIAL = 206,
+    HTTP_FOUND = 302,
+    HTTP_NOT_MODIFIED = 304,
+    HTTP_BAD_REQUEST = 400,
+    HTTP_NOT_FOUND = 404,
+    HTTP_BAD_METHOD = 405,
+    HTTP_TOO_SLOW = 408,
+    HTTP_LONG_PATH = 414,
+    HTTP_BAD_RANGE = 416,
+    HTTP_OTHER_HOST = 421,
+    HTTP_LONG_HEAD = 431,
+    HTTP_FAILED = 500,
+    HTTP_BAD_VERSION = 505
+};
+
+typedef struct http_request {
+    bool head_only; /* method HEAD */
+    bool keeps;     /* the connection stays open after the response */
+    bool has_query;
+    char path[HTTP_PATH_MAX]; /* decoded, without the query; begins with '/' */
+    char range[64];           /* value of Range; "": none, or not a single range of bytes */
+    char if_range[96], if_none_match[256]; /* values; "": none */
+} http_request;
+
+/* Parses a head of `length` bytes that ends with an empty line. Returns HTTP_OK, or the status code
+ * of an error; the connection must then be closed. */
+int http_request_parse(const char *head, size_t length, http_request *out);
+
+/* Finds the range of bytes that a request selects of `size` bytes. Returns HTTP_OK for all bytes,
+ * HTTP_PARTIAL for [*first, *first + *count), or HTTP_BAD_RANGE. */
+int http_request_range(const http_request *request, uint64_t size, const char *tag, uint64_t *first,
+                       uint64_t *count);
+
+/* Returns true if the client has the version `tag` already. */
+bool http_request_has(const http_request *request, const char *tag);
+
+#endif

@@ -1,0 +1,30 @@
+/* Serves contents over HTTP on the loopback interface, each connection on a separate thread. */
+#ifndef EBPO_TOOLS_HTTP_SERVER_H
+#define EBPO_TOOLS_HTTP_SERVER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* What a path leads to. */
+typedef struct http_content {
+    const char *type;     /* of its bytes; NULL: unknown path */
+    const char *location; /* address to which the client is sent instead; NULL: none */
+    int file;             /* open file; -1: `bytes` */
+    const void *bytes;    /* must stay valid until the server ends */
+    uint64_t size;
+    char tag[64]; /* version, in quotes; "": none */
+} http_content;
+
+/* Finds the content of a decoded path. Called by several threads. Returns the status code of the
+ * response: HTTP_OK, HTTP_FOUND with a location, HTTP_NOT_FOUND or HTTP_FAILED. */
+typedef int (*http_find_fn)(void *user, const char *path, bool has_query, http_content *out);
+
+/* Listens on 127.0.0.1. port: 0 for any free one; set to the port. Returns the socket, or -1 with
+ * errno. */
+int http_server_listen(int *port);
+
+/* Serves until SIGINT or SIGTERM arrives, then ends all connections. Closes the socket. Returns
+ * false, with errno, if the server cannot start. */
+bool http_server_run(int listener, http_find_fn find, void *user);
+
+#endif
