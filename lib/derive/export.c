@@ -1,7 +1,8 @@
 /* Exports levels and the mesh in other programs' formats. The table `formats` has one row for each
  * format: its name, the ending of its second file, the colours that it can hold, and the function
  * that writes it. To add a format, add a value of ebpo_export_format, a row of the table, and a
- * file export_NAME.c with the function, which is declared in export_job.h. The functions that the
+ * file export_NAME.c with the function, which is declared in export_job.h. The simplified surface
+ * has separate writers: export_surface.c for GLB, and export_tiles.c. The functions that the
  * writers share are in export_job.c. */
 #include <ebpo/export.h>
 
@@ -46,6 +47,10 @@ static const ebpo_export_row formats[] = {
                           .holds_vertex_colours = true,
                           .takes_colours = true,
                           .write = WRITE_BY_ASSIMP },
+    [EBPO_EXPORT_TILES] = { .name = "tiles",
+                            .folder = true,
+                            .holds_vertex_colours = true,
+                            .write = ebpo_export_tiles },
     [EBPO_EXPORT_STL] = { .name = "stl", .one_block = true, .write = WRITE_BY_ASSIMP },
 };
 
@@ -103,6 +108,29 @@ static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *ro
     return EBPO_OK;
 }
 
+/* Checks an export of the simplified surface. */
+static ebpo_status check_surface(const ebpo_info *info, const ebpo_export_row *row,
+                                 ebpo_export_format format, const ebpo_export_options *o,
+                                 ebpo_error *error)
+{
+    if (o->vertex_colours)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "colours are supported for the mesh in glTF, GLB and OBJ only");
+    if (row->folder)
+        return EBPO_OK;
+    if (format != EBPO_EXPORT_GLB)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the surface is exported as GLB or 3D Tiles only");
+    if (o->mesh)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the surface and the mesh cannot be exported together");
+    if (o->triangles == 0 && (o->first_level != o->last_level || o->last_level < 0 ||
+                              o->last_level >= info->level_count))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "give one level of the surface, 0 to %d, or a number of triangles",
+                         info->level_count - 1);
+    return EBPO_OK;
+}
+
 static ebpo_status write_format(const ebpo_export_job *job, ebpo_error *error)
 {
     if (!job->row)
@@ -112,7 +140,8 @@ static ebpo_status write_format(const ebpo_export_job *job, ebpo_error *error)
                               "this build has no assimp, which writes %s; build with "
                               "libassimp-dev installed, or export XDMF or VTKHDF",
                               job->row->name);
-    return job->row->write(job, error);
+    return job->options->surface && !job->row->folder ? ebpo_export_surface(job, error)
+                                                      : job->row->write(job, error);
 }
 
 ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_format format,
@@ -128,14 +157,16 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
     if (status == EBPO_OK && report)
         status = EBPO_CHECK_SIZED(ebpo_export_report, report, error);
     if (status == EBPO_OK)
-        status = check_export(ebpo_file_info(file), row, &wanted, error);
+        status = row && (row->folder || wanted.surface)
+                     ? check_surface(ebpo_file_info(file), row, format, &wanted, error)
+                     : check_export(ebpo_file_info(file), row, &wanted, error);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, path,
                               "cannot be used with this format: the name is too long or contains "
                               "a ':'; choose another name");
-    if (wanted.first_level <= wanted.last_level)
+    if (wanted.first_level <= wanted.last_level && !wanted.surface && !(row && row->folder))
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
     status =
         write_format(&(ebpo_export_job){ file, path, second, format, row, &wanted, &own_report },

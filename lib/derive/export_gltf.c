@@ -49,24 +49,6 @@ typedef struct model {
 
 /* --- content --- */
 
-/* Sets m->origin. If the model is far from the origin of its coordinates, compared with its size,
- * float32 coordinates have too few digits. Then m->origin is the middle of the root cell, and
- * becomes the nodes' translation. */
-static void choose_origin(model *m, const ebpo_info *info)
-{
-    double size = 0, largest = 0;
-    for (int k = 0; k < 3; k++) {
-        size = fmax(size, info->box_size[k]);
-        largest = fmax(largest, fmax(fabs(info->box_origin[k]),
-                                     fabs(info->box_origin[k] + info->box_size[k])));
-    }
-    for (int k = 0; k < 3 && largest > 16 * size; k++) {
-        /* readers keep a translation as float32 */
-        float middle = (float)(info->box_origin[k] + info->box_size[k] / 2);
-        m->origin[k] = isfinite(middle) ? (double)middle : 0;
-    }
-}
-
 static void find_bounds(gltf_block *p)
 {
     for (int k = 0; k < 3; k++)
@@ -115,7 +97,7 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
 {
     ebpo_status status = EBPO_OK;
     const ebpo_info *info = ebpo_file_info(job->file);
-    choose_origin(m, info);
+    ebpo_choose_origin(info, m->origin);
     if (!m->bin_name && job->options->mesh) /* the size of the mesh is known before it is read */
         status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count),
                                        error);
@@ -164,21 +146,6 @@ static void print_name(FILE *f, const char *name)
     }
 }
 
-/* Prints three numbers as JSON. A locale's decimal separator is replaced by a point. */
-static void print_three(FILE *f, const char *before, const double x[3])
-{
-    fputs(before, f);
-    for (int k = 0; k < 3; k++) {
-        char text[40];
-        snprintf(text, sizeof text, "%.17g", x[k]);
-        for (char *c = text; *c; c++)
-            if (!strchr("+-0123456789eE", *c))
-                *c = '.';
-        fprintf(f, "%s%s", k ? "," : "[", text);
-    }
-    fputc(']', f);
-}
-
 static void print_mesh(FILE *f, const model *m, int i)
 {
     const ebpo_block *block = &m->blocks[i].block;
@@ -201,7 +168,7 @@ static void print_nodes(FILE *f, const model *m)
     for (int i = 0; i < m->count; i++) {
         fprintf(f, "%s{\"name\":\"%s\",\"mesh\":%d", i ? ",\n" : "", m->blocks[i].block.name, i);
         if (o[0] != 0 || o[1] != 0 || o[2] != 0)
-            print_three(f, ",\"translation\":", o);
+            ebpo_json_numbers(f, ",\"translation\":", o, 3);
         fputc('}', f);
     }
     fprintf(f, "],\n\"meshes\":[");
@@ -225,8 +192,8 @@ static void print_accessors(FILE *f, const model *m, int i)
                  high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
     fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"",
             i ? ",\n" : "", first, FLOAT32, p->block.mesh.vertex_count);
-    print_three(f, ",\"min\":", low);
-    print_three(f, ",\"max\":", high);
+    ebpo_json_numbers(f, ",\"min\":", low, 3);
+    ebpo_json_numbers(f, ",\"max\":", high, 3);
     fprintf(f,
             "},\n{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64
             ",\"type\":\"SCALAR\"}",
@@ -297,11 +264,7 @@ static void write_words(FILE *f, const void *words, uint64_t count)
 static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
 {
     uint16_t linear[256];
-    for (int i = 0; i < 256; i++) {
-        double c = i / 255.0;
-        linear[i] =
-            (uint16_t)(65535 * (c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4)) + 0.5);
-    }
+    ebpo_linear_colours(linear);
     for (uint64_t i = 0; i < count; i++, rgba += 4) {
         uint8_t row[8];
         for (int k = 0; k < 4; k++)

@@ -214,6 +214,51 @@ ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double or
     return EBPO_OK;
 }
 
+void ebpo_json_number(FILE *file, double x)
+{
+    char text[40];
+    snprintf(text, sizeof text, "%.17g", x);
+    for (char *c = text; *c; c++)
+        if (!strchr("+-0123456789eE", *c))
+            *c = '.';
+    fputs(text, file);
+}
+
+void ebpo_json_numbers(FILE *file, const char *before, const double *x, int count)
+{
+    fputs(before, file);
+    for (int k = 0; k < count; k++) {
+        fputc(k ? ',' : '[', file);
+        ebpo_json_number(file, x[k]);
+    }
+    fputc(']', file);
+}
+
+void ebpo_linear_colours(uint16_t linear[256])
+{
+    for (int i = 0; i < 256; i++) {
+        double c = i / 255.0;
+        linear[i] =
+            (uint16_t)(65535 * (c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4)) + 0.5);
+    }
+}
+
+void ebpo_choose_origin(const ebpo_info *info, double origin[3])
+{
+    double size = 0, largest = 0;
+    for (int k = 0; k < 3; k++) {
+        origin[k] = 0;
+        size = fmax(size, info->box_size[k]);
+        largest = fmax(largest, fmax(fabs(info->box_origin[k]),
+                                     fabs(info->box_origin[k] + info->box_size[k])));
+    }
+    for (int k = 0; k < 3 && largest > 16 * size; k++) {
+        /* readers keep a translation as float32 */
+        float middle = (float)(info->box_origin[k] + info->box_size[k] / 2);
+        origin[k] = isfinite(middle) ? (double)middle : 0;
+    }
+}
+
 /* Records in the report if the block's colours are written. */
 static void report_colours(const ebpo_export_job *job, const ebpo_colours *colours)
 {

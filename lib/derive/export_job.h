@@ -3,6 +3,8 @@
 #ifndef EBPO_DERIVE_EXPORT_JOB_H
 #define EBPO_DERIVE_EXPORT_JOB_H
 
+#include <stdio.h>
+
 #include <ebpo/colours.h>
 #include <ebpo/export.h>
 
@@ -72,6 +74,7 @@ typedef struct ebpo_export_job ebpo_export_job;
 /* A format: a row of the table in export.c. */
 typedef struct ebpo_export_row {
     const char *name;          /* also the default ending of its files */
+    bool folder;               /* the output is a folder, with all levels of the surface */
     const char *second_ending; /* ending of a second file; NULL: the format has one file */
     /* true: second_ending replaces the ending of the first file's name; false: it is appended */
     bool replaces_ending;
@@ -108,6 +111,18 @@ EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text,
 EBPO_MUST_USE ebpo_status ebpo_export_check_assimp(const char *path, uint64_t vertices,
                                                    uint64_t faces, ebpo_error *error);
 
+/* Prints a number as JSON, in any locale. */
+void ebpo_json_number(FILE *file, double x);
+/* Prints numbers as a JSON array, after the text `before`. */
+void ebpo_json_numbers(FILE *file, const char *before, const double *x, int count);
+
+/* Sets 16-bit linear values for the 256 values of sRGB. */
+void ebpo_linear_colours(uint16_t linear[256]);
+
+/* Returns the point that becomes (0, 0, 0) in files with float32 coordinates: (0, 0, 0), or the
+ * middle of the root cell, rounded to float32, if the model is far from zero. */
+void ebpo_choose_origin(const ebpo_info *info, double origin[3]);
+
 /* Sets *out to the mesh's vertices minus the origin, as floats [vertex_count][3] to be freed by the
  * caller. Raises *largest_change to the largest rounding error of a coordinate. Errors:
  * EBPO_E_MEMORY; EBPO_E_LIMIT: a coordinate is out of range for float32. Then *out is NULL. */
@@ -120,6 +135,9 @@ EBPO_MUST_USE ebpo_status ebpo_export_xdmf(const ebpo_export_job *job, ebpo_erro
 EBPO_MUST_USE ebpo_status ebpo_export_vtkhdf(const ebpo_export_job *job, ebpo_error *error);
 /* glTF and GLB */
 EBPO_MUST_USE ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error);
+/* GLB, if options.surface; and 3D Tiles */
+EBPO_MUST_USE ebpo_status ebpo_export_surface(const ebpo_export_job *job, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_export_tiles(const ebpo_export_job *job, ebpo_error *error);
 /* OBJ and STL; absent from a build without assimp */
 EBPO_MUST_USE ebpo_status ebpo_export_assimp(const ebpo_export_job *job, ebpo_error *error);
 

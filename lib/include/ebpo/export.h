@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * Exports levels and the mesh to formats of other programs. ebpo_mesh_write_ply (mesh.h) writes
- * PLY.
+ * Exports levels, simplified surfaces and the mesh to formats of other programs.
+ * ebpo_mesh_write_ply (mesh.h) writes PLY.
  */
 #ifndef EBPO_EXPORT_H
 #define EBPO_EXPORT_H
@@ -32,12 +32,21 @@ typedef enum ebpo_export_format {
     EBPO_EXPORT_GLTF,
     EBPO_EXPORT_GLB, /* glTF 2.0 in one file */
     EBPO_EXPORT_OBJ, /* written by assimp, without a material library */
-    EBPO_EXPORT_STL  /* written by assimp, binary; only one level, or the mesh */
+    EBPO_EXPORT_STL, /* written by assimp, binary; only one level, or the mesh */
+
+    /*
+     * 3D Tiles 1.1 in a new folder: tileset.json, a tile for each patch of the simplified surface,
+     * and, with ebpo_export_options.mesh, tiles with the model's faces. Tiles are GLB files as for
+     * ebpo_export_options.surface. A tile's geometricError is ebpo_patch.error, or that of a patch
+     * below if this is greater; that of faces is their rounding. Coordinates keep their axes, so
+     * z is upwards. One patch is in memory at a time, and the table of all patches.
+     */
+    EBPO_EXPORT_TILES
 } ebpo_export_format;
 
 /*
- * Returns the name, which is the default extension: "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl".
- * The string is static. Returns NULL for invalid values.
+ * Returns the name, which is the default extension: "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl",
+ * "tiles". The string is static. Returns NULL for invalid values.
  *
  * Threads: any.
  */
@@ -78,14 +87,30 @@ typedef struct ebpo_export_options {
      * formats, this member must be NULL (EBPO_E_ARGUMENT).
      */
     const uint8_t *vertex_colours;
+
+    /*
+     * GLB with `surface`: the greatest number of triangles. The level is then ignored; the patches
+     * are those of any levels with the least error that have so few triangles. 0: no limit.
+     */
+    uint64_t triangles;
+
+    /*
+     * True: exports the simplified surface (EBPO_PART_SURFACE) of a level, last_level, and of
+     * coarser nodes without patches below, as one mesh without cracks. GLB only, with 16-bit
+     * positions, 8-bit normals (KHR_mesh_quantization) and EXT_meshopt_compression; `mesh` must be
+     * false. Nothing else of the file is read.
+     */
+    bool surface;
+
+    uint8_t reserved[7];
 } ebpo_export_options;
 
-#define EBPO_EXPORT_OPTIONS_INIT                                          \
-    {                                                                     \
-        sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL }, NULL \
+#define EBPO_EXPORT_OPTIONS_INIT                                                           \
+    {                                                                                      \
+        sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL }, NULL, 0, false, { 0 } \
     }
 
-/* Statistics of an exported level, or of the exported mesh. */
+/* Statistics of an exported level, of the exported surface, or of the exported mesh. */
 typedef struct ebpo_export_block {
     int level;                    /* -1: the mesh */
     uint64_t nodes;               /* number of polyhedra; 0 for the mesh */
@@ -120,6 +145,16 @@ typedef struct ebpo_export_report {
 
     /* ebpo_export_colours for vertices (mesh and levels) and for faces. */
     uint64_t vertex_colours, face_colours;
+
+    /*
+     * Simplified surface: its `block` has the deepest level of a patch and, as `nodes`, the number
+     * of patches. Each point of the surface is at most `error` from the model, and each point of
+     * the model from the surface, rounding included. Tiles: the error of the coarsest tile.
+     */
+    double error;
+
+    /* 3D Tiles: numbers of tiles and of bytes of all files. */
+    uint64_t tiles, bytes;
 } ebpo_export_report;
 
 #define EBPO_EXPORT_REPORT_INIT EBPO_SIZED(ebpo_export_report)
@@ -135,17 +170,21 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
                                       size_t space);
 
 /*
- * Exports levels and the mesh to a file, which is replaced atomically. A second file is replaced
- * just before the first one. If replacing the first file then fails (EBPO_E_IO), the second file is
- * already the new one.
+ * Exports levels, a surface or the mesh to a file, which is replaced atomically. A second file is
+ * replaced just before the first one. If replacing the first file then fails (EBPO_E_IO), the
+ * second file is already the new one.
  *
  * For XDMF and VTKHDF, one level is in memory at a time; for other formats, all levels are.
  *
  * report   may be NULL
  *
- * EBPO_E_ARGUMENT: a level is not valid, no data is selected, or the format does not support the
- * selected data. EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh
- * is requested, and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a
+ * 3D Tiles are written to a folder beside `path`, which is renamed when it is complete; `path` must
+ * not exist.
+ *
+ * EBPO_E_ARGUMENT: a level is not valid, no data is selected, the format does not support the
+ * selected data, or the coarsest surface has more than options.triangles. EBPO_E_UNSUPPORTED: the
+ * library was built without assimp. EBPO_E_ABSENT: the mesh or the surface is requested, and the
+ * file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a
  * coordinate beyond the range of float32 in a format that has float32 coordinates, or a GLB file of
  * 2^32 bytes or more. EBPO_E_IO. Also the errors of reading (base.h).
  *

@@ -17,9 +17,9 @@
 
 typedef struct values {
     int format;
-    int64_t level, threads;
+    int64_t level, triangles, threads;
     const char *levels, *memory;
-    bool mesh, json, quiet;
+    bool mesh, surface, tiles, json, quiet;
     bool to_deepest; /* --levels ends with '-': up to the last level of the file */
     remote_values remote;
 } values;
@@ -35,6 +35,10 @@ static const char *const format_words[] = {
 static int choose_format(values *v, const char *out)
 {
     const char *dot = strrchr(out, '.');
+    if (v->tiles && v->format >= 0)
+        return command_usage("export", "--tiles and --format cannot be used together");
+    if (v->tiles)
+        v->format = EBPO_EXPORT_TILES;
     if (dot && strcasecmp(dot, ".ply") == 0 && v->format < 0)
         return command_usage("export", "PLY files are written by 'ebpo extract'");
     for (int i = 0; dot && v->format < 0 && format_words[i]; i++)
@@ -46,12 +50,34 @@ static int choose_format(values *v, const char *out)
                                "the output's extension is not that of a format; give --format");
 }
 
+/* Sets the options of an export of the simplified surface. */
+static int choose_surface(const values *v, ebpo_export_options *o)
+{
+    if (v->tiles)
+        return v->level >= 0 || v->levels || v->mesh || v->surface || v->triangles
+                   ? command_usage("export", "--tiles exports everything; omit --level, --levels, "
+                                             "--mesh, --surface and --triangles")
+                   : EXIT_OK;
+    if (v->levels || v->mesh || (v->level >= 0) == (v->triangles > 0))
+        return command_usage("export", "--surface needs --level or --triangles, and nothing else");
+    if (v->format != EBPO_EXPORT_GLB)
+        return command_usage("export", "--surface is written as glb only");
+    o->surface = true;
+    o->triangles = (uint64_t)v->triangles;
+    o->first_level = o->last_level = (int)v->level;
+    return EXIT_OK;
+}
+
 /* Sets the levels to export. Returns an exit code. */
 static int choose_levels(values *v, ebpo_export_options *o)
 {
     word_levels levels;
     *o = (ebpo_export_options)EBPO_EXPORT_OPTIONS_INIT;
     o->mesh = v->mesh;
+    if (v->tiles || v->surface)
+        return choose_surface(v, o);
+    if (v->triangles)
+        return command_usage("export", "--triangles needs --surface");
     if (v->level < 0 && !v->levels && !v->mesh)
         return command_usage("export", "nothing to export; give --level, --levels or --mesh");
     if (v->level >= 0 && v->levels)
@@ -96,10 +122,36 @@ static void print_colours(const ebpo_export_report *r)
                          "them");
 }
 
-static void print_report(const char *out, const char *second, const ebpo_export_report *r)
+/* Prints what was written of the simplified surface. */
+static void print_surface(const values *v, const ebpo_export_report *r)
+{
+    char count[3][40], bytes[40];
+    const ebpo_export_block *b = &r->block[0];
+    words_bytes(bytes, sizeof bytes, r->bytes);
+    if (v->tiles)
+        printf("%s, %s, error up to %.3g\n",
+               words_plural(count[0], sizeof count[0], r->tiles, "tile", "tiles"), bytes, r->error);
+    else
+        printf("surface: %s, %s, %s, %s, error %.3g\n",
+               words_plural(count[0], sizeof count[0], b->nodes, "patch", "patches"),
+               words_plural(count[1], sizeof count[1], b->vertices, "vertex", "vertices"),
+               words_plural(count[2], sizeof count[2], b->triangles, "triangle", "triangles"),
+               bytes, r->error);
+    if (v->tiles && (r->origin[0] != 0 || r->origin[1] != 0 || r->origin[2] != 0))
+        printf("vertices are relative to %.9g %.9g %.9g, the transform of the root tile\n",
+               r->origin[0], r->origin[1], r->origin[2]);
+    print_colours(r);
+}
+
+static void print_report(const values *v, const char *out, const char *second,
+                         const ebpo_export_report *r)
 {
     char count[3][40], volume[TABLE_CELL];
     printf("%s%s%s\n", out, *second ? ", " : "", second);
+    if (v->tiles || v->surface) {
+        print_surface(v, r);
+        return;
+    }
     for (int i = 0; i < r->block_count; i++) {
         const ebpo_export_block *b = &r->block[i];
         words_plural(count[0], sizeof count[0], b->vertices, "vertex", "vertices");
@@ -119,11 +171,15 @@ static void print_report(const char *out, const char *second, const ebpo_export_
     print_colours(r);
 }
 
-static void json_block(json *j, const ebpo_export_block *b)
+static void json_block(json *j, const ebpo_export_block *b, bool surface)
 {
     json_object(j, NULL);
     if (b->level < 0) {
         json_text(j, "block", "mesh");
+    } else if (surface) {
+        json_text(j, "block", "surface");
+        json_int(j, "level", b->level);
+        json_uint(j, "patches", b->nodes);
     } else {
         json_text(j, "block", "level");
         json_int(j, "level", b->level);
@@ -144,7 +200,7 @@ static void print_json(const values *v, const char *out, const char *second,
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    json_text(&j, "format", format_words[v->format]);
+    json_text(&j, "format", ebpo_export_format_name((ebpo_export_format)v->format));
     json_array(&j, "files");
     json_text(&j, NULL, out);
     if (*second)
@@ -152,8 +208,14 @@ static void print_json(const values *v, const char *out, const char *second,
     json_end(&j);
     json_array(&j, "blocks");
     for (int i = 0; i < r->block_count; i++)
-        json_block(&j, &r->block[i]);
+        json_block(&j, &r->block[i], v->surface);
     json_end(&j);
+    if (v->tiles)
+        json_uint(&j, "tiles", r->tiles);
+    if (v->tiles || v->surface) {
+        json_uint(&j, "bytes", r->bytes);
+        json_real(&j, "error", r->error);
+    }
     json_reals(&j, "origin", r->origin, 3);
     json_real(&j, "largest_change", r->largest_change);
     json_text(&j, "vertex_colours", colour_words[r->vertex_colours]);
@@ -176,6 +238,8 @@ static int write_out(const values *v, const char *in, const char *out, const cha
     ebpo_status status = remote_open(&file, in, &v->remote, &error);
     if (status == EBPO_OK && v->to_deepest && o->first_level < ebpo_file_info(file)->level_count)
         o->last_level = ebpo_file_info(file)->level_count - 1;
+    if (status == EBPO_OK && v->tiles) /* without faces, the finest tiles are patches */
+        o->mesh = ebpo_file_info(file)->parts & EBPO_PART_MESH;
     if (status == EBPO_OK)
         status = ebpo_export(file, out, (ebpo_export_format)v->format, o, &report, &error);
     progress_wipe(&line);
@@ -184,7 +248,7 @@ static int write_out(const values *v, const char *in, const char *out, const cha
         if (v->json)
             print_json(v, out, second, &report, &t);
         else if (!v->quiet)
-            print_report(out, second, &report);
+            print_report(v, out, second, &report);
         if (!v->json)
             remote_report(&t, &v->remote, false);
     }

@@ -1,0 +1,330 @@
+/* Exports the simplified surface, and the model's faces, as 3D Tiles 1.1.
+ *
+ * Each patch is a tile, whose children are the patches of the node's children. They replace it
+ * (REPLACE). A patch without patches below has a child with the faces that it replaces. Tiles are
+ * written one after the other, with only the table of patches, and the bounds of the tiles, in
+ * memory; then tileset.json. A tile's geometricError is the certified error of its patch, or that
+ * of a tile below if it is greater, because readers expect that errors decrease.
+ *
+ * Coordinates are relative to an origin, which is the translation of the root tile. glTF has y
+ * upwards, and readers of 3D Tiles turn it to z; so the nodes of tiles turn z to y.
+ *
+ * Source: OGC, "3D Tiles Specification 1.1". */
+#include "core/strict_fp.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "derive/export_job.h"
+#include "derive/gltf_surface.h"
+#include "format/patch_table.h"
+#include "geometry/cells.h"
+#include "levels/surface_mesh.h"
+
+enum { CACHE_BYTES = 64 << 20 };
+
+static const char TILESET[] = "tileset.json";
+
+/* A tile; all lengths are in the model's unit. */
+typedef struct tile {
+    double min[3], max[3]; /* bounds of the content, then of all tiles below, too */
+    double error;          /* geometricError */
+    uint64_t number;       /* of its file */
+} tile;
+
+typedef struct tiler {
+    const ebpo_export_job *job;
+    const ebpo_info *info;
+    ebpo_chunks *chunks;
+    ebpo_patch_table table;
+    tile *patch; /* [table.count] */
+    tile *faces; /* [table.count] tiles of the faces of patches without patches below */
+    double origin[3];
+    char *folder;   /* temporary name */
+    uint64_t files; /* tiles that may have been written */
+} tiler;
+
+/* --- tiles --- */
+
+/* Sets `out` to the path of a file in the folder. */
+static ebpo_status name_file(const tiler *t, const char *name, char out[PATH_MAX],
+                             ebpo_error *error)
+{
+    if (snprintf(out, PATH_MAX, "%s/%s", t->folder, name) < PATH_MAX)
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_IO, t->job->path,
+                          "the path is too long; write to a folder with a shorter path");
+}
+
+static FILE *begin_file(const tiler *t, const char *name, ebpo_error *error)
+{
+    char path[PATH_MAX];
+    if (name_file(t, name, path, error) != EBPO_OK)
+        return NULL;
+    int file = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    FILE *f = file >= 0 ? fdopen(file, "w+b") : NULL;
+    if (!f)
+        ebpo_fail_errno(error, t->job->path, "a file in the folder cannot be made");
+    if (!f && file >= 0)
+        close(file);
+    return f;
+}
+
+/* Closes a file after its data is on the disk. */
+static ebpo_status end_file(const tiler *t, FILE *f, ebpo_error *error)
+{
+    bool ok = !ferror(f) && fflush(f) == 0 && fsync(fileno(f)) == 0;
+    int saved = errno;
+    if (fclose(f) == 0 && ok)
+        return EBPO_OK;
+    errno = ok ? errno : saved;
+    return ebpo_fail_errno(error, t->job->path, "could not be written");
+}
+
+/* Writes a tile and sets its bounds. `surface` lacks colours and origin. Adds the greatest move of
+ * a vertex to the error of the tile. */
+static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_patch *patch,
+                              tile *out, ebpo_error *error)
+{
+    char name[40];
+    ebpo_gltf_written written;
+    surface->vertex_count = patch->vertex_count;
+    surface->triangle_count = patch->triangle_count;
+    surface->triangles = patch->triangles;
+    surface->xyz = patch->xyz;
+    surface->normals = patch->normals;
+    surface->colours = patch->colours;
+    surface->colour_bytes = 3;
+    surface->rotates = true;
+    memcpy(surface->origin, t->origin, sizeof t->origin);
+    out->number = t->files++;
+    snprintf(name, sizeof name, "%" PRIu64 ".glb", out->number);
+    FILE *f = begin_file(t, name, error);
+    if (!f)
+        return error ? error->status : EBPO_E_IO;
+    ebpo_status status = ebpo_gltf_surface_write(f, t->job->path, surface, &written, error);
+    if (status == EBPO_OK) {
+        status = end_file(t, f, error);
+    } else {
+        fclose(f);
+        return status;
+    }
+    memcpy(out->min, written.min, sizeof out->min);
+    memcpy(out->max, written.max, sizeof out->max);
+    out->error += written.change;
+    t->job->report->bytes += written.bytes;
+    t->job->report->tiles++;
+    t->job->report->largest_change = fmax(t->job->report->largest_change, written.change);
+    return status;
+}
+
+static ebpo_status write_patch(tiler *t, uint64_t i, ebpo_error *error)
+{
+    ebpo_patch patch = EBPO_PATCH_INIT;
+    ebpo_gltf_surface surface = { .name = "patch" };
+    ebpo_status status = ebpo_patch_read(&t->table, t->chunks, i, &patch, error);
+    if (status != EBPO_OK)
+        return status;
+    for (int k = 0; k < 3; k++) { /* the grid of the patch, so that vertices do not move */
+        surface.step[k] = ldexp(t->info->box_size[k], -patch.level - EBPO_PATCH_GRID);
+        surface.grid[k] = t->info->box_origin[k];
+    }
+    t->patch[i].error = patch.error;
+    status = write_tile(t, &surface, &patch, &t->patch[i], error);
+    if (patch.colours)
+        t->job->report->vertex_colours = EBPO_EXPORT_WRITTEN;
+    ebpo_patch_free(&patch);
+    return status;
+}
+
+static bool is_divided(const tiler *t, uint64_t i)
+{
+    return t->table.child_end[i] > t->table.child[i];
+}
+
+static bool has_faces(const tiler *t, uint64_t i)
+{
+    return t->job->options->mesh && !is_divided(t, i);
+}
+
+static ebpo_status write_faces(tiler *t, uint64_t i, ebpo_error *error)
+{
+    ebpo_patch faces = EBPO_PATCH_INIT;
+    ebpo_gltf_surface surface = { .name = "faces" };
+    ebpo_status status = ebpo_patch_faces_read(&t->table, t->chunks, &i, 1, &faces, error);
+    if (status == EBPO_OK)
+        status = write_tile(t, &surface, &faces, &t->faces[i], error);
+    ebpo_patch_free(&faces);
+    return status;
+}
+
+static void include_tile(tile *upper, const tile *below)
+{
+    for (int k = 0; k < 3; k++) {
+        upper->min[k] = fmin(upper->min[k], below->min[k]);
+        upper->max[k] = fmax(upper->max[k], below->max[k]);
+    }
+    upper->error = fmax(upper->error, below->error);
+}
+
+/* Extends the bounds and the errors of tiles by those of the tiles below. */
+static void include_children(tiler *t)
+{
+    for (uint64_t i = t->table.count; i-- > 0;) {
+        if (has_faces(t, i))
+            include_tile(&t->patch[i], &t->faces[i]);
+        for (uint64_t c = t->table.child[i]; c < t->table.child_end[i]; c++)
+            include_tile(&t->patch[i], &t->patch[c]);
+    }
+}
+
+static ebpo_status write_tiles(tiler *t, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < t->table.count && status == EBPO_OK; i++) {
+        if (!ebpo_progress_step(&t->job->options->progress, "exporting", i, t->table.count, error))
+            return EBPO_E_CANCELLED;
+        status = write_patch(t, i, error);
+        if (status == EBPO_OK && has_faces(t, i))
+            status = write_faces(t, i, error);
+    }
+    return status;
+}
+
+/* --- the tileset --- */
+
+/* Prints the members of a tile except its children. */
+static void print_tile(FILE *f, const tile *shown)
+{
+    double box[12] = { 0 }, size = 0;
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, shown->max[k] - shown->min[k]);
+    for (int k = 0; k < 3; k++) {
+        /* not flat, and not too small after rounding to float32 */
+        double middle = (shown->min[k] + shown->max[k]) / 2,
+               half = fmax(shown->max[k] - middle, middle - shown->min[k]);
+        box[k] = middle;
+        box[3 + 4 * k] = half + size * 0x1p-20 + fabs(middle) * 0x1p-22;
+    }
+    ebpo_json_numbers(f, "{\"boundingVolume\":{\"box\":", box, 12);
+    fprintf(f, "},\"geometricError\":");
+    ebpo_json_number(f, shown->error);
+    fprintf(f, ",\"content\":{\"uri\":\"%" PRIu64 ".glb\"}", shown->number);
+}
+
+static void print_subtree(FILE *f, const tiler *t, uint64_t i)
+{
+    print_tile(f, &t->patch[i]);
+    if (i == 0) {
+        double at[16] = {
+            1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, t->origin[0], t->origin[1], t->origin[2], 1
+        };
+        ebpo_json_numbers(f, ",\"refine\":\"REPLACE\",\"transform\":", at, 16);
+    }
+    if (is_divided(t, i) || has_faces(t, i))
+        fprintf(f, ",\"children\":[\n");
+    if (has_faces(t, i)) {
+        print_tile(f, &t->faces[i]);
+        fputc('}', f);
+    }
+    for (uint64_t c = t->table.child[i]; c < t->table.child_end[i]; c++) {
+        if (c > t->table.child[i])
+            fprintf(f, ",\n");
+        print_subtree(f, t, c); /* at most EBPO_PATCH_LEVEL deep */
+    }
+    fprintf(f, is_divided(t, i) || has_faces(t, i) ? "]}" : "}");
+}
+
+static ebpo_status write_tileset(tiler *t, ebpo_error *error)
+{
+    double diagonal = 0;
+    for (int k = 0; k < 3; k++)
+        diagonal += t->info->box_size[k] * t->info->box_size[k];
+    diagonal = fmax(sqrt(diagonal), t->patch[0].error);
+    FILE *f = begin_file(t, TILESET, error);
+    if (!f)
+        return error ? error->status : EBPO_E_IO;
+    fprintf(f,
+            "{\"asset\":{\"version\":\"1.1\",\"generator\":\"ebpo %s\"},\n"
+            "\"extensionsUsed\":[\"3DTILES_content_gltf\"],\n"
+            "\"extensions\":{\"3DTILES_content_gltf\":{\"extensionsUsed\":"
+            "[\"KHR_mesh_quantization\",\"EXT_meshopt_compression\"],\"extensionsRequired\":"
+            "[\"KHR_mesh_quantization\",\"EXT_meshopt_compression\"]}},\n",
+            ebpo_version());
+    fprintf(f, "\"geometricError\":");
+    ebpo_json_number(f, diagonal);
+    fprintf(f, ",\n\"root\":");
+    print_subtree(f, t, 0);
+    fprintf(f, "}\n");
+    long bytes = ftell(f);
+    t->job->report->bytes += bytes > 0 ? (uint64_t)bytes : 0;
+    return end_file(t, f, error);
+}
+
+/* --- the folder --- */
+
+static void remove_folder(const tiler *t)
+{
+    char name[40], path[PATH_MAX];
+    for (uint64_t i = 0; i < t->files; i++) {
+        snprintf(name, sizeof name, "%" PRIu64 ".glb", i);
+        if (name_file(t, name, path, NULL) == EBPO_OK)
+            unlink(path);
+    }
+    if (name_file(t, TILESET, path, NULL) == EBPO_OK)
+        unlink(path);
+    rmdir(t->folder);
+}
+
+static ebpo_status write_folder(tiler *t, ebpo_error *error)
+{
+    ebpo_status status = ebpo_patch_table_read(&t->table, t->chunks, error);
+    if (status != EBPO_OK)
+        return status;
+    t->patch = ebpo_alloc_zero(t->table.count, sizeof *t->patch);
+    t->faces = ebpo_alloc_zero(t->table.count, sizeof *t->faces);
+    if (!t->patch || !t->faces)
+        return ebpo_fail_memory(error, 2 * t->table.count * sizeof *t->patch);
+    status = ebpo_folder_begin(t->job->path, &t->folder, error);
+    if (status == EBPO_OK)
+        status = write_tiles(t, error);
+    if (status == EBPO_OK) {
+        include_children(t);
+        t->job->report->error = t->patch[0].error;
+        status = write_tileset(t, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_folder_publish(t->folder, t->job->path, error);
+    if (status != EBPO_OK && t->folder)
+        remove_folder(t);
+    return status;
+}
+
+ebpo_status ebpo_export_tiles(const ebpo_export_job *job, ebpo_error *error)
+{
+    tiler t = { .job = job, .info = ebpo_file_info(job->file) };
+    if (job->options->mesh && !(t.info->parts & EBPO_PART_MESH))
+        return ebpo_fail_file(error, EBPO_E_ABSENT, job->path,
+                              "faces are requested, and the file was written without its mesh");
+    ebpo_choose_origin(t.info, t.origin);
+    memcpy(job->report->origin, t.origin, sizeof t.origin);
+    ebpo_status status = ebpo_chunks_make(&t.chunks, job->file, CACHE_BYTES, error);
+    if (status == EBPO_OK)
+        status = write_folder(&t, error);
+    ebpo_patch_table_free(&t.table);
+    ebpo_chunks_free(t.chunks);
+    free(t.patch);
+    free(t.faces);
+    free(t.folder);
+    return status;
+}
