@@ -66,24 +66,25 @@ static ebpo_status name_file(const tiler *t, const char *name, char out[PATH_MAX
                           "the path is too long; write to a folder with a shorter path");
 }
 
-static FILE *begin_file(const tiler *t, const char *name, ebpo_error *error)
+/* Makes a file in the folder. file: set to its descriptor, which the stream closes. */
+static FILE *begin_file(const tiler *t, const char *name, int *file, ebpo_error *error)
 {
     char path[PATH_MAX];
     if (name_file(t, name, path, error) != EBPO_OK)
         return NULL;
-    int file = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    FILE *f = file >= 0 ? fdopen(file, "w+b") : NULL;
+    *file = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    FILE *f = *file >= 0 ? fdopen(*file, "w+b") : NULL;
     if (!f)
         ebpo_fail_errno(error, t->job->path, "a file in the folder cannot be made");
-    if (!f && file >= 0)
-        close(file);
+    if (!f && *file >= 0)
+        close(*file);
     return f;
 }
 
 /* Closes a file after its data is on the disk. */
-static ebpo_status end_file(const tiler *t, FILE *f, ebpo_error *error)
+static ebpo_status end_file(const tiler *t, FILE *f, int file, ebpo_error *error)
 {
-    bool ok = !ferror(f) && fflush(f) == 0 && fsync(fileno(f)) == 0;
+    bool ok = !ferror(f) && fflush(f) == 0 && fsync(file) == 0;
     int saved = errno;
     if (fclose(f) == 0 && ok)
         return EBPO_OK;
@@ -109,12 +110,13 @@ static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_p
     memcpy(surface->origin, t->origin, sizeof t->origin);
     out->number = t->files++;
     snprintf(name, sizeof name, "%" PRIu64 ".glb", out->number);
-    FILE *f = begin_file(t, name, error);
+    int file;
+    FILE *f = begin_file(t, name, &file, error);
     if (!f)
         return error ? error->status : EBPO_E_IO;
     ebpo_status status = ebpo_gltf_surface_write(f, t->job->path, surface, &written, error);
     if (status == EBPO_OK) {
-        status = end_file(t, f, error);
+        status = end_file(t, f, file, error);
     } else {
         fclose(f);
         return status;
@@ -251,7 +253,8 @@ static ebpo_status write_tileset(tiler *t, ebpo_error *error)
     for (int k = 0; k < 3; k++)
         diagonal += t->info->box_size[k] * t->info->box_size[k];
     diagonal = fmax(sqrt(diagonal), t->patch[0].error);
-    FILE *f = begin_file(t, TILESET, error);
+    int file;
+    FILE *f = begin_file(t, TILESET, &file, error);
     if (!f)
         return error ? error->status : EBPO_E_IO;
     fprintf(f,
@@ -268,7 +271,7 @@ static ebpo_status write_tileset(tiler *t, ebpo_error *error)
     fprintf(f, "}\n");
     long bytes = ftell(f);
     t->job->report->bytes += bytes > 0 ? (uint64_t)bytes : 0;
-    return end_file(t, f, error);
+    return end_file(t, f, file, error);
 }
 
 /* --- the folder --- */

@@ -436,6 +436,45 @@ static ebpo_status call_glb(every_call_env *e) { return export_to(e, "x.glb", EB
 static ebpo_status call_obj(every_call_env *e) { return export_to(e, "x.obj", EBPO_EXPORT_OBJ); }
 static ebpo_status call_stl(every_call_env *e) { return export_to(e, "x.stl", EBPO_EXPORT_STL); }
 
+static void remove_tiles(const char *folder)
+{
+    char path[600];
+    bool found = true;
+    for (int i = 0; found; i++) {
+        snprintf(path, sizeof path, "%s/%d.glb", folder, i);
+        found = unlink(path) == 0;
+    }
+    snprintf(path, sizeof path, "%s/tileset.json", folder);
+    (void)!unlink(path);
+    (void)!rmdir(folder);
+}
+
+/* Exports the patches of a vector: as GLB of a level and of some triangles, and as 3D Tiles. */
+static ebpo_status call_patches(every_call_env *e)
+{
+    ebpo_export_report report = { .struct_size = sizeof report };
+    ebpo_export_options options = EBPO_EXPORT_OPTIONS_INIT;
+    ebpo_file *file = NULL;
+    char path[4096];
+    snprintf(path, sizeof path, "%s/passed/69_surface.ebpo.h5", getenv("EBPO_VECTORS"));
+    options.threads = 1;
+    ebpo_status status = ebpo_open(path, &file, e->error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_export(file, scratch("tiles"), EBPO_EXPORT_TILES, &options, &report, e->error);
+    if (status == EBPO_OK)
+        remove_tiles(scratch("tiles"));
+    options.surface = true;
+    options.mesh = false;
+    options.first_level = options.last_level = 1;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        options.triangles = i ? 1500 : 0;
+        status = ebpo_export(file, scratch("x.glb"), EBPO_EXPORT_GLB, &options, &report, e->error);
+    }
+    ebpo_close(file);
+    return status;
+}
+
 static ebpo_status call_verify(every_call_env *e)
 {
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
@@ -521,6 +560,7 @@ const every_call every_call_files[] = {
     { "export_glb", call_glb },
     { "export_obj", call_obj },
     { "export_stl", call_stl },
+    { "export_patches", call_patches },
     { "verify", call_verify },
     { NULL, NULL },
 };
