@@ -58,6 +58,7 @@ typedef struct patch_node {
     uint64_t triangles, vertices; /* their numbers in `rows` */
     bool made;                    /* the node was processed */
     bool stored;                  /* the file stores the patch */
+    bool collapsed;               /* the patch is a point (add_point) */
 } patch_node;
 
 /* The vertex that replaces the border vertices in a cell, as sums over the corners of faces at
@@ -488,11 +489,11 @@ static bool add_patch(ebpo_patch_mesh *mesh, key_table *table, const ebpo_patch_
     return made;
 }
 
-/* Returns true if a node has a patch; false if all its triangles collapse when border vertices are
- * replaced by vertices of cells. */
-static bool has_patch(const patch_node *node) { return isfinite(node->error); }
+/* Returns true if a node has a patch with area; false if all its triangles collapse when border
+ * vertices are replaced by vertices of cells. */
+static bool has_patch(const patch_node *node) { return isfinite(node->error) && !node->collapsed; }
 
-/* Adds the faces of the children that have no patch to the mesh `mesh`, from which the error is
+/* Adds the faces of the children without has_patch to the mesh `mesh`, from which the error is
  * measured. The node's patch is made without them, but its error bounds their distance from it.
  * Returns false if memory is short. */
 static bool add_collapsed_children(const surface_builder *b, const patch_node *node,
@@ -673,6 +674,21 @@ static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
     return made;
 }
 
+/* Makes a patch a point, a triangle with three equal corners, if its triangles all collapse into
+ * the vertices of cells on its border. So the node has a patch, and its siblings can have theirs.
+ */
+static bool add_point(ebpo_patch_mesh *mesh)
+{
+    bool made = add_triangle(mesh, (uint32_t[3]){ 0, 0, 0 }) && add_hidden_vertices(mesh);
+    while (made && mesh->vertex_count < 3) { /* the least number */
+        made = ebpo_grow(&mesh->vertex, &mesh->vertex_capacity, mesh->vertex_count + 1,
+                         sizeof *mesh->vertex);
+        if (made)
+            mesh->vertex[mesh->vertex_count++] = mesh->vertex[0];
+    }
+    return made;
+}
+
 /* Makes the patch of a node from its faces or from its children's patches. */
 static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *error)
 {
@@ -686,7 +702,11 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
         status = ebpo_simplify(&node->mesh, from.triangle_count / REDUCTION, error);
     if (status == EBPO_OK && !add_collapsed_children(b, node, &from))
         status = ebpo_fail_memory(error, from.triangle_count * 3 * sizeof *from.triangle);
-    if (status == EBPO_OK && !add_hidden_vertices(&node->mesh))
+    uint64_t vertices = node->mesh.vertex_count;
+    node->collapsed = node->mesh.triangle_count == 0 && vertices && node != b->node;
+    bool made = status != EBPO_OK ||
+                (node->collapsed ? add_point(&node->mesh) : add_hidden_vertices(&node->mesh));
+    if (!made)
         status = ebpo_fail_memory(error, node->mesh.vertex_count * sizeof *from.vertex);
     if (status == EBPO_OK) {
         point = ebpo_alloc(node->mesh.vertex_count, 3 * sizeof *point);
@@ -699,6 +719,10 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
         status = bound_error(b, node, &from, before, error);
         if (status == EBPO_OK && node->stored)
             status = encode_rows(b, node, point, error);
+    }
+    if (node->collapsed) { /* the point is no part of the parent's surface */
+        node->mesh.triangle_count = 0;
+        node->mesh.vertex_count = vertices;
     }
     free(point);
     ebpo_patch_mesh_free(&from);
