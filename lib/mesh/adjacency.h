@@ -50,7 +50,7 @@ typedef struct ebpo_star {
     ebpo_workspace *workspace; /* workspace of the mesh; set by the first call that gathers */
 } ebpo_star;
 
-/* Gathers the links of all edges at vertex v. Returns false when memory is short. */
+/* Gathers the links of all edges at vertex v. Returns false when out of memory. */
 bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh *mesh, uint32_t v);
 void ebpo_star_free(ebpo_star *star);
 
@@ -85,7 +85,7 @@ typedef struct ebpo_same_faces {
 } ebpo_same_faces;
 
 /* Gathers the faces that have three distinct vertices of which v is the lowest. Returns false when
- * memory is short. */
+ * out of memory. */
 bool ebpo_same_faces_gather(ebpo_same_faces *out, const ebpo_stars *stars, const ebpo_mesh *mesh,
                             uint32_t v);
 void ebpo_same_faces_free(ebpo_same_faces *faces);
@@ -103,9 +103,8 @@ typedef struct ebpo_edge_face {
     uint32_t face;
     uint8_t out; /* 1: the face runs from the edge's first vertex to the second vertex */
 
-    /* the following fields are set by ebpo_edge_faces_turn; `quarter`: angle from the first face
-     * around the edge: 0: zero; 1: less than a half turn; 2: a half turn; 3: more than a half turn
-     */
+    /* ebpo_edge_faces_turn sets `quarter` to `at`. quarter: angle from the first face around the
+     * edge: 0: zero; 1: less than a half turn; 2: a half turn; 3: more than a half turn */
     uint8_t quarter;
     bool layered;    /* the face has the same angle as the previous face of the sorted list */
     bool reversed;   /* true: coplanar faces are sorted by descending source index */
@@ -113,13 +112,13 @@ typedef struct ebpo_edge_face {
     double at[3];    /* position of the corner that is not on the edge */
 } ebpo_edge_face;
 
-/* Initialise it with zeros; free `face` with free(). */
+/* A list of faces at an edge. Initialise the struct with zeros; free `face` with free(). */
 typedef struct ebpo_edge_faces {
     ebpo_edge_face *face;
     uint64_t count, capacity;
 } ebpo_edge_faces;
 
-/* Adds a face. Returns false when memory is short. */
+/* Adds a face. Returns false when out of memory. */
 bool ebpo_edge_faces_add(ebpo_edge_faces *e, uint32_t face, uint8_t out, uint64_t patch);
 
 /* Sorts the faces by patch. */

@@ -286,7 +286,7 @@ static void pick_items(picking *p)
     }
 }
 
-/* Writes the selected rows to p->made, which the caller frees. Returns false when memory is short.
+/* Writes the selected rows to p->made, which the caller frees. Returns false when out of memory.
  */
 static bool pick_rows(picking *p)
 {

@@ -44,7 +44,7 @@ typedef struct ebpo_attributes {
     char unread[400];
 } ebpo_attributes;
 
-/* Makes empty attributes. Returns NULL when memory is short. */
+/* Makes empty attributes. Returns NULL when out of memory. */
 ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace);
 void ebpo_attributes_free(ebpo_attributes *attributes); /* accepts NULL */
 
@@ -89,14 +89,14 @@ static inline uint64_t ebpo_attribute_value_count(const ebpo_attribute *a)
 }
 
 /* Adds an array with the names and types of `like`, without values. Returns NULL when there are too
- * many arrays or memory is short. */
+ * many arrays, or when out of memory. */
 ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *like);
 void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index);
 
 /* Removes the arrays of elements other than vertices, faces and textures. Accepts NULL. */
 void ebpo_attributes_drop_others(ebpo_attributes *from);
 
-/* Reserves space for `rows` rows and `items` list items. Returns false when memory is short. */
+/* Reserves space for `rows` rows and `items` list items. Returns false when out of memory. */
 bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64_t rows,
                             uint64_t items);
 
@@ -146,12 +146,12 @@ double ebpo_attribute_number(const uint8_t *at, ebpo_attribute_type type);
 /* Finds the least and greatest value, ignoring NaN. Returns false if no value is a number. */
 bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, double range[2]);
 
-/* Creates attributes whose values are borrowed from `from` until rows are selected; NULL for NULL.
- * EBPO_E_MEMORY. */
+/* Creates attributes whose values are borrowed from `from` until rows are selected. If `from` is
+ * NULL, *out is NULL. EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_borrow(ebpo_attributes **out, const ebpo_attributes *from,
                                                  ebpo_error *error);
 
-/* Copies attributes into another workspace; NULL for NULL. */
+/* Copies attributes into another workspace. If `from` is NULL, *out is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *from,
                                                ebpo_workspace *workspace, ebpo_error *error);
 

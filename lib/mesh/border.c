@@ -51,7 +51,7 @@ typedef struct tracing {
     /* The edges that leave a vertex are contiguous. The index of the first of these edges stands
      * for the vertex in the following arrays. */
     uint64_t *start; /* [count] for each edge, the vertex at which the edge ends */
-    uint64_t *next;  /* [count] for each vertex, the first edge whose weight may not be 0 yet */
+    uint64_t *next;  /* [count] for each vertex, the first edge whose weight may still exceed 0 */
     uint64_t *place; /* [count] for each vertex, position on the path plus 1; 0: not on the path */
     uint64_t *path;  /* [length] edges of the current walk that are in no loop yet */
     uint64_t length;
@@ -130,8 +130,8 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Compares edges for the sort. Each pair of vertices is one edge, so keys are unique and the result
- * does not matter. */
+/* Compares edges with equal keys, as the sort requires. Each pair of vertices is one edge, so there
+ * are no equal keys, and the result is never used. */
 static int compare_edges(const void *a, const void *b)
 {
     const border_edge *x = a, *y = b;
@@ -196,7 +196,7 @@ static ebpo_status prepare_walks(tracing *t, ebpo_error *error)
 }
 
 /* Moves the end of the path, from position `from` on, to the loops. The weight of the loop is the
- * least weight of its edges. Returns false when memory is short. */
+ * least weight of its edges. Returns false when out of memory. */
 static bool cut_loop(tracing *t, uint64_t from)
 {
     ebpo_border *b = t->out;
@@ -224,7 +224,7 @@ static bool cut_loop(tracing *t, uint64_t from)
 }
 
 /* Walks from a vertex, and cuts off loops, until all edges that leave this vertex have the weight
- * 0. Returns false when memory is short. */
+ * 0. Returns false when out of memory. */
 static bool walk_from(tracing *t, uint64_t vertex)
 {
     uint64_t at = vertex;

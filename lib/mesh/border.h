@@ -11,7 +11,7 @@
  * the opposite direction. */
 typedef struct ebpo_border {
     uint64_t loop_count;
-    uint64_t edge_count; /* unbalanced edges of the mesh */
+    uint64_t edge_count; /* number of unbalanced edges of the mesh */
     uint64_t *first;     /* [loop_count + 1] */
     uint32_t *vertex;    /* indices in the current mesh */
     uint32_t *weight;    /* [loop_count] at least 1 */

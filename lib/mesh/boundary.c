@@ -98,8 +98,8 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Compares edges for the sort. The keys of boundary edges are unique, so the result never matters.
- */
+/* Compares edges with equal keys, as the sort requires. Boundary edges have no equal keys, so the
+ * result is never used. */
 static int compare_edges(const void *a, const void *b)
 {
     const ebpo_boundary_edge *x = a, *y = b;
@@ -138,7 +138,7 @@ static void store_arrivals(void *context, uint64_t place, const void *records, u
 
 static const ebpo_progress silent = { NULL, NULL };
 
-/* Returns the shift of the keys (vertex << 32) for the sort: the leading bits that remain number at
+/* Returns the shift of the keys (vertex << 32) for the sort: the leading bits that remain give at
  * most EBPO_SORT_BINS bins. */
 static unsigned leading_shift(const ebpo_mesh *mesh)
 {
@@ -232,7 +232,7 @@ static uint64_t find_departure(const chaining *c, uint64_t begin, uint64_t end, 
 
 /* Connects the edges at one vertex: c->arrivals[a .. b) with c->edges[d .. e), which depart. Edges
  * at the two ends of one fan are connected first, then the remaining edges in ascending order.
- * Returns false when memory is short. */
+ * Returns false when out of memory. */
 static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d,
                            uint64_t e)
 {
@@ -262,7 +262,7 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
     return true;
 }
 
-/* Connects the edges at all vertices. Returns false when memory is short. */
+/* Connects the edges at all vertices. Returns false when out of memory. */
 static bool connect_all(chaining *c)
 {
     uint64_t a = 0, d = 0, visits = 0;
@@ -301,8 +301,8 @@ static void emit_loop(chaining *c, uint64_t position)
     c->path_length = position;
 }
 
-/* Adds a vertex to the path. If the path has this vertex already, first removes the loop that ends
- * here from the path. */
+/* Adds a vertex to the path. If the path has this vertex already, the path from there on is a loop;
+ * this loop is first removed from the path. */
 static void visit_vertex(chaining *c, uint32_t vertex)
 {
     if (c->path_position[vertex] != EBPO_NO_INDEX)
@@ -376,7 +376,7 @@ static ebpo_status chain_edges(chaining *c, ebpo_error *error)
     ebpo_workspace *w = c->mesh->workspace;
     if (!allocate_arrays(c))
         return ebpo_workspace_fail(w,
-                                   c->count * 56 /* all arrays with a row for each edge, about */ +
+                                   c->count * 56 /* about: arrays with a row for each edge */ +
                                        c->mesh->vertex_count * sizeof *c->path_position,
                                    error);
     ebpo_status status = sort_all(c, error);

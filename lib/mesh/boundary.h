@@ -19,7 +19,7 @@ typedef struct ebpo_boundary {
     ebpo_workspace *workspace; /* workspace of the mesh; set by the first call that adds edges */
 } ebpo_boundary;
 
-/* Appends an edge. Returns false when memory is short. */
+/* Appends an edge. Returns false when out of memory. */
 bool ebpo_boundary_add(ebpo_boundary *boundary, const ebpo_mesh *mesh, uint32_t from, uint32_t to,
                        uint32_t face);
 /* Moves several lists into one empty list and frees them. */

@@ -1,5 +1,5 @@
-/* Builds box trees of points, and of items that are divided by one point each (for faces, the
- * centre). */
+/* Builds box trees of points, and of items. Each item has one point, by which the tree divides the
+ * items (for a face: its centre). */
 #include "core/strict_fp.h"
 
 #include "core/workspace.h"
@@ -83,7 +83,7 @@ static void build_node(const ebpo_box_tree *tree, uint64_t node, ebpo_tree_point
 
 static bool build_nodes(ebpo_box_tree *tree)
 {
-    uint64_t nodes = 1; /* of a tree whose leaves are all as deep as the largest halves require */
+    uint64_t nodes = 1; /* if all leaves are as deep as the deepest one */
     for (uint64_t most = tree->count; most > EBPO_BOX_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
@@ -156,8 +156,8 @@ typedef struct walking {
     void *user;
 } walking;
 
-/* Walks the subtree of a node, which contains the points p[count]. Returns false as soon as `visit`
- * does. */
+/* Walks the subtree of a node, which contains the points p[0 .. count). Returns false as soon
+ * as `visit` does. */
 static bool walk_node(const walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
     ebpo_box_node n = { &w->tree->node[node], &w->filled[node], count };

@@ -31,8 +31,8 @@ typedef struct ebpo_box_tree {
     ebpo_point_box *filled;
 } ebpo_box_tree;
 
-/* Appends a point, and returns its address, where the caller stores it. Returns NULL when memory is
- * short. */
+/* Appends a point, and returns the address where the caller stores it. Returns NULL when out of
+ * memory. */
 ebpo_tree_point *ebpo_box_tree_add(ebpo_box_tree *tree);
 
 /* Writes the box of an item. */
@@ -40,7 +40,7 @@ typedef void (*ebpo_box_of_fn)(const void *user, const ebpo_tree_point *p, ebpo_
 
 /* Builds the tree after all points are added. If `box_of` is NULL, the tree is a tree of points,
  * which may be built again after further points are added. Otherwise the tree is a tree of items
- * with these boxes, and may be built only once. Returns false when memory is short. */
+ * with these boxes, and may be built only once. Returns false when out of memory. */
 bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user);
 void ebpo_box_tree_free(ebpo_box_tree *tree);
 

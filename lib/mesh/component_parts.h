@@ -30,7 +30,7 @@ struct ebpo_components {
     const ebpo_mesh *mesh;
     const ebpo_mesh_groups *named; /* the groups, in place of components; list, number and position
                                       are then unused. NULL: components */
-    uint64_t count; /* initially all components, later only components that are not cavities */
+    uint64_t count; /* number of components; after cavities are joined, without cavities */
     ebpo_found_component *list; /* all components, also cavities */
     ebpo_component *facts;      /* [count] results for ebpo_components_get */
     /* [face_count] component of each face, borrowed; NULL: derived from its vertices */
@@ -59,8 +59,8 @@ EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *
                                                unsigned threads, const ebpo_progress *progress,
                                                ebpo_components **out, ebpo_error *error);
 
-/* Computes the component of each vertex, [vertex_count]; EBPO_NO_INDEX for unused vertices. Owned
- * by the mesh's workspace. NULL on failure. */
+/* Computes (*number)[vertex_count]: the component of each vertex, or EBPO_NO_INDEX for an unused
+ * vertex. The mesh's workspace owns the array. On failure, *number is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number,
                                                  ebpo_error *error);
 
@@ -88,8 +88,8 @@ struct ebpo_mesh_groups {
 };
 
 /* Merges all runs with the same name into a group; "" and "default" are the same name. runs[0] has
- * the faces before the first name of the file; without such faces, it makes no group. EBPO_E_LIMIT,
- * EBPO_E_MEMORY. */
+ * the faces before the first name of the file; if there are none, runs[0] makes no group.
+ * EBPO_E_LIMIT, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count,
                                                ebpo_mesh_groups **out, ebpo_error *error);
 

@@ -44,7 +44,7 @@ static void set_open(ebpo_components *c, uint32_t component)
 }
 
 /* Visits an edge whose faces may belong to several components. Marks as open the components that do
- * not use the edge equally often in both directions. Returns false when memory is short. */
+ * not use the edge equally often in both directions. Returns false when out of memory. */
 static bool visit_edge(ebpo_components *c, const ebpo_link *links, uint64_t uses,
                        ebpo_edge_faces *e)
 {
@@ -180,10 +180,10 @@ ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
 /* --- the closed component around a cavity --- */
 
 /* A closed component of negative volume. Its host is the smallest closed component of positive
- * volume around which the cavity's point `at` has a winding number other than 0. */
+ * volume whose winding number at the cavity's point `at` is not 0. */
 typedef struct cavity {
     double at[3];       /* first vertex of the cavity's first face */
-    int64_t winding;    /* minus the winding number of `at` around the current host */
+    int64_t winding;    /* minus the winding number of the current host at `at` */
     uint32_t component; /* index of the cavity in the list of components */
     bool placed;        /* true: the host is known */
 } cavity;

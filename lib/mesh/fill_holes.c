@@ -43,7 +43,7 @@ typedef struct scratch {
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
 
-/* Approximate memory for each vertex of a loop, named in messages when memory is short. */
+/* Approximate memory for each vertex of a loop, for messages when out of memory. */
 enum { LOOP_BYTES = 132 };
 
 typedef struct filling {
@@ -131,7 +131,7 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
 }
 
 /* Fills a loop. Its triangles follow the triangles of the loops that precede it (f->before).
- * Returns false when memory is short. */
+ * Returns false when out of memory. */
 static bool fill_loop(filling *f, scratch *s, uint64_t number)
 {
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
@@ -175,8 +175,8 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
 
 /* --- all loops --- */
 
-/* Reserves space after the mesh's faces, which do not change. Also sets the source indices of the
- * added faces, which follow the indices of all faces of the source, also of dropped faces. */
+/* Reserves space after the mesh's faces, which do not change. The added faces get
+ * the source indices after those of all source faces, including dropped faces. */
 static ebpo_status reserve_space(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;

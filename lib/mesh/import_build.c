@@ -143,7 +143,7 @@ static void *positions_of(const ebpo_mesh *mesh)
     return mesh->xyz32 ? (void *)mesh->xyz32 : (void *)mesh->xyz64;
 }
 
-/* Numbers the vertices of a polygon that no earlier polygon uses. */
+/* Numbers those vertices of a polygon that no earlier polygon uses. */
 static void number_vertices(ebpo_import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
@@ -359,7 +359,7 @@ typedef struct placing {
     size_t bytes; /* bytes of a row as stored */
 } placing;
 
-/* Returns the description of an attribute for one row a vertex or face, without values. */
+/* Returns an attribute without values, which will have one row for each vertex or face. */
 static ebpo_attribute head_of(const placing *p, const char *element)
 {
     ebpo_attribute head = { .list = EBPO_ATTRIBUTE_NO_LIST };
@@ -452,8 +452,8 @@ static ebpo_status place_in_lists(const placing *p)
     return status;
 }
 
-/* Converts values to bytes in the same memory. No byte is written behind the next value to be read.
- */
+/* Converts values to bytes in the same memory. Byte i is within values[0] to values[i], so no value
+ * is overwritten before it is read. */
 static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;

@@ -46,7 +46,7 @@ typedef struct ebpo_import_corner {
  * add vertices and rows, ebpo_import_faces, ebpo_import_polygon for each polygon, ebpo_import_end,
  * ebpo_import_attributes, ebpo_import_free. */
 typedef struct ebpo_import_build {
-    const char *name; /* of the file, for messages */
+    const char *name; /* name of the file, for messages */
     ebpo_error *error;
     ebpo_mesh *mesh;
     bool attributes;   /* attributes are requested: values are stored */
@@ -103,8 +103,8 @@ unsigned ebpo_import_columns(ebpo_import_sort sort);
  * first polygon. */
 EBPO_MUST_USE ebpo_status ebpo_import_faces(ebpo_import_build *b);
 
-/* Appends a corner to the current polygon, and returns its address, where the caller stores it.
- * Returns NULL when memory is short. */
+/* Appends a corner to the current polygon, and returns the address where the caller stores it.
+ * Returns NULL when out of memory. */
 ebpo_import_corner *ebpo_import_add_corner(ebpo_import_build *b);
 
 /* Triangulates the polygon of the corners, or counts it as omitted if it has fewer than three

@@ -126,7 +126,7 @@ int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
     return ebpo_attributes_hold(mesh->attributes);
 }
 
-/* Raises greatest[3] to the absolute coordinates of a vertex. */
+/* Raises greatest[k] to the vertex's absolute coordinate along axis k, if this is greater. */
 static void include_vertex(double greatest[3], const ebpo_mesh *mesh, uint64_t vertex)
 {
     double p[3];

@@ -239,7 +239,7 @@ static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
     return a != b;
 }
 
-/* Adds an edge from v to its findings, if it has any. Returns false when memory is short. */
+/* Records the findings of an edge at v, if there are any. Returns false when out of memory. */
 static bool classify_edge(const ebpo_check *check, star_block *block, const scratch *s, uint32_t v,
                           const ebpo_link *links, uint64_t uses)
 {
@@ -281,7 +281,7 @@ static double edge_length(const ebpo_check *check, uint32_t a, uint32_t b)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-/* Checks the edges at vertex v. Returns false when memory is short. */
+/* Checks the edges at vertex v. Returns false when out of memory. */
 static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
     const ebpo_star *star = &s->star;
@@ -307,7 +307,7 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
     return true;
 }
 
-/* Finds repeated faces whose lowest vertex is v. Returns false when memory is short. */
+/* Finds repeated faces whose lowest vertex is v. Returns false when out of memory. */
 static bool record_repeated_faces(const ebpo_check *check, star_block *block, scratch *s,
                                   uint32_t v)
 {

@@ -33,7 +33,7 @@ static inline bool ebpo_found_is_edge(uint32_t kind) { return kind <= EBPO_FOUND
 typedef struct ebpo_found_list {
     ebpo_found *item;
     uint64_t count, capacity;
-    bool short_of_memory; /* some locations are missing */
+    bool short_of_memory; /* true: some locations are missing */
 } ebpo_found_list;
 
 typedef struct ebpo_check {
@@ -44,7 +44,7 @@ typedef struct ebpo_check {
     uint32_t *parents; /* [vertex_count] disjoint sets of vertices (core/disjoint_sets.h) */
     ebpo_stars stars;
     ebpo_boundary boundary; /* all boundary edges, unordered */
-    uint64_t referenced;    /* vertices that faces use */
+    uint64_t referenced;    /* number of vertices that faces use */
     ebpo_units units;
     ebpo_found_list *found; /* [threads]; NULL: locations are not requested */
 } ebpo_check;
@@ -94,7 +94,7 @@ static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding 
     finding->count += other->count - kept;
 }
 
-/* Adds a location to the worker's list. When memory is short, only sets its short_of_memory. */
+/* Adds a location to the worker's list. When out of memory, only sets list.short_of_memory. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found);
 
 /* Counts a location, and adds it to the worker's list if all locations are requested. `location`:

@@ -201,7 +201,7 @@ static int compare_numbers(const void *x, const void *y)
 
 /* Collects the faces that have all `count` corners, as indices in the current mesh. Searches the
  * faces at the corner with the fewest faces, because another corner may have very many faces.
- * Returns false when memory is short. */
+ * Returns false when out of memory. */
 static bool gather_faces(finding_search *p, const uint32_t *corner, int count)
 {
     uint32_t vertex = corner[0];
@@ -223,8 +223,8 @@ static bool gather_faces(finding_search *p, const uint32_t *corner, int count)
     return true;
 }
 
-/* Collects the faces of a finding, as indices in the current mesh. Returns false when memory is
- * short. */
+/* Collects the faces of a finding, as indices in the current mesh. Returns false when out of
+ * memory. */
 static bool faces_of(finding_search *p, const ebpo_found *f)
 {
     if (ebpo_found_is_edge(f->kind))
@@ -432,8 +432,8 @@ static void put_colour(uint8_t kind, uint8_t rgb[3])
     ebpo_finding_colour(kind == NOTHING ? -1 : kind, rgb);
 }
 
-/* Returns the indices of vertices or faces, sorted by their source indices, or NULL when memory is
- * short. source: [count] source indices; the indices of dropped faces may be missing. */
+/* Returns the indices of vertices or faces, sorted by their source indices, or NULL when out of
+ * memory. source: [count] source indices; the indices of dropped faces may be missing. */
 static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, uint64_t count)
 {
     uint64_t size = count;

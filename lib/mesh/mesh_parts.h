@@ -39,7 +39,7 @@ struct ebpo_arrangement {
 };
 
 /* Copies geometry and order, without attributes, into the same workspace; free with ebpo_mesh_free.
- * Cleared on failure. */
+ * `out` is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_copy(const ebpo_mesh *mesh, ebpo_mesh *out, ebpo_error *error);
 
 /* Frees an arrangement. NULL is allowed. */

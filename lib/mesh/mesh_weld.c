@@ -119,7 +119,7 @@ typedef struct welding {
     ebpo_mesh *mesh;
     double distance;    /* 0: merge vertices at equal positions */
     double moved;       /* largest distance by which a vertex moves */
-    uint64_t collapsed; /* faces that repeat a vertex only after welding */
+    uint64_t collapsed; /* number of faces that repeat a vertex only after welding */
     uint64_t kept;      /* number of remaining vertices */
     uint32_t *map;      /* [vertex_count] new index of each vertex */
     uint32_t *from;     /* [kept] the remaining vertex of each group */

@@ -366,8 +366,8 @@ static ebpo_status fail_corner(const obj_reading *r, ebpo_obj_word word)
                           text);
 }
 
-/* Reads [+-] digits, up to `end` or a slash. Ignores digits of a number that is out of range
- * without them. Returns false if there are no digits, or if another character follows. */
+/* Reads [+-] digits, up to `end` or a slash. When the number so far is out of range,
+ * ignores further digits. Returns false if there are no digits, or if another character follows. */
 static bool read_number(const char **at, const char *end, int64_t *number)
 {
     bool negative = *at < end && **at == '-';

@@ -42,7 +42,7 @@ bool ebpo_obj_word_is(ebpo_obj_word word, const char *text);
 
 /* Names in OBJ files: materials, which are stored as an index for each face, and groups. */
 
-/* Begins a run of faces with the name `run`. `name`: of the file, for messages. EBPO_E_LIMIT,
+/* Begins a run of faces with the name `run`. `name`: name of the file, for messages. EBPO_E_LIMIT,
  * EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run,
                                             const char *name, ebpo_error *error);

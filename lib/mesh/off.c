@@ -120,8 +120,8 @@ typedef struct off_reading {
     int rest_count;
     bool not_bytes;        /* a colour is not an integer from 0 to 255 */
     float greatest_colour; /* greatest colour value */
-    /* numbers of vertices and of faces with values that the header does not declare or that are no
-     * colours, and of faces with an index of a colour */
+    /* numbers of: vertices with values that the header does not declare; faces with values that are
+     * no colour; faces with an index of a colour */
     uint64_t surplus_vertices, surplus_faces, indexed;
     uint64_t divided; /* number of vertices with a weight other than 1 */
     /* alpha: a colour has an opacity; both: vertices and faces have colours; more: text follows the

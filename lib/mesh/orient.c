@@ -235,7 +235,7 @@ static uint64_t patch_at(const orienting *o, uint32_t face)
 }
 
 /* Lists the faces at an edge with their patches before the joining, or, if `joined`, with their
- * joined patches. Returns false when memory is short. */
+ * joined patches. Returns false when out of memory. */
 static bool list_around(orienting *o, const ebpo_link *links, uint64_t uses, bool joined,
                         ebpo_edge_faces *e)
 {
@@ -376,7 +376,7 @@ static ebpo_status join_crowded(orienting *o, ebpo_error *error)
 
 /* --- the faces to turn --- */
 
-/* Lists the patches with faces to turn. Returns false when memory is short. */
+/* Lists the patches with faces to turn. Returns false when out of memory. */
 static bool list_patches(orienting *o)
 {
     EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count) {

@@ -284,7 +284,8 @@ static ebpo_status read_vertices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* Lowers t->deviates to `row`. The error ends the calling thread's range. */
+/* Lowers t->deviates to `row`, if it is greater. Returns an error, which ends the calling thread's
+ * range. */
 static ebpo_status record_deviation(plain *t, uint64_t row)
 {
     uint64_t lowest = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);

@@ -24,7 +24,7 @@ typedef struct reader {
     ebpo_ply_header *header;
     const char *at, *end; /* the bytes of the header that have not been read */
     uint64_t line;        /* current line, from 1 */
-    const char *name;     /* of the file, for messages */
+    const char *name;     /* name of the file, for messages */
     bool format_seen;
     ebpo_error *error;
 } reader;

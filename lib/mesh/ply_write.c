@@ -25,7 +25,7 @@
  * attributes, in the order of the source header if there is one. */
 
 typedef struct ply_out_property {
-    /* role of positions and corners; NONE: the next two members identify an attribute */
+    /* role of positions and corners; NONE: `attribute` and `column` identify the values */
     ebpo_ply_role role;
     uint32_t attribute; /* index of the array */
     uint32_t column;
@@ -58,7 +58,7 @@ typedef struct making {
     bool *taken;
     ebpo_ply_type index_type; /* type that holds all vertex indices */
     bool faces;               /* the new header already has the face element */
-    bool no_memory;           /* memory was short: the layout is not usable */
+    bool no_memory;           /* true: out of memory; the layout is not usable */
 } making;
 
 static const char *const type_words[] = { "char", "uchar", "short", "ushort",

@@ -29,8 +29,8 @@ typedef struct dropping {
     ebpo_same_faces *scratch; /* one for each worker */
     unsigned threads;
     uint64_t *removed; /* bit f is set if face f is to be removed */
-    uint64_t count;    /* faces to be removed */
-    uint64_t opposite; /* faces to be removed that are oriented opposite to the kept face */
+    uint64_t count;    /* number of faces to be removed */
+    uint64_t opposite; /* number of these faces with the orientation opposite to the kept face */
 } dropping;
 
 static bool is_removed(const dropping *d, uint64_t f)

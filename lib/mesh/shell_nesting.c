@@ -41,7 +41,7 @@ static bool near_host(void *user, const ebpo_box_node *node)
     return ebpo_shell_may_hold(((const seeker *)user)->host, node);
 }
 
-/* Adds the samples of a shell to the probes. Returns false when memory is short. */
+/* Adds the samples of a shell to the probes. Returns false when out of memory. */
 static bool add_probes(seeker *w, uint32_t number)
 {
     const ebpo_shell *shell = &w->all->n->shells[number];
@@ -55,8 +55,8 @@ static bool add_probes(seeker *w, uint32_t number)
     return true;
 }
 
-/* Adds the probes of the shells whose box is within the host's box. Returns false when memory is
- * short. */
+/* Adds the probes of the shells whose box is within the host's box. Returns false when out of
+ * memory. */
 static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;

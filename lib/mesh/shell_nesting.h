@@ -57,7 +57,7 @@ static inline void ebpo_face_box(const void *user, const ebpo_tree_point *p, ebp
     }
 }
 
-/* Adds a face to a box tree over faces. Returns false when memory is short. */
+/* Adds a face to a box tree over faces. Returns false when out of memory. */
 static inline bool ebpo_face_add(ebpo_box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
                                  int32_t value)
 {

@@ -95,7 +95,7 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
     if (unit + drop < -1074)
         drop = -1074 - unit; /* a denormal result */
     if (drop > 0) {
-        /* the dropped bits, of which the first, half a unit, is the top bit of `below` */
+        /* below: the dropped bits; its top bit is half a unit */
         ebpo_wide below = ebpo_wide_left(head, 128 - drop), half = { UINT64_C(1) << 63, 0 };
         head = ebpo_wide_right(head, drop);
         unit += drop;

@@ -199,7 +199,7 @@ static bool add_name(numbered *to, words name)
 }
 
 /* Collects the names from lines such as "comment material 1 red" and "comment TextureFile red.png".
- * Returns false when memory is short. */
+ * Returns false when out of memory. */
 static bool read_header(naming *n)
 {
     words text = { n->all->header, n->all->header_bytes }, line;
@@ -219,7 +219,7 @@ static bool read_header(naming *n)
     return good;
 }
 
-/* Marks the names that the faces refer to. Returns false when memory is short. */
+/* Marks the names that the faces refer to. Returns false when out of memory. */
 static bool mark_used(numbered *to, const uint32_t *faces, uint64_t count,
                       ebpo_workspace *workspace)
 {

@@ -78,7 +78,7 @@ typedef struct ebpo_texture_names {
     uint16_t slot[EBPO_TEXTURE_SLOTS]; /* hash table of indices from 1; 0: free */
     uint64_t omitted;                  /* names that are too long, too many, or with control
                                         * characters */
-    bool no_memory;                    /* names are missing, because memory was short */
+    bool no_memory;                    /* true: out of memory, so names are missing */
 } ebpo_texture_names;
 
 /* Adds the names from a header: `comment TextureFile NAME`. */

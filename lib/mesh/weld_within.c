@@ -1,6 +1,6 @@
 /* Decides which vertices that are within a distance of each other are joined. Vertices are visited
- * in ascending order of x, y and z. A vertex stays if no vertex that stays is within the distance.
- * Every other vertex is replaced by the nearest vertex that stays. A grid of cells finds
+ * in ascending order of x, y and z. A vertex stays if no earlier vertex that stays is within the
+ * distance. Every other vertex is replaced by the nearest vertex that stays. A grid of cells finds
  * neighbours, and exact arithmetic decides close comparisons. */
 #include "core/strict_fp.h"
 
@@ -17,7 +17,7 @@
 
 enum {
     GRAIN = 1 << 12, /* number of vertices for each call of a thread's function */
-    KEY_SHIFT = 20   /* number of the lower bits of sort keys, below the EBPO_SORT_BINS bins */
+    KEY_SHIFT = 20   /* number of lower bits of a sort key; the higher bits give the bin */
 };
 
 /* The edge of a grid cell is twice the distance. Indices of cells are below 2^49, so that rounding
