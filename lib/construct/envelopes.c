@@ -150,7 +150,7 @@ enum {
     FACES_TRIED = 16,      /* maximum number of means of face normals that are tried */
     HULL_ROUNDS = 3,       /* maximum number of rounds */
     ROUND_TRIED_TOP = 160, /* maximum number of directions tried in a round, down to TOP_LEVELS */
-    ROUND_TRIED = 24,      /* the same below TOP_LEVELS */
+    ROUND_TRIED = 24,      /* the same for the deeper levels */
     TABLE = 1024           /* entries of the table of normals */
 };
 
@@ -299,8 +299,8 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 
 /* --- few points --- */
 
-/* Points outside the hull so far are omitted below TOP_LEVELS if they are nearer to the hull than
- * this distance (in cells), because they would only add nearly equal directions. */
+/* On levels deeper than TOP_LEVELS, points outside the hull so far are omitted if they are nearer
+ * to it than this distance (in cells): they would only add nearly equal directions. */
 static const double hull_tolerance = 1e-3;
 
 /* Makes all points of the node the points of the hull. Returns false if they are too many, or if
@@ -360,9 +360,9 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 
 /* --- the node --- */
 
-/* Returns the factor of epsilon for a node down to TOP_LEVELS, whose envelope has this volume (in
- * cells) so far. The factor is small, because planes of these levels take hardly any bytes, and
- * even a solid that fills a thousandth of its cell needs planes. */
+/* Returns the factor of epsilon for a node of levels 0 to TOP_LEVELS. `volume`: volume of its
+ * envelope so far, in cells. The factor is small, because planes of these levels take hardly any
+ * bytes, and even a solid that fills a thousandth of its cell needs planes. */
 static double top_factor(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
 /* Makes the candidates of a node with many points. */

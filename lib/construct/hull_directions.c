@@ -68,7 +68,7 @@ static bool make_facet(hull *h, int i, int a, int b, int c)
 {
     double n[3];
     cross_of(h->p, a, b, c, n);
-    static const double least_length = 1e-18; /* of a normal that gives a direction */
+    static const double least_length = 1e-18; /* a shorter normal gives no direction */
     double length = ebpo_vec3_length(n);
     if (!(length > least_length))
         return false;

@@ -567,7 +567,7 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
                   b->face_count / PIECES_MAX > PIECE_FACES ? b->face_count / PIECES_MAX
                                                            : PIECE_FACES,
                   ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
-    /* so that collapse_if_few would not make a leaf of a node of the top */
+    /* then each node of the top has too many faces for collapse_if_few to make it a leaf */
     if (c.piece_faces < 2 * (uint64_t)b->options->leaf_faces)
         c.piece_faces = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;

@@ -119,7 +119,7 @@ bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsi
         for (int k = 0; k < 3; k++)
             given->corner[given->corner_count][k] = (child->corner[i][k] + (octant >> k & 1)) / 2;
     for (uint64_t i = 0; i < child->offer_count; i++) {
-        int32_t n[3], d, shift = 0; /* shift: n . the octant's lowest corner, in child cells */
+        int32_t n[3], d, shift = 0; /* shift: n . x, x: octant's lowest corner in child cells */
         ebpo_plane_code_decode(child->offers[i].normal, n, &d);
         for (int k = 0; k < 3; k++)
             shift += octant >> k & 1 ? n[k] : 0;
@@ -147,7 +147,7 @@ enum { BLOCK_BYTES = 16 << 20 /* least size of a block */, ALIGNMENT = 8 };
 /* Blocks of the workspace, filled one after the other. */
 struct ebpo_store {
     ebpo_workspace *workspace;
-    pthread_mutex_t lock; /* for the fields below */
+    pthread_mutex_t lock; /* protects all fields except `workspace` */
     char **blocks;
     uint64_t block_count, block_capacity;
     size_t left;       /* free bytes at the end of the last block */

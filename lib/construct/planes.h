@@ -13,8 +13,8 @@
 #include "geometry/polytope.h"
 
 enum {
-    /* maximum number of planes that a leaf, or a gray node below the first levels, adds to the
-     * planes of its parent */
+    /* maximum number of planes that a leaf, or a gray node deeper than the first levels, adds to
+     * the planes of its parent */
     EBPO_PLANES_MAX = 32,
     EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of such a node */
     /* maximum number of planes of a node in a file, which stores the number in a byte; also the

@@ -15,8 +15,8 @@ typedef struct ebpo_patch_vertex {
     double at[3];             /* position */
     double normal[3];         /* sum of the normals of faces, each as long as twice the area */
     double colour[3], weight; /* sums of colours and of their weights */
-    /* least and greatest index of the model's faces that use the vertices that this vertex replaces
-     */
+    /* this vertex replaces vertices of the model; least and greatest index of the faces that use
+     * those vertices */
     uint64_t lowest, highest;
     uint64_t key; /* key of its cell, or of the model's vertex */
     bool fixed;   /* it is on the border of the patch and does not move */

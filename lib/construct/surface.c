@@ -107,7 +107,7 @@ typedef struct surface_builder {
 
 /* --- nodes --- */
 
-/* Adds a node. Returns false if memory is short. */
+/* Adds a node. Returns false when out of memory. */
 static bool add_node(surface_builder *b, ebpo_cell cell, uint64_t first, uint64_t end)
 {
     if (!ebpo_grow(&b->node, &b->capacity, b->count + 1, sizeof *b->node)) {
@@ -119,9 +119,9 @@ static bool add_node(surface_builder *b, ebpo_cell cell, uint64_t first, uint64_
     return true;
 }
 
-/* Lists a gray node if it has faces; and if it has more than MOST_FACES, the nodes with faces below
- * it. `first`: its first new face. Returns the end of the node's faces. Recursive, one call for
- * each level. */
+/* Lists a gray node if it has faces. If it has more than MOST_FACES faces, also lists the nodes
+ * with faces below it. `first`: first new face of the node. Returns the end of the node's faces.
+ * Recursive, one call for each level. */
 static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
 {
     int below = cell.level + 1;
@@ -150,7 +150,7 @@ static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
 
 /* --- borders --- */
 
-/* Lists the intervals of all levels. Returns false if memory is short. */
+/* Lists the intervals of all levels. Returns false when out of memory. */
 static bool list_intervals(surface_builder *b)
 {
     uint64_t faces = b->tree->info.face_count;
@@ -199,7 +199,7 @@ static cell_vertex *find_cell(const cell_table *table, uint64_t key)
     return &table->slot[i];
 }
 
-/* Moves the vertices to a table with more slots. Returns false if memory is short. */
+/* Moves the vertices to a table with more slots. Returns false when out of memory. */
 static bool resize_table(cell_table *table, uint64_t slots)
 {
     cell_table larger = { .slots = slots, .count = table->count };
@@ -216,7 +216,7 @@ static bool resize_table(cell_table *table, uint64_t slots)
     return true;
 }
 
-/* Returns the vertex of a cell, which is inserted if needed; NULL if memory is short. */
+/* Returns the vertex of a cell, which is inserted if needed; NULL when out of memory. */
 static cell_vertex *enter_cell(cell_table *table, uint64_t key)
 {
     if (4 * (table->count + 1) > 3 * table->slots &&
@@ -269,7 +269,7 @@ static bool is_on_border(const surface_builder *b, uint32_t vertex, face_interva
     return b->lowest[vertex] < inside.first || b->highest[vertex] >= inside.end;
 }
 
-/* Adds corner k of a face to the vertex of the corner's cell. Returns false if memory is short. */
+/* Adds corner k of a face to the vertex of the corner's cell. Returns false when out of memory. */
 static bool add_corner(surface_builder *b, int level, uint64_t face, const scaled_face *f, int k)
 {
     cell_vertex *cell = enter_cell(&b->table[level], key_of_point(f->unit[k], level));
@@ -287,7 +287,7 @@ static bool add_corner(surface_builder *b, int level, uint64_t face, const scale
 }
 
 /* At each level, adds the corners of faces that are on borders of the level to the vertices of
- * their cells. Returns false if memory is short. */
+ * their cells. Returns false when out of memory. */
 static bool add_borders(surface_builder *b)
 {
     const ebpo_mesh *mesh = &b->tree->mesh;
@@ -315,7 +315,7 @@ static bool add_borders(surface_builder *b)
     return true;
 }
 
-/* Finds the first and the last face that use each vertex. Returns false if memory is short. */
+/* Finds the first and the last face that use each vertex. Returns false when out of memory. */
 static bool find_uses(surface_builder *b)
 {
     const ebpo_mesh *mesh = &b->tree->mesh;
@@ -344,7 +344,7 @@ typedef struct key_table {
 /* This bit is 1 in keys of vertices of the model, and 0 in keys of cells. */
 static const uint64_t MODEL_VERTEX = UINT64_C(1) << 63;
 
-/* Makes a table with twice as many slots for the mesh's vertices. Returns false if memory is short.
+/* Makes a table with twice as many slots for the mesh's vertices. Returns false when out of memory.
  */
 static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
 {
@@ -367,8 +367,8 @@ static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
 }
 
 /* Returns the vertex with a key. If there is none, or if the key is UINT64_MAX (a vertex that is on
- * no border), adds a vertex. Sets *is_new to true if a vertex was added. Returns NULL if memory is
- * short. */
+ * no border), adds a vertex. Sets *is_new to true if a vertex was added. Returns NULL when out of
+ * memory. */
 static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, uint64_t key,
                                        bool *is_new)
 {
@@ -392,7 +392,7 @@ static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, 
     return made;
 }
 
-/* Returns false if memory is short. */
+/* Returns false when out of memory. */
 static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
 {
     if (!ebpo_grow(&mesh->triangle, &mesh->triangle_capacity, mesh->triangle_count + 1,
@@ -411,7 +411,7 @@ static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int 
     const int shift = EBPO_PATCH_GRID - EBPO_PATCH_CELLS;
     double steps = ldexp(1, node_level + EBPO_PATCH_GRID);
     for (int k = 0; k < 3; k++) {
-        /* on the grid of the patch, within the cell */
+        /* the coordinate is rounded to the grid of the patch, and stays within the cell */
         double least = (double)((uint64_t)at[k] << shift), greatest = least + (1 << shift) - 1,
                on_grid = floor(cell->at[k] / cell->weight * steps + 0.5);
         on_grid = fmin(fmax(on_grid, least), greatest);
@@ -430,7 +430,7 @@ static void widen_uses(ebpo_patch_vertex *v, uint64_t lowest, uint64_t highest)
 }
 
 /* Adds the faces first .. end - 1 of the model to a mesh; also those with repeated corners, because
- * the error bounds their distances, too. Returns false if memory is short. */
+ * the error bounds their distances, too. Returns false when out of memory. */
 static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t first, uint64_t end)
 {
     const uint32_t *corner = b->tree->mesh.faces + 3 * first;
@@ -463,7 +463,7 @@ static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t 
     return made;
 }
 
-/* Adds the patch of a child to a mesh. Returns false if memory is short. */
+/* Adds the patch of a child to a mesh. Returns false when out of memory. */
 static bool add_patch(ebpo_patch_mesh *mesh, key_table *table, const ebpo_patch_mesh *from)
 {
     uint32_t *new_index = ebpo_alloc(from->vertex_count, sizeof *new_index);
@@ -495,7 +495,7 @@ static bool has_patch(const patch_node *node) { return isfinite(node->error) && 
 
 /* Adds the faces of the children without has_patch to the mesh `mesh`, from which the error is
  * measured. The node's patch is made without them, but its error bounds their distance from it.
- * Returns false if memory is short. */
+ * Returns false when out of memory. */
 static bool add_collapsed_children(const surface_builder *b, const patch_node *node,
                                    ebpo_patch_mesh *mesh)
 {
@@ -508,7 +508,7 @@ static bool add_collapsed_children(const surface_builder *b, const patch_node *n
 
 /* Makes the surface from which a node's patch is made: the node's faces, or the patches of its
  * children. Frees the children's patches. Sets *error to the greatest error of these patches.
- * Returns false if memory is short. */
+ * Returns false when out of memory. */
 static bool gather_surface(surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                            double *error)
 {
@@ -542,8 +542,8 @@ static uint64_t key_of_vertex(const surface_builder *b, uint32_t vertex, int nod
 }
 
 /* Makes the mesh `to` from `from`: replaces the vertices on the border of a node's patch by the
- * vertices of their cells, and omits triangles that then have repeated corners. Returns false if
- * memory is short. */
+ * vertices of their cells, and omits triangles that then have repeated corners. Returns false when
+ * out of memory. */
 static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_patch_mesh *from,
                         ebpo_patch_mesh *to)
 {
@@ -655,7 +655,7 @@ static ebpo_status bound_error(const surface_builder *b, patch_node *node,
 
 /* Adds a vertex without triangles at each border vertex whose edges all have two triangles. Readers
  * treat vertices without triangles as border vertices; otherwise they would not recognise such a
- * border vertex. Returns false if memory is short. */
+ * border vertex. Returns false when out of memory. */
 static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
 {
     uint64_t count = mesh->vertex_count;
@@ -751,7 +751,7 @@ static ebpo_status run_tasks(void *context, uint64_t begin, uint64_t end, unsign
     return status;
 }
 
-/* Lists the highest nodes with at most TASK_FACES faces. Returns false if memory is short. */
+/* Lists the highest nodes with at most TASK_FACES faces. Returns false when out of memory. */
 static bool list_tasks(surface_builder *b)
 {
     b->task = ebpo_alloc(b->count, sizeof *b->task);
@@ -865,7 +865,7 @@ ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads, const ebpo_pro
     const ebpo_attributes *attributes = tree->mesh.attributes;
     ebpo_status status = EBPO_OK;
     frexp(ebpo_patch_error_step(&tree->info), &b.exponent);
-    b.exponent += 31; /* the longest side is 2^32 steps of the error */
+    b.exponent += 31; /* longest side: 2^32 steps of the error, scaled 1 to 2 */
     for (int k = 0; k < 3; k++)
         b.size[k] = ldexp(b.box.size[k], -b.exponent);
     b.threads = ebpo_thread_count(threads);

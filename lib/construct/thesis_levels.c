@@ -3,8 +3,8 @@
  *
  * In a file, a node has at most 255 planes, and candidates with equal normals are dropped before a
  * percentage of the candidates is chosen. Neither thesis has these limits (BP 2008, 3.5.1: 2,955
- * planes at a root). In this file, all candidates of a node count, in the order of the node's faces
- * or children, and polytopes have any number of faces. Normals are rounded as in files, offsets are
+ * planes at a root). Here, all candidates of a node count, in the order of the node's faces or
+ * children, and polytopes have any number of faces. Normals are rounded as in files, offsets are
  * not. Leaves are made by one of three criteria (BP 2008, 3.3.1, algorithm 4). */
 #include "core/strict_fp.h"
 
