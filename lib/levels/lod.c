@@ -576,9 +576,9 @@ static ebpo_status add_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cel
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent);
 
-/* Returns true for a pruned node (whose children are not in the file). Its envelope then represents
- * it at all deeper levels. `level` must be above the target level. `gray` is the node's rank among
- * the gray nodes of its level. */
+/* Returns true for a pruned node (whose children are not in the file). Its envelope
+ * represents it at all deeper levels. Always false at the target level. `gray` is the node's rank
+ * among the gray nodes of `level`. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;

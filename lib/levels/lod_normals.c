@@ -43,7 +43,7 @@ typedef struct lighting {
     const ebpo_lod_nodes *nodes;
     polygon *polygons;             /* [polygon_count] */
     uint32_t (*corner_of_node)[8]; /* [node_count] index of each corner of the node's cell */
-    double (*sum)[4]; /* [corner_count] in the current pass: sum of area vectors, of lengths */
+    double (*sum)[4]; /* [corner_count] current pass: 0 to 2: sum of area vectors; 3: of lengths */
     uint64_t *keys;   /* [corner_count] positions (position_key) */
     uint64_t corner_count, key_capacity;
 } lighting;

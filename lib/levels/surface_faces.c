@@ -21,12 +21,12 @@
 
 #define NONE UINT32_MAX
 
-static const double LEAST_COSINE = 0.766; /* of 40 degrees */
+static const double LEAST_COSINE = 0.766; /* cosine of 40 degrees */
 
 typedef struct faces_reader {
     ebpo_chunks *chunks;
     ebpo_patch *out;     /* the faces as a patch */
-    uint64_t count;      /* of faces */
+    uint64_t count;      /* number of faces */
     uint32_t *face;      /* [count] indices of the faces in the file */
     uint32_t *corner;    /* [count][3] indices in the file of the faces' vertices */
     uint32_t *vertex;    /* [out->vertex_count] index in the file of each shared vertex */

@@ -3,10 +3,11 @@
  *
  * On its border, a patch has at most one vertex in each "border cell". The border cells are the
  * cells EBPO_PATCH_CELLS levels below the patch's node. Patches are joined from coarse to fine.
- * A vertex on the border of a finer patch is replaced by the vertex of the coarsest border cell
- * that contains it, among the border cells in which a patch has a vertex. Each vertex of the model
- * on the border is in such a border cell, so both sides of a border get the same vertices. Vertices
- * of the model's faces are replaced in the same way. Source: format-spec/surface.md. */
+ * For a vertex on the border of a finer patch, the border cells that contain this vertex are
+ * searched, coarse to fine; the vertex of the first cell that has one replaces it. Each vertex of
+ * the model on the border is in a border cell with a vertex, so both sides of a border get the same
+ * vertices. Vertices of the model's faces are replaced in the same way. Source:
+ * format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -67,8 +68,8 @@ static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return to;
 }
 
-/* Returns the vertex of the coarsest border cell that contains the point and has a vertex, among
- * border cells of patches of level 0 to `levels` - 1. Returns NONE if there is none. */
+/* Searches the border cells that contain the point, for patches of level 0 to `levels` - 1, coarse
+ * to fine. Returns the vertex of the first cell that has one, or NONE. */
 static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
 {
     for (int level = 0; level < levels; level++) {
@@ -147,7 +148,7 @@ static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
         ebpo_patch_mark_border(patch.triangles, patch.triangle_count, patch.vertex_count, border))
         add_patch(j, &patch, border, mesh_vertex);
     else
-        status = ebpo_fail_memory(error, patch.vertex_count * 16); /* with the borders' edges */
+        status = ebpo_fail_memory(error, patch.vertex_count * 16); /* about, with marking borders */
     free(border);
     free(mesh_vertex);
     ebpo_patch_free(&patch);

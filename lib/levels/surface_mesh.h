@@ -13,13 +13,13 @@ typedef struct ebpo_patch_reader {
     ebpo_status (*read)(const void *user, uint64_t patch, ebpo_patch *out, ebpo_error *error);
     const void *user;    /* argument of `read` */
     const uint64_t *row; /* [count][EBPO_PATCH_COLUMNS] row of each patch in the table of patches */
-    uint64_t count;      /* of all patches */
+    uint64_t count;      /* number of all patches */
     bool coloured;       /* patches have colours */
 } ebpo_patch_reader;
 
-/* Joins patches as ebpo_surface_join does. `patches`: [count] ascending indices. `faces`: faces of
- * the model that replace patches which are not in `patches`, or NULL; faces->level and the position
- * of this patch are ignored. */
+/* Joins patches as ebpo_surface_join does. `patches`: [count] ascending indices. `faces`: the
+ * model's faces that replace patches not in `patches`, stored like one patch (whose level and
+ * position are ignored), or NULL. */
 EBPO_MUST_USE ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader,
                                             const uint64_t *patches, uint64_t count,
                                             const ebpo_patch *faces, ebpo_surface_mesh *out,

@@ -26,8 +26,8 @@
 
 /* --- the observer --- */
 
-/* A bound, with a large margin, of the relative rounding error of a sum of three products. Within
- * this error, a cell counts as visible. */
+/* A bound, with a large margin, of the relative rounding error of a sum of three products. A
+ * cell that is outside by less than this error counts as visible. */
 static const double SLACK = 1e-12;
 
 /* Scales a vector of any length to length 1; returns false for (0, 0, 0). */

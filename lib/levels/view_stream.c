@@ -46,8 +46,8 @@ typedef struct view_group {
     uint64_t parent;
 } view_group;
 
-/* A function that returns the first level below a node (given by its octcode) that the view will
- * not visit soon. */
+/* A function that returns, for a node (given by its octcode), the first level at which the view
+ * will not visit the node's descendants soon. */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
@@ -71,7 +71,7 @@ struct ebpo_view_stream {
     ebpo_envelope_stack *envelopes; /* NULL if no polygons are requested */
     ebpo_node_buffers buffers;      /* arrays of the last returned node */
     view_leaves *leaves;            /* NULL if no faces are requested */
-    /* nodes below soon_level, or smaller than soon_pixels pixels, are not prefetched yet */
+    /* nodes deeper than soon_level, or smaller than soon_pixels pixels, are not prefetched yet */
     int soon_level;
     double soon_pixels;
     ebpo_patch_table patches; /* read by ebpo_view_stream_surface */
@@ -359,7 +359,7 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
 
 /* --- fetching --- */
 
-/* Collects the missing chunks of the group in `keys`, and returns their number. If all of these
+/* Collects in `keys` the missing chunks of the group, and returns their number. If all of these
  * chunks were prefetched with an earlier batch, collects nothing else: so the view uses the chunks
  * of one batch before it requests the next batch. Otherwise also collects the missing chunks of the
  * groups that follow. */
@@ -416,8 +416,8 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
     return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
 }
 
-/* Fetches the missing chunks of a remote file that have the `wanted` data (EBPO_GROUP_...) of the
- * group and, with `faces`, the faces of its leaves. Also prefetches the chunks of the groups that
+/* For a remote file. Fetches the missing chunks of the group's `wanted` data (EBPO_GROUP_...) and,
+ * with `faces`, of the faces of the group's leaves. Also prefetches the chunks of the groups that
  * follow. If the file has a table of subtrees, prefetches all chunks of the groups' subtrees. When
  * the limit of bytes is exceeded, returns EBPO_E_LIMIT as ebpo_group_read does. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
@@ -824,7 +824,7 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
         (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
 }
 
-/* Adds a gray node of the cut to the greatest size in pixels and the number of waiting nodes. */
+/* Includes a gray node of the cut in out->pixels and out->waiting. */
 static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
