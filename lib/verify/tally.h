@@ -33,8 +33,8 @@ typedef struct ebpo_tally {
     uint64_t checks[EBPO_VERIFY_KINDS], violations[EBPO_VERIFY_KINDS];
     ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* positions of the violations in `first` */
     char first[EBPO_VERIFY_KINDS][240];         /* texts of the first violations */
-    /* number of listed faces that do not touch their leaf; the format allows them if they are near
-     */
+    /* number of listed faces that do not touch the leaf; the format allows this if they are near
+     * the leaf */
     uint64_t spare_entries;
     uint64_t exact_touches, exact_half_spaces; /* numbers of tests in rational arithmetic */
 } ebpo_tally;

@@ -40,7 +40,7 @@ enum { NODES_A_TIME = 128 };
 
 /* Sums over the corners of faces. */
 typedef struct colour_sums {
-    ebpo_wide of[4]; /* weight times red, green and blue; weight */
+    ebpo_wide of[4]; /* 0 to 2: weight times red, green, blue; 3: weight */
 } colour_sums;
 
 /* The check of all colours. */
@@ -61,8 +61,8 @@ static void add_corner(uint64_t weight, const uint8_t *rgba, colour_sums *sum)
     sum->of[3] = ebpo_wide_plus(sum->of[3], (ebpo_wide){ 0, weight });
 }
 
-/* Adds a face with the weight 1 + 2^32 times its doubled area, relative to the squared longest
- * side. */
+/* Adds a face. Its weight is 1 + floor(2^32 A / L^2), where A is twice the face's area, and L the
+ * longest side of the root cell. */
 static void add_face(const colour_check *j, uint64_t face, colour_sums *sum)
 {
     const ebpo_mesh *mesh = &j->view->tree->mesh;

@@ -82,7 +82,7 @@ typedef struct cap_list {
     uint32_t *corner; /* [count][3] indices of points of the loops */
     uint64_t count, capacity;
     double area;    /* sum of the areas of all caps */
-    bool no_memory; /* caps are missing */
+    bool no_memory; /* true: out of memory, so caps are missing */
 } cap_list;
 
 static double area_of(const double *a, const double *b, const double *c)
@@ -177,7 +177,7 @@ ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_points *points,
                            .faces = caps.corner };
         status = ebpo_rays_follow(points, &mesh, &view->box, threads, progress, error);
         for (uint64_t i = 0; i < points->count && status == EBPO_OK; i++)
-            points->point[i].stored -= points->point[i].found; /* now of the surface alone */
+            points->point[i].stored -= points->point[i].found; /* now without the caps */
     }
     free(caps.corner);
     return status;

@@ -189,8 +189,8 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
 
 /* --- selection of the cells to check by rays --- */
 
-/* By default, all cells are checked if there are at most CELLS_ALL; with more cells, SAMPLES_MANY
- * cells. If the checks of this number of cells would take too long, SAMPLES_LEAST cells. */
+/* By default, all cells are checked if there are at most CELLS_ALL, otherwise SAMPLES_MANY cells.
+ * If checking this number of cells would take too long, SAMPLES_LEAST cells are checked. */
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
 /* Number of tests of a face against a point that takes too long: some seconds. */
 static const double ray_work_affordable = 4e8;
@@ -260,7 +260,7 @@ static const struct {
 } edge_tree[7] = { { 0, 1, 0 }, { 0, 2, 1 }, { 0, 4, 2 }, { 2, 3, 0 },
                    { 4, 5, 0 }, { 4, 6, 1 }, { 6, 7, 0 } };
 
-/* Adds the changes of the winding number along the seven edges that one face causes. */
+/* Adds the changes that a face causes to the winding number along the seven edges. */
 static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo_corners *face)
 {
     for (int e = 0; e < 7; e++) {

@@ -117,7 +117,7 @@ static void count_faces(recount *c, uint64_t count)
     const ebpo_mesh *mesh = &c->view->tree->mesh;
     uint64_t used = c->vertices;
     EBPO_FOR_ITEMS(c->view->workspace, i, 3 * c->faces, 3 * (c->faces + count))
-        used += mesh->faces[i] == used; /* a vertex of first use has the next index */
+        used += mesh->faces[i] == used; /* a vertex used for the first time has the next index */
     c->row[c->within ? FACES : FACES_BEFORE] += count;
     c->row[c->within ? VERTICES : VERTICES_BEFORE] += used - c->vertices;
     c->faces += count;

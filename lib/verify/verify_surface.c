@@ -172,7 +172,7 @@ static void free_grid(triangle_grid *g)
     ebpo_array_free(g->workspace, g->triangle);
 }
 
-/* Sorts the triangles into a grid. Returns false when memory is short. */
+/* Sorts the triangles into a grid. Returns false when out of memory. */
 static bool make_grid(triangle_grid *g, const triangle_list *list, ebpo_workspace *workspace)
 {
     int from[3], to[3];

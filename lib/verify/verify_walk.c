@@ -42,7 +42,7 @@ typedef struct worker {
     face_stack stack;
     ebpo_node_planes planes;
     ebpo_ray_points points;
-    uint64_t visited; /* number of faces since the last release of pages */
+    uint64_t visited; /* faces visited since pages were released; a node counts 64 more */
 } worker;
 
 /* A node of the upper part of the tree, which is visited by all threads, or the root of a subtree.
@@ -132,7 +132,7 @@ static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *
             ebpo_check_face_contained(&self->tally, &self->planes, node, &f->self, &face, faces[i]);
         octants[i] = (uint8_t)touched_octants(f, &face, &self->tally);
     }
-    /* pages of the workspace are used for each visited face, and a few for each node */
+    /* each visited face uses pages of the workspace; a node uses about as many as 64 faces */
     if ((self->visited += count + 64) >= 1 << 15) {
         self->visited = 0;
         ebpo_release_pages(w->options->workspace);
@@ -208,7 +208,7 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_referen
     return EBPO_OK;
 }
 
-/* Makes space for `need` faces. Returns false when memory is short. */
+/* Makes space for `need` faces. Returns false when out of memory. */
 static bool stack_reserve(face_stack *s, uint64_t need)
 {
     if (need <= s->capacity)
@@ -352,7 +352,7 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Visits a subtree. The faces of a root that is a leaf may be very many; they are not copied to the
+/* Visits a subtree. If its root is a leaf, it may have very many faces; these are not copied to the
  * stack. */
 static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
 {
