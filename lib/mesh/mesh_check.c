@@ -96,8 +96,8 @@ static bool surely_nonzero(double a, double b, double c, double d)
     return permanent > 1e-280 && permanent < 1e300 && fabs(a * d - b * c) > 1e-15 * permanent;
 }
 
-/* Returns true if a face has no area: if no component of its normal is certainly nonzero, by an
- * exact test. */
+/* Returns true if a face has no area. The result is exact: ebpo_zero_area decides when rounded
+ * arithmetic finds no component of the normal that is certainly nonzero. */
 static bool zero_area(const double a[3], const double b[3], const double c[3])
 {
     double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };

@@ -37,7 +37,7 @@ static void *hash_file(void *argument)
     return NULL;
 }
 
-/* Starts a thread that hashes the file while this thread parses the file. Hashing and parsing take
+/* Starts a thread that hashes the file while the calling thread parses it. Hashing and parsing take
  * about the same time and read the same pages. */
 static void hash_begin(hashing *h)
 {

@@ -237,9 +237,9 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
 
 /* --- remaining vertices --- */
 
-/* Chooses the vertex of each group that is first in the source. Groups are numbered in the order of
- * their first vertices, so the first vertex of a group is the first one whose new index is
- * group_count. */
+/* Chooses, for each group, the vertex that is first in the source. Groups are numbered in the order
+ * of their first vertices. So a new index equal to group_count, the number of groups so far, begins
+ * the next group. */
 static ebpo_status choose_remaining(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;

@@ -72,8 +72,8 @@ struct orienting {
     ebpo_star *star;         /* one for each thread */
     ebpo_edge_faces *around; /* one for each thread: the faces around a crowded edge */
     bool crowded;            /* the mesh has crowded edges */
-    /* [face_count] disjoint sets of faces: index << 1 of a lower face of the patch or of the face
-     * itself, plus 1 if the two faces run against each other */
+    /* [face_count] disjoint sets of faces: twice the index of a lower face of the patch, or of the
+     * face itself, plus 1 if the two faces run against each other */
     uint64_t *above;
     uint8_t *flags; /* [face_count] */
     patch *patches; /* the patches with faces to turn, sorted by root */
@@ -104,7 +104,7 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
 
 /* Joins the patches of faces a and b. turned: 1 if a runs against b, else 0. Links the higher root
  * to the lower root, so the roots do not depend on the order of calls. Returns false if the faces
- * are already in one patch, in which `turned` is wrong. */
+ * are already in one patch and `turned` contradicts their orientations in it. */
 static bool join_patches(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {

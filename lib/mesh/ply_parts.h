@@ -150,8 +150,8 @@ ebpo_status ebpo_ply_fail_stopped(const ebpo_ply_parser *p);
 /* Creates arrays for the header's properties, with space for the declared rows. The functions of
  * this section do nothing if attributes are not read (ebpo_ply_parser.lost is NULL). */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_plan(ebpo_ply_parser *p);
-/* Moves the values into the mesh after the last row. Keeps the header when it has information that
- * the mesh lacks. */
+/* Call this function after the last row: it moves the values into the mesh. Keeps the header if it
+ * has information that the mesh lacks. */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p);
 
 /* Reserves space for a total of `faces` faces. */
