@@ -5,9 +5,9 @@
  * group of eight children. No data is stored for each face: the weight of a face is computed again
  * for each leaf that lists the face, because most faces are in one leaf only. Weights and sums are
  * integers, so the result is exact and does not depend on the number of threads. The colour of a
- * face is the mean of its vertices' colours; if vertices have no colours, or all have the same
- * colour, it is the face's own colour, if faces have colours. lib/verify computes the same colours
- * with separate code. */
+ * face is the mean of its vertices' colours. The face's own colour is used, if faces have colours,
+ * when vertices have none or all have the same one. lib/verify computes the same colours with
+ * separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -2,11 +2,11 @@
  *
  * The quadric of a vertex is a function of a position: the sum of the squared distances from the
  * planes of the vertex's triangles, weighted by area. A collapse moves a vertex onto a neighbour
- * and removes the triangles that have both; its cost is mainly the sum of the quadrics of both
- * vertices at the neighbour's position. An edge with one triangle adds a plane that contains the
- * edge and is perpendicular to the triangle, which keeps open borders in place. A corner is one of
- * the three uses of a vertex by a triangle: corner c is entry c of the array `triangle`. The
- * corners of each vertex are a circular list, and a collapse joins two lists. */
+ * and removes the triangles that have both vertices. Its cost is mainly the sum of the quadrics of
+ * the two vertices at the neighbour's position. An edge with one triangle adds a plane that
+ * contains the edge and is perpendicular to the triangle, which keeps open borders in place. A
+ * corner is one of the three uses of a vertex by a triangle: corner c is entry c of the array
+ * `triangle`. The corners of each vertex are a circular list, and a collapse joins two lists. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -43,8 +43,8 @@ typedef struct simplifier {
     quadric *sum;      /* [vertices] */
     uint32_t *next;    /* [3 * triangles] next corner of the same vertex */
     uint32_t *head;    /* [vertices] a corner of the vertex's list; NONE: it has no list */
-    uint32_t *corners; /* [vertices] number of corners in the list, or more; corners of removed
-                        * triangles do not count */
+    uint32_t *corners; /* [vertices] upper bound of the number of corners in the list that are
+                        * of remaining triangles */
     uint32_t *age;     /* [vertices] number of collapses that changed the vertex */
     uint32_t *mark;    /* [vertices] last mark that was set */
     uint32_t marks;    /* number of marks so far; a new number makes all vertices unmarked */
@@ -277,8 +277,8 @@ static bool stays_unflipped(const simplifier *s, const uint32_t t[3], uint32_t f
     return !(ebpo_vec3_dot(before, before) > 0) || dot > LEAST_COSINE * sqrt(square);
 }
 
-/* Returns true if a collapse does not change the topology (each vertex that is a neighbour of both
- * ends is a vertex of a triangle that has both ends) and flips no triangle. */
+/* Returns true if a collapse flips no triangle and does not change the topology: each common
+ * neighbour of both ends is a vertex of a triangle that has both ends. */
 static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
 {
     /* number of triangles that have both ends; number of common neighbours of both ends */

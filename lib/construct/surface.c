@@ -7,10 +7,11 @@
  * triangles as the faces or patches that it is made from.
  *
  * A vertex is on the border of a patch if faces outside the patch use it too. Each border vertex is
- * replaced by the vertex of the cell that contains it, EBPO_PATCH_CELLS levels below the node. The
- * vertex of a cell is at the mean of the model's vertices that are in the cell and on borders at
- * the node's level. This mean depends on the model only, so neighbouring patches have the same
- * vertex. Vertices on borders do not move when a patch is simplified.
+ * replaced by the vertex of its cell: of the cells EBPO_PATCH_CELLS levels below the node, the cell
+ * that contains the border vertex. The vertex of a cell is at the mean of the model's vertices that
+ * are in the cell and on borders at the node's level. This mean depends on the model only, so
+ * neighbouring patches have the same vertex. Vertices on borders do not move when a patch is
+ * simplified.
  *
  * The error of a patch is the distance between the patch and the surface it is made from, in both
  * directions, plus the greatest error of that surface. Nodes with at most TASK_FACES faces, and all
