@@ -47,7 +47,7 @@ typedef struct view_group {
 } view_group;
 
 /* A function that returns, for a node (given by its octcode), the first level at which the view
- * will not visit the node's descendants soon. */
+ * will refine no descendant of the node soon. */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;

@@ -7,7 +7,7 @@
  * The order of the checks:
  * 1. chunk directory and chunk checksums (verify_chunks.c)
  * 2. content checksum
- * 3. consistency of the arrays; the checks in line 4 require it
+ * 3. consistency of the arrays; the checks of item 4 require it
  * 4. structure, nesting, colours, the walk (containment, lists, labels), subtrees, chunks of faces
  * 5. source mesh
  * 6. unused bytes

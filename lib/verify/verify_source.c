@@ -156,8 +156,8 @@ static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_
 }
 
 /* Compares row i of the file's array with row source_row[i] of the source's array, or with row i if
- * `source_row` is NULL. Skips faces that repairs have added: their source indices are source->rows
- * and more. */
+ * `source_row` is NULL. Skips faces that repairs have added: their source indices are at
+ * least source->rows. */
 static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
                          const ebpo_attribute *stored, const uint32_t *source_row,
                          ebpo_workspace *workspace)

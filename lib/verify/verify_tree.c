@@ -204,7 +204,7 @@ enum {
     POINT_BITS = 16        /* coordinates of points are in units of 2^-POINT_BITS of the cell */
 };
 
-/* Checks that the plane codes of the level's nodes of a type are valid. */
+/* Checks that the plane codes of all nodes of one type in a level are valid. */
 static void check_codes(ebpo_tally *tally, const ebpo_reference_tree *view, int l,
                         ebpo_node_type type, const uint8_t *counts)
 {
@@ -487,8 +487,8 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         ok &= CHECK(
             leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
             "level %d, leaf %" PRIu64
-            ": its list exceeds the faces, or its references are not ascending below its first "
-            "new face",
+            ": it lists faces that the mesh lacks, or its references are not ascending and below "
+            "its first new face",
             l, leaf);
         refs += level->leaf_ref_count[leaf];
     }

@@ -464,7 +464,7 @@ START_TEST(test_verify_detects_inconsistent_arrays)
     build("sphere", 8, EBPO_RULE_NONZERO);
     position leaf = find_from(0, EBPO_LEAF);
     tree.level[leaf.level].leaf_first[0] = UINT64_MAX - 1;
-    expect_caught(EBPO_VERIFY_STRUCTURE, "its list exceeds the faces");
+    expect_caught(EBPO_VERIFY_STRUCTURE, "it lists faces that the mesh lacks");
     build("sphere", 8, EBPO_RULE_NONZERO);
     position gray = find_from(1, EBPO_GRAY);
     set_type(gray.level, gray.group, gray.octant, EBPO_WHITE);
