@@ -410,7 +410,7 @@ static ebpo_status cast_all_rays(ebpo_nesting *n, ebpo_error *error)
 /* --- closed components, and the number of hosts that contain each component --- */
 
 enum {
-    CROWD = 8, /* a host is crowded if it has more than this number of probes a face */
+    CROWD = 8, /* a host is crowded if it has more than this number of probes for each face */
     SHELL_NESTING_GRAIN = 64 /* number of shells for each call of a thread's function */
 };
 

@@ -376,7 +376,7 @@ typedef struct stl_text {
     uint64_t line;
     uint64_t loops, corners; /* number of loops so far, and of corners of the current loop */
     uint64_t next_release;   /* offset at which pages are released again */
-    uint64_t solids;         /* solids that have facets */
+    uint64_t solids;         /* number of solids that have facets */
     bool begun;              /* a solid has begun and has no facets so far */
     /* number of unexpected words, and the line of the first one */
     uint64_t odd, odd_line;

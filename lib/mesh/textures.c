@@ -261,7 +261,7 @@ static bool has_name(const numbered *n, words name)
 }
 
 /* Parses one line of an image's uses, such as "map_Kd red". Returns true if the kept faces use the
- * image in this way, or if faces do not refer to such names. */
+ * image in this way, or if no attribute of faces refers to names of this kind. */
 static bool is_named(const naming *n, words file, words use)
 {
     words word = first_word(&use);
