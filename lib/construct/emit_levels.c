@@ -316,8 +316,8 @@ static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, i
     return type;
 }
 
-/* Appends the stretches of the pieces below a node to the list, and stretches with the nodes of the
- * top between them. Returns false when out of memory. */
+/* Appends to the list the stretches below a node: those of its pieces and, between them, stretches
+ * with the nodes of the top. Returns false when out of memory. */
 static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
 {
     ebpo_builder *b = j->b;

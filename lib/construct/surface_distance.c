@@ -252,9 +252,9 @@ static void bound_polygon(bounding *b, const polygon *p, int depth)
 
 /* Cuts triangle p by the sides of the prism over triangle `near`: the three planes that contain its
  * edges and are perpendicular to it. The part inside the prism is bounded by the distances of its
- * corners from `near`, and the parts outside as further triangles. Returns false and changes
- * nothing if the centre of p is outside the prism, as the part inside could be empty, or if a
- * corner of the part inside is too far from `near`. */
+ * corners from `near`. The parts outside are bounded as further triangles. Returns false and
+ * changes nothing if the centre of p is outside the prism (then the part inside may be empty), or
+ * if a corner of the part inside is too far from `near`. */
 static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], uint64_t near,
                            int depth)
 {
