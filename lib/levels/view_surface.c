@@ -24,7 +24,7 @@ typedef struct choosing {
     const ebpo_view_options *options;
     const ebpo_info *info;
     ebpo_box box;
-    ebpo_frontier frontier; /* (view_cut.h) patches so far; child_group is the patch's index */
+    ebpo_frontier frontier; /* (view_cut.h) patches to draw so far; child_group: index of a patch */
     ebpo_chunk_keys *keys;  /* missing chunks of the patches so far; NULL: no limit of bytes */
     uint64_t *chosen;       /* [chosen_count] patches that are drawn */
     uint64_t *replaced; /* [replaced_count] patches whose faces are drawn, greatest error first */

@@ -177,7 +177,7 @@ ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, con
 static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count)
 {
     columns c = grid_for(mesh, box, count);
-    uint64_t covered = 0; /* sum over all faces of the number of their columns */
+    uint64_t covered = 0; /* number of columns of each face, added up over all faces */
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
         ebpo_corners face;
         ebpo_face_corners(mesh, f, &face);
@@ -190,7 +190,7 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
 /* --- selection of the cells to check by rays --- */
 
 /* By default, all cells are checked if there are at most CELLS_ALL, otherwise SAMPLES_MANY cells.
- * If checking this number of cells would take too long, SAMPLES_LEAST cells are checked. */
+ * If checking so many cells would take too long, SAMPLES_LEAST cells are checked. */
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
 /* Number of tests of a face against a point that takes too long: some seconds. */
 static const double ray_work_affordable = 4e8;
