@@ -119,7 +119,7 @@ bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsi
         for (int k = 0; k < 3; k++)
             given->corner[given->corner_count][k] = (child->corner[i][k] + (octant >> k & 1)) / 2;
     for (uint64_t i = 0; i < child->offer_count; i++) {
-        int32_t n[3], d, shift = 0; /* shift: n . x, x: octant's lowest corner in child cells */
+        int32_t n[3], d, shift = 0; /* shift: n . (octant's lowest corner in child cells) */
         ebpo_plane_code_decode(child->offers[i].normal, n, &d);
         for (int k = 0; k < 3; k++)
             shift += octant >> k & 1 ? n[k] : 0;

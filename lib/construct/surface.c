@@ -866,7 +866,7 @@ ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads, const ebpo_pro
     const ebpo_attributes *attributes = tree->mesh.attributes;
     ebpo_status status = EBPO_OK;
     frexp(ebpo_patch_error_step(&tree->info), &b.exponent);
-    b.exponent += 31; /* longest side: 2^32 steps of the error, scaled 1 to 2 */
+    b.exponent += 31; /* the longest side, 2^32 steps of the error, becomes 1 to 2 */
     for (int k = 0; k < 3; k++)
         b.size[k] = ldexp(b.box.size[k], -b.exponent);
     b.threads = ebpo_thread_count(threads);

@@ -148,7 +148,7 @@ static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
         ebpo_patch_mark_border(patch.triangles, patch.triangle_count, patch.vertex_count, border))
         add_patch(j, &patch, border, mesh_vertex);
     else
-        status = ebpo_fail_memory(error, patch.vertex_count * 16); /* about, with marking borders */
+        status = ebpo_fail_memory(error, patch.vertex_count * 16); /* approximate bytes */
     free(border);
     free(mesh_vertex);
     ebpo_patch_free(&patch);

@@ -83,7 +83,7 @@ static void build_node(const ebpo_box_tree *tree, uint64_t node, ebpo_tree_point
 
 static bool build_nodes(ebpo_box_tree *tree)
 {
-    uint64_t nodes = 1; /* if all leaves are as deep as the deepest one */
+    uint64_t nodes = 1; /* number of nodes if all leaves are as deep as the deepest one */
     for (uint64_t most = tree->count; most > EBPO_BOX_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
