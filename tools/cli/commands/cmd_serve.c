@@ -137,12 +137,11 @@ static void find_viewer(const site *s, char out[PATH_MAX])
         return;
     }
     for (size_t i = sizeof places / sizeof *places; i-- > 0;) {
-        char index[2 * PATH_MAX + 16];
+        char index[PATH_MAX + 16];
         int folder = places[i][0] == '/' ? 0 : (int)(strrchr(program, '/') - program + 1);
-        int n = snprintf(index, sizeof index, "%.*s%s", folder, program, places[i]);
-        snprintf(out, PATH_MAX, "%s", index);
-        snprintf(index + n, sizeof index - (size_t)n, "/index.html");
-        if (access(index, R_OK) == 0)
+        int length = snprintf(out, PATH_MAX, "%.*s%s", folder, program, places[i]);
+        snprintf(index, sizeof index, "%s/index.html", out);
+        if (length < PATH_MAX && access(index, R_OK) == 0)
             return;
     }
 }
