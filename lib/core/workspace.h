@@ -32,7 +32,7 @@ uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
 void ebpo_release_pages(ebpo_workspace *workspace);
 
 /* Numbers of items between two calls of ebpo_release_pages. EBPO_ITEMS_IN_ORDER: for arrays that
- * are visited in order. EBPO_ITEMS_SCATTERED: for loops of which each item may bring 16 pages into
+ * are visited in order. EBPO_ITEMS_SCATTERED: for loops in which an item may bring 16 pages into
  * memory. */
 enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 

@@ -116,8 +116,8 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
             keep_child(k, s, &top->bound.child[lane]);
 }
 
-/* Of the children that have owned faces and whose nodes are not in the skeleton, finds the largest
- * child, and adds its node, which improves the bounds most. Returns false if there is none.
+/* Finds the largest child that has owned faces and whose node is not in the skeleton, and adds its
+ * node, which improves the bounds most. Returns false if there is none.
  * `shared_end`: index of the first node after the nodes of shared faces. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t shared_end)
 {

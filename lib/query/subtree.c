@@ -542,7 +542,7 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
 {
     const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
     ebpo_octcode found = ebpo_cursor_octcode(c);
-    /* Whether the node is pruned is known only after its children have been requested. */
+    /* A request for its children shows if the node is pruned. */
     ebpo_status status = ebpo_cursor_children(c, &child, error);
     if (status != EBPO_OK)
         return status;
