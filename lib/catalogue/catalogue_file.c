@@ -5,8 +5,9 @@
  * corners of three finite numbers each, with min not above max. When a model is opened,
  * open_models.c compares the digest and the box with the model. Unknown members are ignored.
  *
- * Entries have the paths by which files are opened: relative paths in a catalogue file are relative
- * to the folder of this file. A catalogue is immutable, and any number of threads may use it.
+ * The paths in entries are already joined with their base folder. For a catalogue file, the base
+ * folder is the folder of this file. A catalogue is immutable, and any number of threads may use
+ * it.
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -144,8 +145,10 @@ static const char *fault_of_entry(const ebpo_catalogue_entry *e)
 {
     if (!e->path || !*e->path)
         return "has no path";
-    if (e->surface && (!*e->surface || e->only_caps))
-        return "has a path of a surface that is empty or contradicts `only_caps`";
+    if (e->surface && !*e->surface)
+        return "has an empty path in `surface`";
+    if (e->surface && e->only_caps)
+        return "has a `surface`, although `only_caps` is true";
     if (e->numbers && !*e->numbers)
         return "has an empty path of face indices";
     if ((unsigned)e->rule >= RULES)

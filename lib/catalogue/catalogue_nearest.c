@@ -2,15 +2,16 @@
  *
  * For a point, the models are queried in the order of the distances of their boxes from the point,
  * until no other box may contain a face that is nearer than the nearest face so far. Many points
- * are processed together: in each step, the next model of each point is queried, and a model is
- * queried once for all points whose next model it is. If several models have the same rounded
- * distance, the result is from the first of these models in the catalogue, independent of the order
- * of queries. So a box is skipped only if its distance exceeds the nearest distance by more than
- * the rounding error (catalogue_boxes.c).
+ * are processed together: in each step, the points are grouped by their next model, and each
+ * of these models is queried once, with all points of its group. If several models have the same
+ * rounded distance, the result is from the first of these models in the catalogue, independent of
+ * the order of queries. So a box is skipped only if its distance exceeds the nearest distance by
+ * more than the rounding error (catalogue_boxes.c).
  *
  * For a ray, the models whose boxes the ray may intersect are queried in the order of the
- * catalogue, each only up to the nearest hit so far. If t overflows for several hits, their t along
- * a ray with a longer direction decide which hit is first; the direction is scaled exactly. */
+ * catalogue, each only up to the nearest hit so far. If t overflows for several hits, t is
+ * computed again with the direction multiplied by a power of two, which is exact. The hit with the
+ * smallest new t is first. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -113,8 +114,8 @@ static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *ne
     return status;
 }
 
-/* Processes points from *at on, until they have EBPO_CATALOGUE_PAIRS boxes. Sets *at to the first
- * point that is not processed. */
+/* Processes points from *at on, until they have EBPO_CATALOGUE_PAIRS or more boxes together. Sets
+ * *at to the first point that is not processed. */
 static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *next_box,
                               ebpo_error *error)
 {

@@ -1,5 +1,6 @@
-/* Computes winding numbers at the corners of cells. A corner's winding number decides whether the
- * corner is inside the solid; so does the winding number of a cell without faces.
+/* Computes winding numbers at the corners of cells. The winding number of a corner decides
+ * whether the corner is inside the solid. The winding number of a cell without faces decides this
+ * for the whole cell.
  *
  * In one cell, the winding number at a corner is the one at another corner plus the signed
  * crossings of faces along the cell's edges between them. All corners are shifted by the same

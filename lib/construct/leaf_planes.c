@@ -27,8 +27,8 @@ typedef struct leaf_points {
     double at[LEAF_POINTS][3];
     double slack[LEAF_POINTS]; /* upper bounds of the rounding errors of a point's coordinates */
     int count;
-    /* hash table, since most corners of faces occur several times: 1 + index of the point; 0: empty
-     * slot */
+    /* Hash table of the points, because most corners of faces occur several times. A slot has 1 +
+     * the index of a point, or 0 if it is empty. */
     uint8_t table[LEAF_TABLE];
 } leaf_points;
 

@@ -34,10 +34,11 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return greatest;
 }
 
-/* Returns the slack: the bound of the rounding error of a coordinate. `greatest`: result of
- * to_cell, M below. With u = 2^-53, the errors are 2.01 u M from to_cell and at most 8 u M for each
- * of six clips; 128 u M is more than their sum. The slack is the same for all faces with
- * coordinates up to 2, so that a common point of two faces is computed identically from both. */
+/* Returns the slack: the bound of the rounding error of a coordinate. `greatest` (M in the
+ * following) is the result of to_cell. With u = 2^-53, the errors are 2.01 u M from to_cell and
+ * at most 8 u M for each of six clips; 128 u M is more than their sum. The slack is the same for
+ * all faces with coordinates up to 2, so that a common point of two faces is computed identically
+ * from both. */
 static double slack_for(double greatest) { return greatest <= 2 ? 0x1p-45 : greatest * 0x1p-46; }
 
 /* Clips a polygon by the half-space of the points with sign * x[axis] <= limit. Returns the number

@@ -18,16 +18,16 @@
 #include "mesh/attributes.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
-    /* The values for a level; the mesh has -1 or 0. */
-    { "octcode", EBPO_H5_I64 }, /* locational code of the node; 0 for the mesh */
-    { "level", EBPO_H5_I32 },   /* level of the node in the octree; -1 for the mesh */
-    { "type", EBPO_H5_I32 },    /* type of the node (ebpo_node_type); -1 for the mesh */
-    { "winding", EBPO_H5_I32 }, /* winding number in a black node's cell, or at a leaf's lowest
-                                   corner; else 0 */
-    { "volume", EBPO_H5_F64 },  /* volume of the envelope; 0 for the mesh */
-    { "source_face",
-      EBPO_H5_I64 },        /* source index of the mesh's face; -1 without maps; level: -1 */
-    { "lod", EBPO_H5_I32 }, /* level of the block; -1 for the mesh */
+    /* Each comment gives the value in a level, and then the value in the mesh. */
+    { "octcode", EBPO_H5_I64 },     /* locational code of the node; 0 for the mesh */
+    { "level", EBPO_H5_I32 },       /* level of the node in the octree; -1 for the mesh */
+    { "type", EBPO_H5_I32 },        /* type of the node (ebpo_node_type); -1 for the mesh */
+    { "winding", EBPO_H5_I32 },     /* winding number in a black node's cell, or at a leaf's lowest
+                                       corner; else 0 */
+    { "volume", EBPO_H5_F64 },      /* volume of the envelope; 0 for the mesh */
+    { "source_face", EBPO_H5_I64 }, /* -1 in a level; in the mesh, the source index of the face, or
+                                       -1 if the file has no maps */
+    { "lod", EBPO_H5_I32 },         /* level of the block; -1 for the mesh */
 };
 
 int ebpo_block_count(const ebpo_export_options *o)
@@ -259,7 +259,7 @@ void ebpo_choose_origin(const ebpo_info *info, double origin[3])
     }
 }
 
-/* Records in the report if the block's colours are written. */
+/* Records in the report whether the format stores the block's colours or omits them. */
 static void report_colours(const ebpo_export_job *job, const ebpo_colours *colours)
 {
     if (colours->vertex)
@@ -303,10 +303,10 @@ ebpo_status ebpo_export_check_assimp(const char *path, uint64_t vertices, uint64
 {
     if (vertices <= UINT32_MAX && faces <= UINT32_MAX / 3)
         return EBPO_OK;
-    return ebpo_fail_file(
-        error, EBPO_E_LIMIT, path,
-        "would have %" PRIu64 " vertices and %" PRIu64
-        " triangles, which are more corners than assimp supports; choose another format, or a "
-        "coarser level",
-        vertices, faces);
+    return ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                          "would have %" PRIu64 " vertices and %" PRIu64
+                          " triangles, but assimp supports at most %" PRIu32
+                          " vertices and %" PRIu32
+                          " triangles; choose another format, or a coarser level",
+                          vertices, faces, UINT32_MAX, UINT32_MAX / 3);
 }

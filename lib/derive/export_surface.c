@@ -1,7 +1,8 @@
-/* Exports the simplified surface of a level, or with a number of triangles, as GLB.
+/* Exports the simplified surface as GLB: that of a level, or the best one with at most a given
+ * number of triangles.
  *
  * Positions are stored on a grid of 2^16 steps along the root cell. This grid contains the grids of
- * patches of levels 0 to 6, so these are stored exactly. */
+ * patches of levels 0 to 6, so the vertices of these patches are stored exactly. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -19,9 +20,9 @@ enum { GRID_BITS = 16 };
 
 /* The patches of a file, and those to export. */
 typedef struct choice {
-    ebpo_surface table; /* only `patch` and the counts */
-    uint64_t *child;    /* [patch_count + 1] first child of each patch; ascending */
-    uint64_t *patch;    /* [count] ascending */
+    ebpo_surface table; /* only `patch` and the counts are read */
+    uint64_t *child;    /* [patch_count + 1] index of each patch's first child; ascending */
+    uint64_t *patch;    /* [count] indices of the patches to export; ascending */
     uint64_t count;
     int level; /* deepest level of a patch in `patch` */
 } choice;
@@ -36,7 +37,7 @@ static ebpo_octcode octcode_of(const choice *c, uint64_t patch)
     return row_of(c, patch)[EBPO_PATCH_OCTCODE];
 }
 
-/* Finds the children of each patch: patches ascend by octcode, so children do too. */
+/* Finds the first child of each patch. Patches ascend by octcode, so their children do too. */
 static ebpo_status find_children(choice *c, ebpo_error *error)
 {
     uint64_t child = 1;
@@ -60,8 +61,9 @@ static bool is_divided(const choice *c, uint64_t patch)
            ebpo_octcode_parent(octcode_of(c, child)) == octcode_of(c, patch);
 }
 
-/* Chooses the coarsest patches with at most this error, and patches that cannot be replaced.
- * Returns the number of their triangles. `taken`: [patch_count] scratch. */
+/* Chooses the coarsest patches with at most this error. Where no patch has so small an error, the
+ * finest patch is chosen. Returns the number of triangles of the chosen patches. `replaced`:
+ * [patch_count] scratch. */
 static uint64_t choose_by_error(choice *c, uint64_t error, uint8_t *replaced)
 {
     uint64_t triangles = 0;
@@ -87,7 +89,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Chooses the patches with the least error that have at most `most` triangles. */
+/* Chooses patches that have at most `most` triangles together, with the least error. */
 static ebpo_status choose_by_triangles(choice *c, uint64_t most, ebpo_error *error)
 {
     uint64_t count = c->table.patch_count, low = 0, high = count - 1;
@@ -98,9 +100,11 @@ static ebpo_status choose_by_triangles(choice *c, uint64_t most, ebpo_error *err
                              ? EBPO_OK
                              : ebpo_fail_memory(error, count * 2 * sizeof *errors);
     if (status == EBPO_OK && row_of(c, 0)[EBPO_PATCH_TRIANGLES] > most)
-        status = ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "the coarsest surface of this file has %llu triangles",
-                           (unsigned long long)row_of(c, 0)[EBPO_PATCH_TRIANGLES]);
+        status =
+            ebpo_fail(error, EBPO_E_ARGUMENT,
+                      "the coarsest surface of this file has %llu triangles; request at least as "
+                      "many",
+                      (unsigned long long)row_of(c, 0)[EBPO_PATCH_TRIANGLES]);
     if (status == EBPO_OK) {
         for (uint64_t i = 0; i < count; i++)
             errors[i] = row_of(c, i)[EBPO_PATCH_ERROR];
@@ -179,7 +183,7 @@ static ebpo_status export_patches(const ebpo_export_job *job, choice *c, ebpo_pu
         status = choose_patches(c, job->options, error);
     if (status == EBPO_OK && !ebpo_progress_step(&job->options->progress, "exporting", 0, 1, error))
         status = EBPO_E_CANCELLED;
-    if (status == EBPO_OK) /* the patches of levels 0 to c->level are the first ones of the table */
+    if (status == EBPO_OK) /* patches of levels 0 to c->level come first in the table */
         status = ebpo_file_read_surface(job->file, 0, c->level, &surface, error);
     if (status == EBPO_OK)
         status = ebpo_surface_join(&surface, ebpo_file_info(job->file), c->patch, c->count, &mesh,

@@ -1,13 +1,14 @@
 /* Exports the simplified surface, and the model's faces, as 3D Tiles 1.1.
  *
- * Each patch is a tile, whose children are the patches of the node's children. They replace it
- * (REPLACE). A patch without patches below has a child with the faces that it replaces. Tiles are
- * written one after the other, with only the table of patches, and the bounds of the tiles, in
- * memory; then tileset.json. A tile's geometricError is the certified error of its patch, or that
- * of a tile below if it is greater, because readers expect that errors decrease.
+ * Each patch is a tile. The patches of the node's children are the tile's children; viewers replace
+ * the tile by them (REPLACE). If the mesh is exported, a patch without patches below has one child:
+ * a tile with the model's faces that the patch simplifies. Tiles are written one after the other,
+ * and then tileset.json. The table of patches, the bounds of all tiles, and one tile are in memory.
+ * A tile's geometricError is the greatest of the certified errors of this tile and the tiles below,
+ * because readers expect that children have no greater error.
  *
- * Coordinates are relative to an origin, which is the translation of the root tile. glTF has y
- * upwards, and readers of 3D Tiles turn it to z; so the nodes of tiles turn z to y.
+ * Coordinates are relative to an origin, which is the translation of the root tile. In glTF, y
+ * points upwards, and readers of 3D Tiles turn y to z. So the glTF nodes of tiles turn z to y.
  *
  * Source: OGC, "3D Tiles Specification 1.1". */
 #include "core/strict_fp.h"
@@ -37,9 +38,9 @@ static const char TILESET[] = "tileset.json";
 
 /* A tile; all lengths are in the model's unit. */
 typedef struct tile {
-    double min[3], max[3]; /* bounds of the content, then of all tiles below, too */
+    double min[3], max[3]; /* bounds of the content, and (include_children) of the tiles below */
     double error;          /* geometricError */
-    uint64_t number;       /* of its file */
+    uint64_t number;       /* number of the tile's file */
 } tile;
 
 typedef struct tiler {
@@ -51,7 +52,7 @@ typedef struct tiler {
     tile *faces; /* [table.count] tiles of the faces of patches without patches below */
     double origin[3];
     char *folder;   /* temporary name */
-    uint64_t files; /* tiles that may have been written */
+    uint64_t files; /* number of tile files that may exist */
 } tiler;
 
 /* --- tiles --- */
@@ -66,7 +67,7 @@ static ebpo_status name_file(const tiler *t, const char *name, char out[PATH_MAX
                           "the path is too long; write to a folder with a shorter path");
 }
 
-/* Makes a file in the folder. file: set to its descriptor, which the stream closes. */
+/* Makes a file in the folder. Sets *file to the descriptor, which fclose of the result closes. */
 static FILE *begin_file(const tiler *t, const char *name, int *file, ebpo_error *error)
 {
     char path[PATH_MAX];
@@ -81,7 +82,7 @@ static FILE *begin_file(const tiler *t, const char *name, int *file, ebpo_error 
     return f;
 }
 
-/* Closes a file after its data is on the disk. */
+/* Waits until the data of a file is on the disk, and closes the file. */
 static ebpo_status end_file(const tiler *t, FILE *f, int file, ebpo_error *error)
 {
     bool ok = !ferror(f) && fflush(f) == 0 && fsync(file) == 0;
@@ -92,8 +93,8 @@ static ebpo_status end_file(const tiler *t, FILE *f, int file, ebpo_error *error
     return ebpo_fail_errno(error, t->job->path, "could not be written");
 }
 
-/* Writes a tile and sets its bounds. `surface` lacks colours and origin. Adds the greatest move of
- * a vertex to the error of the tile. */
+/* Writes a tile with the geometry and colours of `patch`, and with the grid and name of `surface`.
+ * Sets the bounds of the tile, and adds the greatest rounding error of a vertex to its error. */
 static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_patch *patch,
                               tile *out, ebpo_error *error)
 {
@@ -212,7 +213,7 @@ static void print_tile(FILE *f, const tile *shown)
     for (int k = 0; k < 3; k++)
         size = fmax(size, shown->max[k] - shown->min[k]);
     for (int k = 0; k < 3; k++) {
-        /* not flat, and not too small after rounding to float32 */
+        /* the box is not flat, and is not too small after rounding to float32 */
         double middle = (shown->min[k] + shown->max[k]) / 2,
                half = fmax(shown->max[k] - middle, middle - shown->min[k]);
         box[k] = middle;

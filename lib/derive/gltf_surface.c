@@ -1,7 +1,7 @@
 /* Writes a surface as GLB. Vertices are numbered in the order of their first use, and vertices
- * without triangles are omitted. Each array is a buffer view, which states its decoded place in a
- * second buffer that is not stored. Sources: Khronos, "glTF 2.0 Specification" and the extensions
- * KHR_mesh_quantization and EXT_meshopt_compression. */
+ * without triangles are omitted. Each array is a buffer view. The view also states the place of the
+ * decoded array in a second buffer, which is not stored. Sources: Khronos, "glTF 2.0 Specification"
+ * and the extensions KHR_mesh_quantization and EXT_meshopt_compression. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -29,7 +29,8 @@ typedef struct gltf_array {
     uint64_t count;  /* of elements; 0: the array is absent */
     unsigned stride; /* bytes of an element */
     uint8_t *encoded;
-    uint64_t bytes, first, decoded_first; /* encoded bytes; positions in the two buffers */
+    uint64_t bytes;                /* number of encoded bytes */
+    uint64_t first, decoded_first; /* positions in the two buffers */
 } gltf_array;
 
 typedef struct gltf_writer {
@@ -38,10 +39,10 @@ typedef struct gltf_writer {
     uint32_t *vertex; /* [out->vertices] vertices of the surface in the order of their first use */
     uint32_t *index;  /* [triangle_count][3] positions in `vertex` */
     bool quantized;
-    double step[3], low[3]; /* of the grid; low is relative to the origin */
+    double step[3], low[3]; /* step and low corner of the grid; low is relative to the origin */
     double stored_min[3], stored_max[3];
     gltf_array array[ARRAYS];
-    uint64_t bytes, decoded_bytes;
+    uint64_t bytes, decoded_bytes; /* sizes of the two buffers */
 } gltf_writer;
 
 /* --- vertices --- */
@@ -137,8 +138,8 @@ static ebpo_status fill_positions(gltf_writer *w, uint8_t *to, ebpo_error *error
     return EBPO_OK;
 }
 
-/* Stores normals as signed bytes. Where the node scales positions, normals are scaled too: readers
- * multiply them by the inverse. */
+/* Stores normals as signed bytes. If the node scales positions by the steps, normals are multiplied
+ * by the steps here, because readers divide them by the steps. */
 static void fill_normals(const gltf_writer *w, uint8_t *to)
 {
     for (uint64_t i = 0; i < w->out->vertices; i++, to += 4) {
@@ -170,7 +171,7 @@ static void fill_colours(const gltf_writer *w, uint8_t *to)
 
 /* --- encoding --- */
 
-/* Gives an array its place after the previous ones. */
+/* Gives an array its places after the previous arrays in both buffers. */
 static void place_array(gltf_writer *w, gltf_array *a)
 {
     a->first = w->bytes;
@@ -225,7 +226,7 @@ static ebpo_status encode_arrays(gltf_writer *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- the text --- */
+/* --- the JSON text --- */
 
 static void print_matrix(FILE *f, const gltf_writer *w)
 {
@@ -234,7 +235,7 @@ static void print_matrix(FILE *f, const gltf_writer *w)
         scale[k] = w->step[k];
         at[k] = w->low[k];
     }
-    /* columns; rotated, (x, y, z) becomes (x, z, -y) */
+    /* stored by columns; `rotates` turns (x, y, z) to (x, z, -y) */
     m[0] = scale[0];
     m[w->surface->rotates ? 6 : 5] = w->surface->rotates ? -scale[1] : scale[1];
     m[w->surface->rotates ? 9 : 10] = scale[2];

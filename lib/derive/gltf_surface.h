@@ -13,21 +13,21 @@ typedef struct ebpo_gltf_surface {
     const uint32_t *triangles; /* [triangle_count][3] */
     const double *xyz;         /* [vertex_count][3] */
     const float *normals;      /* [vertex_count][3], of length 1 */
-    const uint8_t *colours;    /* [vertex_count][colour_bytes] sRGB, and opacity; NULL: none */
-    unsigned colour_bytes;     /* 3 or 4 */
+    const uint8_t *colours;    /* [vertex_count][colour_bytes] sRGB; NULL: none */
+    unsigned colour_bytes;     /* 3, or 4 with opacity */
     double origin[3];          /* point that becomes (0, 0, 0) */
-    /* Step of the grid of positions on each axis; the grid contains `grid`. 0: positions are stored
-     * as floats. */
+    /* step: distance of the grid's planes on each axis; 0: positions are stored as floats.
+     * grid: a point of the grid */
     double step[3], grid[3];
-    bool rotates; /* y in the file is z of the surface, as in 3D Tiles */
+    bool rotates; /* the file's y is the surface's z, as in 3D Tiles */
     const char *name;
 } ebpo_gltf_surface;
 
 /* Facts of a written surface. */
 typedef struct ebpo_gltf_written {
-    uint64_t vertices; /* those that triangles use */
+    uint64_t vertices; /* number of vertices that triangles use */
     uint64_t bytes;
-    double change;         /* greatest distance by which a vertex was moved */
+    double change;         /* greatest distance by which rounding moved a vertex */
     double min[3], max[3]; /* bounds of the vertices, relative to the origin */
 } ebpo_gltf_written;
 

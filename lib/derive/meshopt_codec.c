@@ -10,7 +10,7 @@
 
 enum {
     ATTRIBUTES_HEADER = 0xa0,
-    GROUP = 16,      /* elements that have one way of storing */
+    GROUP = 16,      /* elements; store_group chooses how one byte of each is stored */
     BLOCK_MAX = 256, /* elements */
     BLOCK_BYTES = 8192,
     TAIL_BYTES = 32
@@ -29,7 +29,8 @@ uint64_t ebpo_meshopt_attributes_bound(uint64_t count, unsigned stride)
            (stride < TAIL_BYTES ? TAIL_BYTES : stride);
 }
 
-/* Stores 16 differences in `bits` bits each; greater ones follow as bytes. */
+/* Stores 16 differences in `bits` bits each. The largest value of these bits means that the
+ * difference is at least this value and follows as a byte. */
 static uint8_t *pack_group(const uint8_t *difference, unsigned bits, uint8_t *out)
 {
     unsigned each = 8 / bits;
@@ -46,7 +47,7 @@ static uint8_t *pack_group(const uint8_t *difference, unsigned bits, uint8_t *ou
     return out;
 }
 
-/* Stores a group in the shortest of the four ways, whose number is *way. */
+/* Stores a group in the shortest of the four ways, and sets *way to its number. */
 static uint8_t *store_group(const uint8_t *difference, unsigned *way, uint8_t *out)
 {
     unsigned zeros = 0, large2 = 0, large4 = 0;
@@ -65,8 +66,8 @@ static uint8_t *store_group(const uint8_t *difference, unsigned *way, uint8_t *o
     return out + GROUP;
 }
 
-/* Stores the differences of one byte of the elements of a block. last: the byte of the element
- * before the block. */
+/* Stores one byte of each element of a block, as its difference from the same byte of the previous
+ * element. last: this byte of the element before the block. */
 static uint8_t *store_byte(const uint8_t *elements, uint64_t count, unsigned stride, uint8_t last,
                            uint8_t *out)
 {
@@ -113,9 +114,9 @@ uint64_t ebpo_meshopt_attributes(const uint8_t *elements, uint64_t count, unsign
 enum {
     TRIANGLES_HEADER = 0xe1,
     RECENT = 16,      /* entries of both lists */
-    EDGES_USED = 15,  /* a code names one of so many edges, */
-    BESIDE_EDGE = 12, /* for a triangle at an edge one of the vertices 1 to 12, */
-    BESIDE_NONE = 14, /* and else one of the first 14 */
+    EDGES_USED = 15,  /* a code can name one of the latest 15 edges */
+    BESIDE_EDGE = 12, /* triangle at such an edge: a code can name recent vertices 1 to 12 */
+    BESIDE_NONE = 14, /* triangle without such an edge: recent vertices 0 to 13 */
     CODE_NEW = 0,
     CODE_BEFORE = 13,
     CODE_AFTER = 14,
@@ -127,7 +128,8 @@ enum {
 typedef struct triangle_encoder {
     uint32_t edge[RECENT][2], vertex[RECENT];
     unsigned edges, vertices; /* positions of the next entries */
-    uint32_t next, last;      /* first vertex that was not used; vertex that was last named */
+    uint32_t next;            /* first vertex that was not used */
+    uint32_t last;            /* vertex last stored by store_vertex, CODE_BEFORE or CODE_AFTER */
     uint8_t *data;
 } triangle_encoder;
 
@@ -149,8 +151,8 @@ static void push_vertex(triangle_encoder *e, uint32_t v)
     e->vertices = (e->vertices + 1) % RECENT;
 }
 
-/* Returns the number of the latest edge that a triangle has, and sets *corner to its first corner.
- * EDGES_USED: none. */
+/* Returns the number of the latest edge in the list that is an edge of the triangle, and sets
+ * *corner to the edge's first corner. Returns EDGES_USED if there is none. */
 static unsigned find_edge(const triangle_encoder *e, const uint32_t *t, unsigned *corner)
 {
     for (unsigned i = 0; i < EDGES_USED; i++) {
@@ -171,7 +173,7 @@ static unsigned find_recent(const triangle_encoder *e, uint32_t v)
     return i;
 }
 
-/* Stores a vertex as the difference from the last one that was stored so. */
+/* Stores a vertex as its difference from e->last. */
 static void store_vertex(triangle_encoder *e, uint32_t v)
 {
     uint32_t change = v - e->last, left = change << 1 ^ (change >> 31 ? UINT32_MAX : 0);
@@ -201,8 +203,8 @@ static uint8_t encode_at_edge(triangle_encoder *e, unsigned edge, uint32_t a, ui
     return (uint8_t)(edge << 4 | code);
 }
 
-/* Returns how a vertex of a triangle without a recent edge is stored: 0, new; 1 to 14, recent; or
- * CODE_OTHER. */
+/* Returns how a vertex of a triangle without a recent edge is stored: CODE_NEW; 1 to 14, a
+ * recent vertex; or CODE_OTHER. */
 static unsigned code_of(triangle_encoder *e, uint32_t v)
 {
     unsigned recent = find_recent(e, v);
@@ -224,7 +226,9 @@ static uint8_t encode_apart(triangle_encoder *e, uint32_t a, uint32_t b, uint32_
     if (code == 0xfe && !b_code && !c_code) {
         code = 0xf0; /* the first entry of the table: all three are new */
     } else {
-        /* Never 0, which would begin the numbers of vertices anew: if a is not new, b is not. */
+        /* This byte is never 0, which would tell the decoder to restart its vertex numbers. It
+         * would be 0 only if b and c were new and a were not, but triangles are rotated so that a
+         * is new if b or c is. */
         *e->data++ = (uint8_t)(b_code << 4 | c_code);
     }
     if (code == 0xff)
@@ -253,7 +257,7 @@ uint64_t ebpo_meshopt_triangles(const uint32_t *triangles, uint64_t count, uint8
     for (uint64_t i = 0; i < count; i++) {
         const uint32_t *t = triangles + 3 * i;
         unsigned first, edge = find_edge(&e, t, &first);
-        if (edge == EDGES_USED) /* begins with a new vertex, if it has one */
+        if (edge == EDGES_USED) /* the first corner is new, if one is */
             first = t[1] == e.next ? 1 : t[2] == e.next ? 2 : 0;
         if (edge == EDGES_USED && t[0] == e.next)
             first = 0;

@@ -1,4 +1,4 @@
-/* Encodes vertices and triangles as the glTF extension EXT_meshopt_compression says. */
+/* Encodes vertices and triangles as the glTF extension EXT_meshopt_compression prescribes. */
 #ifndef EBPO_DERIVE_MESHOPT_CODEC_H
 #define EBPO_DERIVE_MESHOPT_CODEC_H
 

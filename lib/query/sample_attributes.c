@@ -41,7 +41,8 @@ struct ebpo_sampler {
 
 /* --- choice of attributes --- */
 
-/* A requested column: NAME or ELEMENT:NAME. The three texts are within a longer string. */
+/* A requested column: NAME or ELEMENT:NAME. `text` is the whole request; all three pointers point
+ * into a longer string. */
 typedef struct wanted {
     const char *text, *element, *name;
     size_t bytes, element_bytes, name_bytes; /* element_bytes 0: any element */
@@ -102,7 +103,7 @@ static ebpo_status choose_columns(ebpo_sampler *s, const char *names, ebpo_error
         sampled item;
         if (!find_column(s->file, &w, "vertex", &item) && !find_column(s->file, &w, "face", &item))
             return ebpo_fail_file(error, EBPO_E_ABSENT, shown,
-                                  "vertices and faces have no attribute '%.*s' that is not a list; "
+                                  "vertices and faces have no attribute '%.*s', or it is a list; "
                                   "'ebpo info' lists the attributes of the file",
                                   (int)(w.bytes < 100 ? w.bytes : 100), w.text);
         if (s->count == EBPO_SAMPLER_MAX)

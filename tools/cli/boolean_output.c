@@ -123,7 +123,7 @@ void boolean_print_result(const boolean_output *o)
     words_plural(cut, sizeof cut, o->report.faces_cut, "face", "faces");
     words_plural(added, sizeof added, o->report.new_vertices, "new vertex", "new vertices");
     printf("%s: %s, %s; %s cut, %s, displaced at most %s", o->path, faces,
-           o->changed_only ? "the changes" : "closed", cut, added,
+           o->changed_only ? "changed faces only" : "closed", cut, added,
            words_real(o->report.displacement, real));
     if (o->changed_only)
         printf("; removed faces of A: %" PRIu64, o->report.removed_faces);

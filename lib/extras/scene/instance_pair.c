@@ -49,7 +49,8 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
 typedef struct posed_box {
     double middle[3];  /* centre of the box, in the world */
     double half[3][3]; /* [axis of the box] vector from the centre to the middle of a side */
-    double size;       /* sum of the absolute values of all terms, for bounds of rounding */
+    double size;       /* sum of the absolute values of all terms of the posed coordinates, for
+                          bounds of their rounding errors */
 } posed_box;
 
 static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, posed_box *out)
@@ -176,7 +177,9 @@ static ebpo_status bound_omitted(const ebpo_scene *scene, uint64_t self, uint64_
 ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
                                double *distance, uint64_t *omitted_in, ebpo_error *error)
 {
-    double from_a, from_b; /* distances of the faces omitted from the file of a, and of b */
+    /* from_a: bound of the distance between b and the faces that the file of a omits; from_b: the
+     * converse */
+    double from_a, from_b;
     ebpo_status status = bound_omitted(scene, pair->a, pair->b, time, &from_a, error);
     if (status == EBPO_OK)
         status = bound_omitted(scene, pair->b, pair->a, time, &from_b, error);
@@ -208,7 +211,7 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
 }
 
 /* Returns true if both instances follow one route, or two routes with the same keys. Their relative
- * position then changes only by rounding, and in size if the route's scale changes. */
+ * position then changes only by rounding and by changes of the route's scale. */
 static bool follows_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
@@ -396,8 +399,9 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Bounds the distance of the faces that are in both files, at a time. If there is no collider, one
- * of the files has no faces, and both bounds are INFINITY. */
+/* Bounds the distance, at a time, between the faces in the file of a and the faces in the file of
+ * b; omitted faces are not considered. If there is no collider, one of the files has no faces, and
+ * both bounds are INFINITY. */
 static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                   ebpo_error *error)
 {

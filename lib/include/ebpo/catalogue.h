@@ -175,9 +175,9 @@ EBPO_API void ebpo_catalogue_entry_of(const ebpo_file *file, const char *path,
 EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
 /*
- * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin with the same
- * bytes as the folder of `path` become relative; other paths are unchanged. When the catalogue is
- * read again, relative paths are based on that folder.
+ * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin with the
+ * folder of `path` (compared as bytes) become relative to it; other paths are unchanged. When the
+ * catalogue is read again, relative paths are based on that folder.
  *
  * EBPO_E_ARGUMENT: a path is not UTF-8. EBPO_E_IO.
  *
@@ -301,8 +301,8 @@ typedef struct ebpo_catalogue_models_stats {
 /*
  * Gets statistics.
  *
- * sums   sums over all models, including closed models; only `memory` is the current use, and
- *        `budget` is the budget of all models together. May be NULL
+ * sums   sums over all models, including closed models. Exceptions: `memory` is the memory in use
+ *        now; `budget` is the budget that all models share. May be NULL
  *
  * Threads: any.
  */
@@ -394,9 +394,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
- * have the same rounded t, the first of them in the catalogue is used. Exception: if t is INFINITY
- * although a face is hit (ebpo_ray_hit), t is computed again for the direction multiplied by a
- * power of two. The values of t computed in this way are compared.
+ * have the same rounded t, the first of them in the catalogue is used. Exception: if the nearest
+ * hits of several models all have t = INFINITY (ebpo_ray_hit), they are compared by their t along a
+ * direction that is longer by a power of two. The returned t stays INFINITY.
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -37,9 +37,10 @@ typedef enum ebpo_export_format {
     /*
      * 3D Tiles 1.1 in a new folder: tileset.json, a tile for each patch of the simplified surface,
      * and, with ebpo_export_options.mesh, tiles with the model's faces. Tiles are GLB files as for
-     * ebpo_export_options.surface. A tile's geometricError is ebpo_patch.error, or that of a patch
-     * below if this is greater; that of faces is their rounding. Coordinates keep their axes, so
-     * z is upwards. One patch is in memory at a time, and the table of all patches.
+     * ebpo_export_options.surface. The geometricError of a tile with a patch is the greatest error
+     * (ebpo_patch.error plus rounding) of this tile and the tiles below. The geometricError of a
+     * tile with the model's faces is the rounding of the coordinates. Viewers show the model's z
+     * axis upwards. The table of all patches and one patch at a time are in memory.
      */
     EBPO_EXPORT_TILES
 } ebpo_export_format;
@@ -89,16 +90,17 @@ typedef struct ebpo_export_options {
     const uint8_t *vertex_colours;
 
     /*
-     * GLB with `surface`: the greatest number of triangles. The level is then ignored; the patches
-     * are those of any levels with the least error that have so few triangles. 0: no limit.
+     * GLB with `surface`: the greatest number of triangles. last_level is then ignored, and patches
+     * of any levels are chosen: with the least error that this number of triangles allows. 0: no
+     * limit.
      */
     uint64_t triangles;
 
     /*
-     * True: exports the simplified surface (EBPO_PART_SURFACE) of a level, last_level, and of
-     * coarser nodes without patches below, as one mesh without cracks. GLB only, with 16-bit
-     * positions, 8-bit normals (KHR_mesh_quantization) and EXT_meshopt_compression; `mesh` must be
-     * false. Nothing else of the file is read.
+     * True: exports the simplified surface (EBPO_PART_SURFACE) as one mesh without cracks: the
+     * patches of last_level, and the coarser patches that have no patches below. GLB only, with
+     * 16-bit positions, 8-bit normals (KHR_mesh_quantization) and EXT_meshopt_compression; `mesh`
+     * must be false. Nothing else of the file is read.
      */
     bool surface;
 
@@ -147,9 +149,10 @@ typedef struct ebpo_export_report {
     uint64_t vertex_colours, face_colours;
 
     /*
-     * Simplified surface: its `block` has the deepest level of a patch and, as `nodes`, the number
-     * of patches. Each point of the surface is at most `error` from the model, and each point of
-     * the model from the surface, rounding included. Tiles: the error of the coarsest tile.
+     * Simplified surface: in its `block`, `level` is the level of the deepest patch, and `nodes` is
+     * the number of patches. Each point of the surface is at most `error` from the model, and each
+     * point of the model from the surface, rounding included. Tiles: the error of the coarsest
+     * tile.
      */
     double error;
 
@@ -178,13 +181,13 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
  *
  * report   may be NULL
  *
- * 3D Tiles are written to a folder beside `path`, which is renamed when it is complete; `path` must
- * not exist.
+ * 3D Tiles are written to a temporary folder beside `path`; the complete folder is renamed to
+ * `path`, which must not exist.
  *
  * EBPO_E_ARGUMENT: a level is not valid, no data is selected, the format does not support the
- * selected data, or the coarsest surface has more than options.triangles. EBPO_E_UNSUPPORTED: the
- * library was built without assimp. EBPO_E_ABSENT: the mesh or the surface is requested, and the
- * file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a
+ * selected data, or the coarsest surface has more triangles than options.triangles.
+ * EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh or the surface
+ * is requested, and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a
  * coordinate beyond the range of float32 in a format that has float32 coordinates, or a GLB file of
  * 2^32 bytes or more. EBPO_E_IO. Also the errors of reading (base.h).
  *

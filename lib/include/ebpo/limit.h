@@ -65,8 +65,8 @@ typedef struct ebpo_limit {
  * the sum is infinite or 0 if the volume of a cell is out of the range of doubles, that is, with
  * coordinates beyond about 1e102 or below 1e-102.
  *
- * The decoded tree and mesh are in memory, and a number for each node of the level. The cost of a
- * hull depends on the faces in the cell. Memory and time are not limited; `progress` can stop the
+ * The decoded tree, the mesh, and one number for each node of the level are in memory. The cost of
+ * a hull depends on the faces in the cell. Memory and time are not limited; `progress` can stop the
  * call.
  *
  * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull. Also the errors of

@@ -219,9 +219,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
  * that are outside the cell by a rounding error. In a subset (ebpo_subset), faces that are only
  * below pruned nodes are missing. Arrays are valid until the subtree is closed.
  *
- * Shared faces come first: faces that a leaf before this subtree, in the order of the file, also
- * lists. All other faces are owned. So if the tree is divided into disjoint subtrees, exactly one
- * of the subtrees that list a face owns the face. The whole tree owns all faces.
+ * A face is shared if a leaf that precedes this subtree in the file also lists the face. Shared
+ * faces come first, because faces are in the order in which leaves first list them. All other faces
+ * are owned. So if the tree is divided into disjoint subtrees, exactly one of the subtrees that
+ * list a face owns the face. The whole tree owns all faces.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size;

@@ -26,7 +26,7 @@ typedef struct values {
 
 static const char *const format_words[] = {
     "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL
-}; /* as in ebpo_export_format */
+}; /* in the order of ebpo_export_format; EBPO_EXPORT_TILES has an option instead */
 
 #include "cli/options/export.inc"
 

@@ -1,7 +1,7 @@
 /* ebpo serve: serves models and the web viewer to browsers of this machine.
  *
- * All paths that can be requested are in a table, which is made at the start with the files open.
- * Requests do not open files, so no request leads to another file. */
+ * All paths that can be requested are in a table. At the start, this table is made and its files
+ * are opened. A request only selects an entry of the table, so no request leads to another file. */
 #include "ebpo_config.h"
 
 #include <dirent.h>
@@ -48,11 +48,11 @@ typedef struct served {
 typedef struct model {
     char *path;            /* of the file */
     char *name;            /* last part of the path */
-    char *address;         /* path of its request below "/models/", encoded */
-    uint64_t faces, bytes; /* of the file */
+    char *address;         /* path in requests, after "/models/"; encoded */
+    uint64_t faces, bytes; /* numbers of faces and bytes of the file */
     pthread_mutex_t lock;  /* guards the picture */
     bool drawn;
-    void *png; /* NULL: it could not be drawn */
+    void *png; /* the picture; NULL: not drawn yet, or drawing has failed */
     size_t png_bytes;
 } model;
 
@@ -127,7 +127,8 @@ static const char *type_of(const char *name)
     return NULL;
 }
 
-/* Finds the viewer: where it is installed, or beside the program in the folder of a build. */
+/* Finds the folder of the viewer: beside the program in the folder of a build, or where the viewer
+ * is installed. */
 static void find_viewer(const site *s, char out[PATH_MAX])
 {
     char program[PATH_MAX];
@@ -166,7 +167,7 @@ static int add_viewer_file(site *s, const char *folder, const char *name, const 
     return code;
 }
 
-/* Adds the files of the viewer that lie directly in its folder. */
+/* Adds the files of the viewer. Folders in its folder are not searched. */
 static int add_viewer(site *s)
 {
     char folder[PATH_MAX];
@@ -192,7 +193,8 @@ static int add_viewer(site *s)
 
 /* --- models --- */
 
-/* Returns text as a part of an address: other characters become %XX. The caller frees it. */
+/* Encodes a name as a part of an address: all characters except letters, digits and -._~ become
+ * %XX. The caller frees the result. */
 static char *encode_name(const char *name)
 {
     char *text = malloc(3 * strlen(name) + 1), *to = text;

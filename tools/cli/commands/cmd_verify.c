@@ -31,10 +31,12 @@ static const struct kind {
     { offsetof(ebpo_verify_report, content), "content", "all arrays match the checksum" },
     { offsetof(ebpo_verify_report, containment), "containment",
       "the solid lies in every half-space" },
-    { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
+    { offsetof(ebpo_verify_report, nesting), "nesting",
+      "each envelope is inside the envelope of its parent" },
     { offsetof(ebpo_verify_report, labels), "labels",
       "white and black nodes and winding numbers are right" },
-    { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
+    { offsetof(ebpo_verify_report, lists), "lists",
+      "each leaf lists all faces that touch its cell" },
     { offsetof(ebpo_verify_report, source), "source", "data of the file equals the source's" },
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
@@ -57,10 +59,11 @@ static not_compared list_not_compared(const ebpo_file *file, const ebpo_mesh *so
     bool has_attributes = ebpo_mesh_has_attributes(source);
     if (has_attributes && !(parts & EBPO_PART_ATTRIBUTES))
         snprintf(u.words, sizeof u.words,
-                 "its attributes, such as colours and normals: the file has none");
+                 "its attributes, such as colours and normals, because the .ebpo.h5 file has none");
     else if (has_attributes && !(parts & EBPO_PART_MAPS))
         snprintf(u.words, sizeof u.words,
-                 "its attributes, such as colours and normals: the file has no source indices");
+                 "its attributes, such as colours and normals, because the .ebpo.h5 file has no "
+                 "source indices");
     else if (lost || unread)
         snprintf(u.words, sizeof u.words, "data that is not converted: %s%s%s",
                  unread ? unread : "", lost && unread ? "; " : "", lost ? lost : "");
@@ -82,9 +85,11 @@ static void print_words(const ebpo_verify_report *report, const char *path, cons
     if (u->words[0])
         printf("%s: not compared: %s\n", against, u->words);
     if (report->spare_filled)
-        printf("%s: note: %llu of %llu unused bytes are not zero; this program writes zeros\n",
-               path, (unsigned long long)report->spare_filled,
-               (unsigned long long)report->spare_bytes);
+        printf(
+            "%s: note: %llu of %llu unused bytes are not zero, so the file was changed, or another "
+            "program wrote it; not a violation\n",
+            path, (unsigned long long)report->spare_filled,
+            (unsigned long long)report->spare_bytes);
     if (!report->violations)
         printf("%s: OK: %llu checks, no violation\n", path, (unsigned long long)report->checks);
 }

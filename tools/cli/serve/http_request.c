@@ -21,7 +21,7 @@ static bool span_is_word(span s, const char *text)
 
 static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/* Returns true for the characters of a token (RFC 9110, 5.6.2). */
+/* Returns true if the character may be in a token (RFC 9110, 5.6.2). */
 static bool is_token_character(char c)
 {
     return is_digit(c) || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
@@ -67,8 +67,8 @@ static int hex_digit(char c)
                                   : -1;
 }
 
-/* Decodes the path of a request's target. The result is a name of a table, never of a file, so ".."
- * needs no treatment. */
+/* Decodes the path of a request's target. The path is only compared with the paths of a table and
+ * opens no file, so ".." needs no treatment. */
 static int decode_path(span target, http_request *out)
 {
     size_t n = 0;
@@ -120,8 +120,9 @@ static int parse_first_line(span line, http_request *out)
     return decode_path(target, out);
 }
 
-/* Returns true if the name is that of this machine, with any port, which a tunnel may change. Pages
- * of other sites whose name leads to this machine are refused in this way. */
+/* Returns true if the host is a name of this machine. Any port is accepted, because a tunnel may
+ * change the port. A page of another site whose name leads to this machine sends the name of the
+ * site, so its requests are refused. */
 static bool is_own_host(span host)
 {
     static const char *const names[] = { "127.0.0.1", "localhost", "[::1]" };
@@ -139,9 +140,9 @@ static bool is_own_host(span host)
     return false;
 }
 
-/* What the fields of a head have been so far. */
+/* Fields that the head has had so far. */
 typedef struct seen_fields {
-    bool host, range, length;
+    bool host, range, length; /* length: Content-Length */
 } seen_fields;
 
 static int take_field(span name, span value, http_request *out, seen_fields *seen)
@@ -152,7 +153,7 @@ static int take_field(span name, span value, http_request *out, seen_fields *see
         seen->host = true;
         return is_own_host(value) ? HTTP_OK : HTTP_OTHER_HOST;
     }
-    /* No request has a body. */
+    /* Requests with a body are refused. */
     if (span_is_word(name, "Transfer-Encoding") ||
         (span_is_word(name, "Content-Length") && (seen->length || !span_is(value, "0"))))
         return HTTP_BAD_REQUEST;
@@ -166,7 +167,7 @@ static int take_field(span name, span value, http_request *out, seen_fields *see
         if (!copy_span(value, out->range, sizeof out->range))
             out->range[0] = 0; /* a server may ignore ranges */
     }
-    /* A value that is too long equals no tag. */
+    /* If-Range: a value that is too long becomes one that equals no tag. */
     if (span_is_word(name, "If-Range") && !copy_span(value, out->if_range, sizeof out->if_range))
         strcpy(out->if_range, "?");
     if (span_is_word(name, "If-None-Match") &&
@@ -232,8 +233,8 @@ int http_request_range(const http_request *request, uint64_t size, const char *t
     uint64_t last = UINT64_MAX;
     *first = 0;
     *count = size;
-    /* A range of an unknown unit, of wrong form or of several parts is ignored, as RFC 9110 says;
-     * so is a range of another version. */
+    /* As RFC 9110 says, a range is ignored if its unit is unknown, if its form is wrong, if it has
+     * several parts, or if it is meant for another version of the content. */
     if (strncasecmp(at, "bytes=", 6) != 0 ||
         (request->if_range[0] && strcmp(request->if_range, tag) != 0))
         return HTTP_OK;

@@ -1,5 +1,5 @@
 /* Parses requests of HTTP/1.1 (RFC 9110, RFC 9112) for files. Refuses everything that the server
- * does not need: other methods, bodies, absolute addresses, names of other hosts. */
+ * does not need: methods other than GET and HEAD, bodies, absolute addresses, other host names. */
 #ifndef EBPO_TOOLS_HTTP_REQUEST_H
 #define EBPO_TOOLS_HTTP_REQUEST_H
 
@@ -32,16 +32,17 @@ typedef struct http_request {
     bool keeps;     /* the connection stays open after the response */
     bool has_query;
     char path[HTTP_PATH_MAX]; /* decoded, without the query; begins with '/' */
-    char range[64];           /* value of Range; "": none, or not a single range of bytes */
-    char if_range[96], if_none_match[256]; /* values; "": none */
+    char range[64];           /* value of Range; "": none, or too long */
+    char if_range[96];        /* value of If-Range; "": none; "?": too long */
+    char if_none_match[256];  /* value of If-None-Match; "": none, or too long */
 } http_request;
 
 /* Parses a head of `length` bytes that ends with an empty line. Returns HTTP_OK, or the status code
- * of an error; the connection must then be closed. */
+ * of an error, after which the connection must be closed. */
 int http_request_parse(const char *head, size_t length, http_request *out);
 
-/* Finds the range of bytes that a request selects of `size` bytes. Returns HTTP_OK for all bytes,
- * HTTP_PARTIAL for [*first, *first + *count), or HTTP_BAD_RANGE. */
+/* Finds which bytes of a content of `size` bytes a request selects. `tag`: version of the content.
+ * Returns HTTP_OK for all bytes, HTTP_PARTIAL for [*first, *first + *count), or HTTP_BAD_RANGE. */
 int http_request_range(const http_request *request, uint64_t size, const char *tag, uint64_t *first,
                        uint64_t *count);
 

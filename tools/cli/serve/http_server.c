@@ -26,7 +26,7 @@ enum {
     HEAD_SECONDS = 15,
     SEND_SECONDS = 30,
     DRAIN_MILLISECONDS = 500,
-    DRAIN_MAX = 1 << 20, /* bytes of a refused request that are still read */
+    DRAIN_MAX = 1 << 20, /* bytes that are still received when a connection ends */
     BLOCK = 1 << 16,
     FIELDS_MAX = 2048,
     FULL_MILLISECONDS = 100 /* until the next look for a free slot */
@@ -116,7 +116,7 @@ static bool send_head(const connection *c, int status, bool keeps, const char *f
     return n > 0 && (size_t)n < sizeof text && send_bytes(c, text, (size_t)n);
 }
 
-/* Sends a response without content, whose text is the reason. */
+/* Sends a response whose content is only the reason of its status. */
 static bool send_status(const connection *c, int status, bool keeps, bool head_only,
                         const char *fields)
 {
@@ -187,8 +187,8 @@ static size_t head_length(const connection *c)
     return 0;
 }
 
-/* Receives a head. Returns HTTP_OK with *length, a status code to send, or 0 if the client has
- * ended the connection or sends nothing. */
+/* Receives a head. Returns HTTP_OK and sets *length; or returns a status code to send, or 0 if the
+ * client has ended the connection or sends nothing. */
 static int receive_head(connection *c, size_t *length)
 {
     int64_t end = milliseconds_now() + 1000 * HEAD_SECONDS;
@@ -212,7 +212,8 @@ static int receive_head(connection *c, size_t *length)
     return HTTP_OK;
 }
 
-/* Ends a connection so that the client gets the response although it may still be sending. */
+/* Ends a connection. Bytes that the client still sends are received first, because otherwise the
+ * connection could be reset before the client has the response. */
 static void end_connection(connection *c)
 {
     size_t drained = 0;
@@ -264,7 +265,7 @@ static void *serve_connection(void *user)
 
 /* --- connections --- */
 
-/* Starts a thread for an accepted connection; takes the socket over. */
+/* Starts a thread for an accepted connection. Takes ownership of the socket. */
 static void start_connection(http_server *server, int socket)
 {
     struct timeval limit = { SEND_SECONDS, 0 };
@@ -329,7 +330,7 @@ static bool catch_signals(int pipe_end)
     action.sa_handler = end_server;
     action.sa_flags = (int)SA_RESETHAND; /* a second signal ends the process at once */
     sigemptyset(&action.sa_mask);
-    signal(SIGPIPE, SIG_IGN); /* a client that leaves is an error of send */
+    signal(SIGPIPE, SIG_IGN); /* if a client has left, send returns an error */
     return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, NULL, &before) == 0 &&
            (before.sa_handler == SIG_IGN || sigaction(SIGINT, &action, NULL) == 0);
 }
@@ -369,7 +370,7 @@ bool http_server_run(int listener, http_find_fn find, void *user)
     pthread_cond_init(&server.released, NULL);
     for (int i = 0; i < CONNECTIONS_MAX; i++)
         server.slot[i].socket = -1;
-    fcntl(listener, F_SETFL, O_NONBLOCK); /* a client may leave before accept */
+    fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
     if (!catch_signals(ends[1]))
         return false;
     for (;;) {

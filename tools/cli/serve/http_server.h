@@ -7,9 +7,9 @@
 
 /* What a path leads to. */
 typedef struct http_content {
-    const char *type;     /* of its bytes; NULL: unknown path */
-    const char *location; /* address to which the client is sent instead; NULL: none */
-    int file;             /* open file; -1: `bytes` */
+    const char *type;     /* media type of the bytes */
+    const char *location; /* with HTTP_FOUND: address to which the client is sent; else NULL */
+    int file;             /* descriptor of the open file with the bytes; -1: they are in `bytes` */
     const void *bytes;    /* must stay valid until the server ends */
     uint64_t size;
     char tag[64]; /* version, in quotes; "": none */
@@ -19,8 +19,8 @@ typedef struct http_content {
  * response: HTTP_OK, HTTP_FOUND with a location, HTTP_NOT_FOUND or HTTP_FAILED. */
 typedef int (*http_find_fn)(void *user, const char *path, bool has_query, http_content *out);
 
-/* Listens on 127.0.0.1. port: 0 for any free one; set to the port. Returns the socket, or -1 with
- * errno. */
+/* Listens on 127.0.0.1. *port: 0 for any free port; set to the port that is used. Returns
+ * the socket, or -1 with errno. */
 int http_server_listen(int *port);
 
 /* Serves until SIGINT or SIGTERM arrives, then ends all connections. Closes the socket. Returns

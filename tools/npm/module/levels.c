@@ -31,7 +31,8 @@ enum stream_array {
     VERTEX_COUNTS,  /* uint32 for each node: number of vertices */
     VERTICES,       /* double [3] for each vertex */
     POLYGON_COUNTS, /* uint32 for each node: number of polygons */
-    POLYGON_FIRST,  /* uint32 [polygon_count + 1] for each node with polygons: first corners */
+    POLYGON_FIRST,  /* uint32 [polygon_count + 1] for each node with polygons: index of each
+                       polygon's first corner among the node's CORNERS; then their number */
     CORNERS,        /* uint32 for each corner: index of a vertex of the node */
     LEVEL_FACTS = EBPO_JS_NODE_ARRAYS /* double [4]: level, number of nodes, bytes, volume */
 };
