@@ -5,9 +5,9 @@
  * group of eight children. No data is stored for each face: the weight of a face is computed again
  * for each leaf that lists the face, because most faces are in one leaf only. Weights and sums are
  * integers, so the result is exact and does not depend on the number of threads. The colour of a
- * face is the mean of its vertices' colours. The face's own colour is used, if faces have colours,
- * when vertices have none or all have the same one. lib/verify computes the same colours with
- * separate code. */
+ * face is the mean of its vertices' colours. Exception: if faces have colours, and the vertices
+ * have no colours or all have the same colour, it is the colour of the face itself. lib/verify
+ * computes the same colours with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -46,8 +46,8 @@ typedef struct colouring {
     const ebpo_level *level;  /* level whose groups are added up */
     const task_start *start;  /* [task] */
     const colour_sums *below; /* [gray node of the level] sums */
-    /* sums and colours of the level's groups, which are those of the gray nodes of the level above:
-     * [group] */
+    /* [group] sums and colours of the level's groups. A group has the sums and the colour of its
+     * parent, a gray node of the level above */
     colour_sums *above;
     uint32_t *colours; /* bytes 0 to 2: red, green, blue */
 } colouring;

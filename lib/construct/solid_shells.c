@@ -3,11 +3,12 @@
  * Two components are apart if their faces have no common point. Then each is completely inside or
  * outside the other one, and the winding numbers on both sides of its faces follow from the nesting
  * of components (which component is inside which). Faces are compared only if the boxes of
- * components do not decide: a first pass finds the faces that intersect the box of another
- * component, unless that box contains the box of the face's own component. A second pass compares
- * these faces. Both passes stop after a number of steps that is proportional to the number of
- * faces; then the components count as not apart. `ebpo check` prints the counts; ebpo_measure uses
- * ebpo_component_times. */
+ * components do not decide. A first pass finds, for each component, the faces whose boxes intersect
+ * the box of another component. Boxes that contain the component's own box are left out: there,
+ * all faces of the component would be found, and the faces found for the outer component suffice. A
+ * second pass compares the found faces with faces of other components. Both passes stop after a
+ * number of steps that is proportional to the number of faces; then the components count as not
+ * apart. `ebpo check` prints the counts; ebpo_measure uses ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -161,7 +162,8 @@ static ebpo_status build_face_tree(comparing *c, ebpo_error *error)
                                      error);
 }
 
-/* Runs both passes: sets c->apart to false if faces of two shells have a common point. */
+/* Runs both passes: sets c->apart to false if faces of two shells have a common point, or at the
+ * limit of steps. */
 static ebpo_status compare_shells(comparing *c, ebpo_error *error)
 {
     const ebpo_nesting *n = &c->s->nesting;
@@ -183,7 +185,7 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
     return status;
 }
 
-/* Sets s->apart if all components are simple (is_simple). */
+/* Sets s->apart to true or false. All components must be simple (is_simple). */
 static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
 {
     comparing c = { .s = s, .apart = true };

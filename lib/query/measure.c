@@ -6,11 +6,12 @@
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * where s' is the transpose of s. All values are in double-double arithmetic, on coordinates scaled
  * by a power of two to about 1. They are summed in blocks of BLOCK_FACES faces, so that sums do not
- * depend on the number of threads. A face counts as often as its component adds to the volume (its
- * multiplicity, construct/solid_shells.h), or once if this is not known. For a surface with its
- * border (the edges of its holes), the caps that close the holes are faces, too (measure_caps.h).
- * Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia
- * tensor in terms of its vertex coordinates". */
+ * depend on the number of threads. For volume and moments, the terms of a face are multiplied by
+ * 1, -1 or 0: the face's component bounds the solid, bounds it with the opposite orientation, or
+ * does not bound it (ebpo_component_times). If this is not known, the factor is 1. For a surface
+ * with its border (the edges of its holes), the caps that close the holes are faces, too
+ * (measure_caps.h). Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D
+ * tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -59,7 +60,7 @@ typedef struct moments {
 typedef struct measuring {
     const ebpo_mesh *mesh;
     const uint32_t *component; /* [faces] component of each face; NULL: all faces count once */
-    int8_t *times;             /* [components] how often the component's faces count */
+    int8_t *times;             /* [components] factor of the component's faces: 1, -1 or 0 */
     frame frame;
     moments *blocks; /* sums over each block */
 } measuring;
@@ -144,7 +145,7 @@ static void normal_of(const double corner[3][3], ebpo_pair n[3], double terms[3]
     }
 }
 
-/* Returns the products of corners for the second moment in (u, v). */
+/* Returns element (u, v) of s s' + a a' + b b' + c c'. `r`: the corners a, b, c; `s`: their sum. */
 static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, int v)
 {
     ebpo_pair sum = ebpo_pair_multiply(s[u], s[v]);
@@ -153,8 +154,9 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
     return sum;
 }
 
-/* Adds the tetrahedron of a triangle. `n`, `terms`: results of normal_of. The tetrahedron counts
- * `weight` times in integral6, and `weight` * `times` times in all other sums. */
+/* Adds the tetrahedron of a triangle. `n`, `terms`: results of normal_of. The factor of the
+ * tetrahedron's terms is `weight` in integral6 and terms6, 1 in absolute6, and `weight` * `times`
+ * in volume6, first24 and second120. */
 static void add_tetrahedron(moments *m, const double corner[3][3], const double middle[3],
                             const ebpo_pair n[3], const double terms[3], double weight, int times)
 {
@@ -266,7 +268,7 @@ static void sum_hulls(cap_sums *out, const frame *f, const ebpo_border_loops *lo
         out->moment += volume * farthest;
         point += 3 * (uint64_t)loops->loop[2 * i];
     }
-    out->volume *= 1 + 0x1p-20; /* rounding, of fewer than 2^30 sums */
+    out->volume *= 1 + 0x1p-20; /* covers the rounding errors of fewer than 2^30 additions */
     out->moment *= 1 + 0x1p-20;
 }
 
@@ -287,8 +289,9 @@ static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
 
 /* Returns a bound of the rounding error of integral6. Each operation on pairs has an error of at
  * most 2^-103 times the absolute values of its operands (for a product: of its result). A term of
- * the sum is the result of at most 8 operations, and passes at most 4 additions for each triangle
- * and block. All partial sums are at most 2 * terms6. */
+ * the sum is the result of at most 8 operations. After that, the sum that contains the term takes
+ * part in at most 4 additions for each triangle and for each block. All partial sums are at most
+ * 2 * terms6. */
 static double integral_error(const moments *m, uint64_t triangles)
 {
     return (4 * (double)triangles + 64) * 0x1p-102 * m->terms6 + 0x1p-900;
@@ -301,15 +304,15 @@ static double integral_error(const moments *m, uint64_t triangles)
  * error of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and an
  * error f of M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
  *
- * Other caps: let k be the winding numbers with our caps C, and k' those with other caps C'. We
- * assume two properties of the cap C'_i of each loop. First, C'_i together with our cap C_i,
- * reversed, is a closed surface with no other winding numbers than -w_i, 0 and w_i, where w_i is
- * the loop's weight. Second, C'_i is in the convex hull H_i of the loop (as C_i is). Then |k' - k|
- * is at most the sum of w_i over the hulls that contain the point, so the integral changes by at
- * most h = sum of w_i |H_i|, where |H_i| is the volume of the hull. With the centroid c as the
- * origin, the first moment of k is 0, and the first moment of k' is at most the sum of w_i |H_i|
- * r_i, where r_i is the distance of the farthest point of H_i. So the centroid moves by at most
- * this sum divided by |V| - h. */
+ * Other caps: let k(x) be the winding number of a point x with our caps C, and k'(x) the one with
+ * other caps C'. We assume two properties of the cap C'_i of each loop. First, C'_i together with
+ * our cap C_i, reversed, is a closed surface with no other winding numbers than -w_i, 0 and w_i,
+ * where w_i is the loop's weight. Second, C'_i is in the convex hull H_i of the loop (as C_i is).
+ * Then |k'(x) - k(x)| is at most the sum of w_i over the hulls H_i that contain x, so the integral
+ * changes by at most h = sum of w_i |H_i|, where |H_i| is the volume of the hull. With the centroid
+ * c as the origin, the first moment of k is 0, and the first moment of k' is at most the sum of w_i
+ * |H_i| r_i, where r_i is the distance of the farthest point of H_i. So the centroid moves by at
+ * most this sum divided by |V| - h. */
 static void set_border(ebpo_mass *out, const moments *m, const frame *f,
                        const ebpo_border_loops *loops, uint64_t triangles)
 {
@@ -370,7 +373,7 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
 
 /* --- counted faces --- */
 
-/* Sets the multiplicity of each component's faces. */
+/* Sets the factor of each component's faces. */
 static ebpo_status count_components(measuring *p, const ebpo_solid_shells *s, ebpo_rule rule,
                                     ebpo_error *error)
 {

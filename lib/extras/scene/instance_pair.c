@@ -1,6 +1,6 @@
-/* Computes data of two instances of a scene at a time: the box of one instance in the coordinates
- * of the other one, bounds of their relative motion and of their distance, and bounds of the faces
- * that their files omit.
+/* Computes data of a pair of instances of a scene: the box of one instance in the coordinates of
+ * the other one at a given time, bounds of their relative motion and of their distance, and bounds
+ * of the faces that their files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
  * file that is a subset has all faces of a box (the kept box); up to six boxes around the kept box
@@ -30,9 +30,9 @@ static const ebpo_scene_model_entry *model_of_instance(const ebpo_scene *scene, 
     return &scene->models[scene->instances[instance].description.model];
 }
 
-/* Makes the posing of an instance at a time: its checked pose with an error bound of the rotation
- * (geometry/pose.h). Fails with EBPO_E_ARGUMENT if the pose or posed coordinates are out of range.
- */
+/* Makes the posing of an instance for a given time: its checked pose with an error bound of the
+ * rotation (geometry/pose.h). Fails with EBPO_E_ARGUMENT if the pose or posed coordinates are out
+ * of range. */
 static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
                              ebpo_posing *out, ebpo_error *error)
 {
@@ -88,8 +88,8 @@ ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t self,
         sizes += fabs(posing.translation[i]);
         max_coordinate += fmax(fabs(m->min[i]), fabs(m->max[i]));
     }
-    /* The transposed matrix is used as the inverse. `error_bound` bounds the error that this and
-     * rounding cause for points of the model's box. */
+    /* The transposed matrix is used as the inverse, which is not exact. `error_bound` bounds the
+     * error of this inverse, including rounding, for points of the model's box. */
     double error_bound =
         (sizes + max_coordinate * scale) * slack / scale + 3 * posing.error_bound * max_coordinate;
     out->rounding = error_bound;
@@ -399,9 +399,9 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Bounds the distance, at a time, between the faces in the file of a and the faces in the file of
- * b; omitted faces are not considered. If there is no collider, one of the files has no faces, and
- * both bounds are INFINITY. */
+/* Bounds the distance, at a given time, between the faces in the file of a and the faces in the
+ * file of b; omitted faces are not considered. If there is no collider, one of the files has no
+ * faces, and both bounds are INFINITY. */
 static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                   ebpo_error *error)
 {

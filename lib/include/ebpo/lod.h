@@ -176,8 +176,8 @@ typedef struct ebpo_surface_mesh {
 
     /*
      * Greatest error of the patches (ebpo_patch), in the model's unit. To close cracks, some
-     * vertices of a finer patch are replaced by vertices of a coarser patch; their error is at most
-     * that of the coarser patch.
+     * vertices of a finer patch are replaced by vertices of a coarser patch. The error at the new
+     * vertices is at most that of the coarser patch, so this member is a bound for them, too.
      */
     double error;
 

@@ -18,7 +18,7 @@ enum { LISTS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
 /* The position of a leaf in the file. */
 typedef struct wanted_leaf {
     double level;
-    double group;   /* index in the level of the leaf's group (the eight children of a node) */
+    double group;   /* index of the leaf's group (the eight children of a node) in the level */
     double octant;  /* index of the leaf in the group */
     double subtree; /* index of the leaf's subtree; -1: the file does not store the level by
                      * subtree */

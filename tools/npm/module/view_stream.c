@@ -105,8 +105,8 @@ static ebpo_status put_facts(ebpo_js_object *object, double end, double count)
     return ebpo_js_put(object, VIEW_FACTS, facts, sizeof facts);
 }
 
-/* Reads the next nodes, at most `most`, into the result arrays. Stops earlier at a node that needs
- * missing bytes. EBPO_E_PENDING: the first of these nodes needs missing bytes. */
+/* Reads up to `most` nodes into the result arrays. Stops at a node whose bytes are missing: returns
+ * EBPO_OK with the nodes before it, or EBPO_E_PENDING if there are none. */
 int EBPO_JS(ebpo_js_view_next)(ebpo_js_object *object, double most)
 {
     ebpo_status status = EBPO_OK;
