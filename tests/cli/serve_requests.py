@@ -7,10 +7,12 @@ import json
 import os
 import random
 import re
+import select
 import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.parse
 
 SECRET = b"a file that was not given"
@@ -91,7 +93,7 @@ def check_contents():
     expect("type", get("/app.js")[1]["content-type"], "text/javascript; charset=utf-8")
     status, fields, _, _ = get("/")
     expect("first page", status, 302)
-    first = "samples=models/index.json" if len(entries) > 1 else "file=models/" + entries[0]["file"]
+    first = "samples=models/index.json" if len(entries) > 1 else "file=models/" + entries[0]["file"].replace("%", "%25")
     expect("first page", fields["location"], "/?" + first)
     for entry in entries:
         path = "/models/" + entry["file"]
@@ -214,9 +216,17 @@ def change_files():
     given = next(m for m in known if os.path.basename(m) == urllib.parse.unquote(os.path.basename(path)))
     os.rename(given, given + ".moved")
     os.symlink(os.path.abspath("secret.txt"), given)
-    expect("a file that became a link", get(path)[2] == before, True)
+    expect("a file that became a link", get(path)[0], 410)
     os.remove(given)
     os.rename(given + ".moved", given)
+    expect("a file that came back", get(path)[2] == before, True)
+    times = os.stat(given)
+    with open(given, "r+b") as f:
+        f.write(before[:1])
+    os.utime(given, ns=(times.st_atime_ns, times.st_mtime_ns + 1))
+    expect("a file that was written to", get(path)[0], 410)
+    os.utime(given, ns=(times.st_atime_ns, times.st_mtime_ns))
+    expect("a file that is the same again", get(path)[0], 200)
 
 
 def connections():
@@ -240,6 +250,26 @@ def connections():
     for c in silent:
         c.close()
     expect("after silent clients", get("/app.js")[0], 200)
+    began, slow = time.monotonic(), [connect() for _ in range(32)] # refused clients that go on sending
+    for c in slow:
+        c.sendall(b"X\r\n\r\n")
+    with connect() as c:
+        c.sendall(b"GET /app.js HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        c.setblocking(False)
+        while time.monotonic() - began < LIMIT:
+            for other in slow:
+                try:
+                    other.send(b"y")
+                except OSError:
+                    pass # the server has closed this connection
+            if select.select([c], [], [], 0.2)[0]:
+                break
+        c.settimeout(LIMIT)
+        expect("beside refused clients", receive(c)[0], 200)
+    expect("beside refused clients, soon", time.monotonic() - began < LIMIT / 2, True)
+    for c in slow:
+        c.close()
+    expect("Connection", get("/app.js", "Connection: TE, close")[1]["connection"], "close")
 
 
 prepare()

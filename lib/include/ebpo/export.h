@@ -137,8 +137,9 @@ typedef struct ebpo_export_report {
     ebpo_export_block block[EBPO_LEVELS_MAX + 1];
 
     /*
-     * glTF: vertices are relative to this point, which is the translation of the glTF nodes. Other
-     * formats: 0.
+     * glTF of levels and of the mesh: vertices are relative to this point, which is the translation
+     * of the glTF nodes. 3D Tiles: the translation of the root tile. Otherwise 0: the matrix of its
+     * node places a surface, and programs that keep matrices as float32 round this place.
      */
     double origin[3];
 

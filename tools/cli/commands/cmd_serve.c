@@ -1,7 +1,8 @@
 /* ebpo serve: serves models and the web viewer to browsers of this machine.
  *
- * All paths that can be requested are in a table. At the start, this table is made and its files
- * are opened. A request only selects an entry of the table, so no request leads to another file. */
+ * All paths that can be requested are in a table, which is made at the start. A request selects an
+ * entry of the table, and opens the entry's file only if it is still the same file, so no request
+ * leads to another file. */
 #include "ebpo_config.h"
 
 #include <dirent.h>
@@ -26,7 +27,7 @@
 #include "cli/serve/http_request.h"
 #include "cli/serve/http_server.h"
 
-enum { PICTURE_WIDTH = 320, PICTURE_HEIGHT = 240, ADDRESS_MAX = 1024 };
+enum { PICTURE_WIDTH = 320, PICTURE_HEIGHT = 240 };
 
 typedef struct values {
     int64_t port, max_expansion;
@@ -40,8 +41,9 @@ static const values standard = { .port = 8080 };
 
 /* A path that can be requested. */
 typedef struct served {
-    char *path; /* decoded */
-    http_content content;
+    char *path;             /* decoded */
+    char *file;             /* path of the file with the content; NULL: the content is in memory */
+    http_content content;   /* content.file is -1 */
     struct model *pictured; /* model whose picture is the content; NULL: other content */
 } served;
 
@@ -49,6 +51,7 @@ typedef struct model {
     char *path;            /* of the file */
     char *name;            /* last part of the path */
     char *address;         /* path in requests, after "/models/"; encoded */
+    char tag[64];          /* version of the file, as in http_content */
     uint64_t faces, bytes; /* numbers of faces and bytes of the file */
     pthread_mutex_t lock;  /* guards the picture */
     bool drawn;
@@ -62,16 +65,19 @@ typedef struct site {
     size_t entries, capacity;
     model **model;
     size_t models, model_capacity;
-    char start[ADDRESS_MAX + 64]; /* address of the first page, from "/" on */
-    char *list;                   /* of models, for the viewer */
+    char *start; /* address of the first page, from "/" on */
+    char *list;  /* of models, for the viewer */
     size_t list_bytes;
 } site;
 
 /* --- the table --- */
 
-/* Adds a path. Takes ownership of `path` and of the content's file, also on failure. */
-static bool add_entry(site *s, char *path, const http_content *content, model *pictured)
+/* Adds a path. `file`: path of the file with the content; NULL: the content is in memory. Takes
+ * ownership of `path`, also on failure. */
+static bool add_entry(site *s, char *path, const char *file, const http_content *content,
+                      model *pictured)
 {
+    char *copy = file ? strdup(file) : NULL;
     if (path && s->entries == s->capacity) {
         size_t capacity = s->capacity ? 2 * s->capacity : 64;
         served *wider = realloc(s->entry, capacity * sizeof *wider);
@@ -80,13 +86,13 @@ static bool add_entry(site *s, char *path, const http_content *content, model *p
             s->capacity = capacity;
         }
     }
-    if (!path || s->entries == s->capacity) {
+    if (!path || s->entries == s->capacity || (file && !copy)) {
         free(path);
-        if (content->file >= 0)
-            close(content->file);
+        free(copy);
         return false;
     }
-    s->entry[s->entries++] = (served){ path, *content, pictured };
+    s->entry[s->entries] = (served){ path, copy, *content, pictured };
+    s->entry[s->entries++].content.file = -1;
     return true;
 }
 
@@ -108,7 +114,28 @@ static bool open_content(const char *path, const char *type, http_content *out)
     return true;
 }
 
-static int find_content(void *user, const char *path, bool has_query, http_content *out);
+/* Opens the file of a content if it is the file with the content's tag. Returns HTTP_OK, HTTP_GONE,
+ * or HTTP_FAILED if the system lacks resources. */
+static int open_again(const char *path, http_content *content)
+{
+    http_content now;
+    if (!open_content(path, content->type, &now))
+        return errno == EMFILE || errno == ENFILE || errno == ENOMEM ? HTTP_FAILED : HTTP_GONE;
+    if (strcmp(now.tag, content->tag) != 0) {
+        close(now.file);
+        return HTTP_GONE;
+    }
+    *content = now;
+    return HTTP_OK;
+}
+
+static const served *find_entry(const site *s, const char *path)
+{
+    for (size_t i = 0; i < s->entries; i++)
+        if (strcmp(s->entry[i].path, path) == 0)
+            return &s->entry[i];
+    return NULL;
+}
 
 /* --- the viewer --- */
 
@@ -160,7 +187,8 @@ static int add_viewer_file(site *s, const char *folder, const char *name, const 
     } else {
         if (asprintf(&request, "/%s", strcmp(name, "index.html") == 0 ? "" : name) < 0)
             request = NULL;
-        if (!add_entry(s, request, &content, NULL))
+        close(content.file);
+        if (!add_entry(s, request, path, &content, NULL))
             code = command_no_memory("serve");
     }
     free(path);
@@ -171,7 +199,6 @@ static int add_viewer_file(site *s, const char *folder, const char *name, const 
 static int add_viewer(site *s)
 {
     char folder[PATH_MAX];
-    http_content content;
     find_viewer(s, folder);
     DIR *d = opendir(folder);
     int code = EXIT_OK;
@@ -180,7 +207,7 @@ static int add_viewer(site *s)
             code = add_viewer_file(s, folder, e->d_name, type_of(e->d_name));
     if (d)
         closedir(d);
-    if (code == EXIT_OK && find_content(s, "/", true, &content) != HTTP_OK) {
+    if (code == EXIT_OK && !find_entry(s, "/")) {
         fprintf(stderr,
                 "ebpo serve: %s: the viewer is not in this folder; give its folder with --viewer, "
                 "or make it from the sources of ebpo by 'sh tools/npm/build.sh build-npm' and 'npm "
@@ -236,21 +263,22 @@ static model *new_model(site *s, const char *path)
     return m->path && m->address ? m : NULL;
 }
 
-/* Adds the paths of a model and of its picture. Takes ownership of the content's file. */
+/* Adds the paths of a model and of its picture. */
 static bool add_model_entries(site *s, model *m, const http_content *content)
 {
     char *path = NULL;
     size_t number = s->models - 1;
     if (asprintf(&path, "/models/%zu/%s", number, m->name) < 0)
         path = NULL;
-    if (!add_entry(s, path, content, NULL))
+    if (!add_entry(s, path, m->path, content, NULL))
         return false;
     if (!EBPO_HAVE_PNG)
         return true;
-    http_content picture = { .type = "image/png", .file = -1 };
+    http_content picture = { .type = "image/png" };
     if (asprintf(&path, "/models/%zu.png", number) < 0)
         path = NULL;
-    return add_entry(s, path, &picture, m);
+    snprintf(m->tag, sizeof m->tag, "%s", content->tag);
+    return add_entry(s, path, NULL, &picture, m);
 }
 
 static int add_model(site *s, const char *path)
@@ -270,12 +298,11 @@ static int add_model(site *s, const char *path)
         ebpo_close(file);
         return EXIT_FAILED;
     }
+    close(content.file);
     model *m = new_model(s, path);
     if (m) {
         m->faces = ebpo_file_info(file)->face_count;
         m->bytes = content.size;
-    } else {
-        close(content.file);
     }
     ebpo_close(file);
     return m && add_model_entries(s, m, &content) ? EXIT_OK : command_no_memory("serve");
@@ -339,8 +366,25 @@ static void print_models(const site *s, json *j, bool for_viewer)
     json_end(j);
 }
 
-/* Adds the list of models, and sets the address of the first page: of the only model, or of the
- * list. */
+/* Makes the address of the first page: of the only model, or of the list of models. A path in the
+ * query is decoded once more than a path, so its % becomes %25. */
+static bool make_start(site *s)
+{
+    const char *only = s->models == 1 ? s->model[0]->address : "";
+    size_t space = sizeof "/?samples=models/index.json" + 3 * strlen(only);
+    char *to = s->start = malloc(space);
+    if (!to)
+        return false;
+    if (s->models != 1) {
+        snprintf(to, space, "/?samples=models/index.json");
+        return true;
+    }
+    for (to += sprintf(to, "/?file=models/"); *only; only++)
+        to += sprintf(to, *only == '%' ? "%%25" : "%c", *only);
+    return true;
+}
+
+/* Adds the list of models, and sets the address of the first page. */
 static int add_list(site *s)
 {
     json j;
@@ -352,30 +396,31 @@ static int add_list(site *s)
     json_finish(&j);
     if (fclose(f) != 0)
         return command_no_memory("serve");
-    http_content content = {
-        .type = "application/json", .file = -1, .bytes = s->list, .size = s->list_bytes
-    };
-    if (s->models == 1 && strlen(s->model[0]->address) < ADDRESS_MAX)
-        snprintf(s->start, sizeof s->start, "/?file=models/%s", s->model[0]->address);
-    else
-        snprintf(s->start, sizeof s->start, "/?samples=models/index.json");
-    return add_entry(s, strdup("/models/index.json"), &content, NULL) ? EXIT_OK
-                                                                      : command_no_memory("serve");
+    http_content content = { .type = "application/json", .bytes = s->list, .size = s->list_bytes };
+    return make_start(s) && add_entry(s, strdup("/models/index.json"), NULL, &content, NULL)
+               ? EXIT_OK
+               : command_no_memory("serve");
 }
 
 /* --- requests --- */
 
-/* Draws the picture of a model when it is first requested. */
-static int find_picture(model *m, http_content *out)
+/* Draws the picture of a model when it is first requested, if the file is the same as at the start.
+ */
+static int find_picture(model *m, int64_t max_expansion, http_content *out)
 {
 #if EBPO_HAVE_PNG
     pthread_mutex_lock(&m->lock);
     if (!m->drawn) {
         ebpo_error error = EBPO_ERROR_INIT;
+        http_content file = { .type = "" };
+        memcpy(file.tag, m->tag, sizeof file.tag);
         m->drawn = true;
-        if (thumbnail_draw(m->path, PICTURE_WIDTH, PICTURE_HEIGHT, &m->png, &m->png_bytes,
-                           &error) != EBPO_OK)
-            (void)command_failed("serve", &error);
+        if (open_again(m->path, &file) == HTTP_OK) {
+            close(file.file);
+            if (thumbnail_draw(m->path, max_expansion, PICTURE_WIDTH, PICTURE_HEIGHT, &m->png,
+                               &m->png_bytes, &error) != EBPO_OK)
+                (void)command_failed("serve", &error);
+        }
     }
     pthread_mutex_unlock(&m->lock);
 #endif
@@ -391,12 +436,13 @@ static int find_content(void *user, const char *path, bool has_query, http_conte
         out->location = s->start;
         return HTTP_FOUND;
     }
-    for (size_t i = 0; i < s->entries; i++)
-        if (strcmp(s->entry[i].path, path) == 0) {
-            *out = s->entry[i].content;
-            return s->entry[i].pictured ? find_picture(s->entry[i].pictured, out) : HTTP_OK;
-        }
-    return HTTP_NOT_FOUND;
+    const served *found = find_entry(s, path);
+    if (!found)
+        return HTTP_NOT_FOUND;
+    *out = found->content;
+    return found->pictured ? find_picture(found->pictured, s->v->max_expansion, out)
+           : found->file   ? open_again(found->file, out)
+                           : HTTP_OK;
 }
 
 /* --- the command --- */
@@ -444,9 +490,8 @@ static int serve_site(site *s)
 static void free_site(site *s)
 {
     for (size_t i = 0; i < s->entries; i++) {
-        if (s->entry[i].content.file >= 0)
-            close(s->entry[i].content.file);
         free(s->entry[i].path);
+        free(s->entry[i].file);
     }
     for (size_t i = 0; i < s->models; i++) {
         pthread_mutex_destroy(&s->model[i]->lock);
@@ -459,6 +504,7 @@ static void free_site(site *s)
     free(s->entry);
     free(s->model);
     free(s->list);
+    free(s->start);
 }
 
 static int run_serve(void *given, const char **operand)

@@ -95,10 +95,12 @@ static ebpo_status load_level(drawing *d, const ebpo_file *file, ebpo_error *err
     return status;
 }
 
-static ebpo_status load_drawing(drawing *d, const char *path, ebpo_error *error)
+static ebpo_status load_drawing(drawing *d, const char *path, int64_t max_expansion,
+                                ebpo_error *error)
 {
     ebpo_file *file = NULL;
     remote_values how = REMOTE_VALUES_INIT;
+    how.max_expansion = max_expansion;
     ebpo_status status = remote_open(&file, path, &how, error);
     if (status != EBPO_OK)
         return status;
@@ -128,13 +130,13 @@ static ebpo_status draw_picture(const drawing *d, picture *p, ebpo_error *error)
     return raster_draw(p, 0, 0, p->width, p->height, &view, &d->mesh, &style, 1, error);
 }
 
-ebpo_status thumbnail_draw(const char *path, int width, int height, void **png, size_t *size,
-                           ebpo_error *error)
+ebpo_status thumbnail_draw(const char *path, int64_t max_expansion, int width, int height,
+                           void **png, size_t *size, ebpo_error *error)
 {
     static const uint8_t paper[3] = { 240, 242, 245 };
     drawing d = { .closed = false };
     picture p = { 0 };
-    ebpo_status status = load_drawing(&d, path, error);
+    ebpo_status status = load_drawing(&d, path, max_expansion, error);
     if (status == EBPO_OK && !picture_make(&p, width, height, paper))
         status = error->status = EBPO_E_MEMORY;
     if (status == EBPO_OK)

@@ -145,6 +145,22 @@ typedef struct seen_fields {
     bool host, range, length; /* length: Content-Length */
 } seen_fields;
 
+/* Returns true if a list of words, separated by commas, contains the word "close". */
+static bool lists_close(span value)
+{
+    for (size_t i = 0; i < value.length;) {
+        while (i < value.length && strchr(", \t", value.text[i]))
+            i++;
+        span word = { value.text + i, 0 };
+        while (i < value.length && !strchr(", \t", value.text[i]))
+            i++;
+        word.length = (size_t)(value.text + i - word.text);
+        if (span_is_word(word, "close"))
+            return true;
+    }
+    return false;
+}
+
 static int take_field(span name, span value, http_request *out, seen_fields *seen)
 {
     if (span_is_word(name, "Host")) {
@@ -158,7 +174,7 @@ static int take_field(span name, span value, http_request *out, seen_fields *see
         (span_is_word(name, "Content-Length") && (seen->length || !span_is(value, "0"))))
         return HTTP_BAD_REQUEST;
     seen->length |= span_is_word(name, "Content-Length");
-    if (span_is_word(name, "Connection") && span_is_word(value, "close"))
+    if (span_is_word(name, "Connection") && lists_close(value))
         out->keeps = false;
     if (span_is_word(name, "Range")) {
         if (seen->range)

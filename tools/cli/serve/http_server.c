@@ -25,8 +25,7 @@ enum {
     CONNECTIONS_MAX = 32,
     HEAD_SECONDS = 15,
     SEND_SECONDS = 30,
-    DRAIN_MILLISECONDS = 500,
-    DRAIN_MAX = 1 << 20, /* bytes that are still received when a connection ends */
+    DRAIN_MILLISECONDS = 1000, /* time in which bytes are still received when a connection ends */
     BLOCK = 1 << 16,
     FIELDS_MAX = 2048,
     FULL_MILLISECONDS = 100 /* until the next look for a free slot */
@@ -95,6 +94,7 @@ static const char *reason_of(int status)
     case HTTP_NOT_FOUND: return "Not Found";
     case HTTP_BAD_METHOD: return "Method Not Allowed";
     case HTTP_TOO_SLOW: return "Request Timeout";
+    case HTTP_GONE: return "Gone: the file was changed or removed after the start of ebpo serve";
     case HTTP_LONG_PATH: return "URI Too Long";
     case HTTP_BAD_RANGE: return "Range Not Satisfiable";
     case HTTP_OTHER_HOST: return "Misdirected Request";
@@ -162,8 +162,12 @@ static bool send_response(connection *c, const http_request *request)
     http_content content = { .file = -1 };
     int status = c->server->find(c->server->user, request->path, request->has_query, &content);
     char fields[FIELDS_MAX - 128] = "";
-    if (status == HTTP_OK)
-        return send_content(c, request, &content) && request->keeps;
+    if (status == HTTP_OK) {
+        bool sent = send_content(c, request, &content);
+        if (content.file >= 0)
+            close(content.file);
+        return sent && request->keeps;
+    }
     if (status == HTTP_FOUND)
         snprintf(fields, sizeof fields, "Location: %s\r\n", content.location);
     return send_status(c, status, request->keeps, request->head_only, fields) && request->keeps;
@@ -216,15 +220,12 @@ static int receive_head(connection *c, size_t *length)
  * connection could be reset before the client has the response. */
 static void end_connection(connection *c)
 {
-    size_t drained = 0;
+    int64_t end = milliseconds_now() + DRAIN_MILLISECONDS;
     struct pollfd p = { c->socket, POLLIN, 0 };
     shutdown(c->socket, SHUT_WR);
-    while (drained < DRAIN_MAX && poll(&p, 1, DRAIN_MILLISECONDS) > 0) {
-        ssize_t n = recv(c->socket, c->block, sizeof c->block, 0);
-        if (n <= 0)
+    for (int64_t left; (left = end - milliseconds_now()) > 0 && poll(&p, 1, (int)left) > 0;)
+        if (recv(c->socket, c->block, sizeof c->block, 0) <= 0)
             break;
-        drained += (size_t)n;
-    }
 }
 
 static void serve_requests(connection *c)
@@ -373,14 +374,15 @@ bool http_server_run(int listener, http_find_fn find, void *user)
     fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
     if (!catch_signals(ends[1]))
         return false;
-    for (;;) {
-        bool full = is_full(&server);
+    for (bool refused = false;;) {
+        bool full = refused || is_full(&server); /* refused: the system lacks resources */
         struct pollfd p[2] = { { ends[0], POLLIN, 0 }, { full ? -1 : listener, POLLIN, 0 } };
         if (poll(p, 2, full ? FULL_MILLISECONDS : -1) < 0 && errno != EINTR)
             return false;
         if (p[0].revents)
             break;
         int socket = p[1].revents ? accept(listener, NULL, NULL) : -1;
+        refused = socket < 0 && p[1].revents;
         if (socket < 0)
             continue;
         fcntl(socket, F_SETFD, FD_CLOEXEC);

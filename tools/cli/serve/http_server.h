@@ -9,14 +9,14 @@
 typedef struct http_content {
     const char *type;     /* media type of the bytes */
     const char *location; /* with HTTP_FOUND: address to which the client is sent; else NULL */
-    int file;             /* descriptor of the open file with the bytes; -1: they are in `bytes` */
+    int file;             /* open file with the bytes, which the server closes; -1: in `bytes` */
     const void *bytes;    /* must stay valid until the server ends */
     uint64_t size;
     char tag[64]; /* version, in quotes; "": none */
 } http_content;
 
 /* Finds the content of a decoded path. Called by several threads. Returns the status code of the
- * response: HTTP_OK, HTTP_FOUND with a location, HTTP_NOT_FOUND or HTTP_FAILED. */
+ * response: HTTP_OK, HTTP_FOUND with a location, HTTP_NOT_FOUND, HTTP_GONE or HTTP_FAILED. */
 typedef int (*http_find_fn)(void *user, const char *path, bool has_query, http_content *out);
 
 /* Listens on 127.0.0.1. *port: 0 for any free port; set to the port that is used. Returns
