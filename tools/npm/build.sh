@@ -107,11 +107,11 @@ build_gmp() {
 
 # Makes deps/lib/libebpoSUFFIX.a of folders of lib.
 build_library() { # suffix, folders as a regular expression, more flags
-    build=$folder/lib$1
+    build=$folder/lib$1 settings=$folder/lib$1.ini
     describe_library jansson 2.14 # which meson.build requires; the folders do not use it
     # shellcheck disable=SC2086
     words=$(printf "'%s', " $flags $3 "-I$deps/include")
-    cat >"$folder/emscripten.ini" <<EOF
+    cat >"$settings.new" <<EOF
 [binaries]
 c = 'emcc'
 ar = 'emar'
@@ -128,8 +128,10 @@ endian = 'little'
 [built-in options]
 c_args = [${words}'-DEBPO_NO_MESH_READERS']
 EOF
+    # meson reads the settings only when it makes a folder
+    cmp -s "$settings.new" "$settings" || { rm -rf "$build"; mv "$settings.new" "$settings"; }
     [ -f "$build/build.ninja" ] ||
-        meson setup "$build" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
+        meson setup "$build" "$root" --cross-file "$settings" --buildtype=plain \
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
     ninja -C "$build" build.ninja >/dev/null # lists files that are new since the last build
