@@ -97,7 +97,7 @@ class Runs:
                               self.work / "report", mesh)
         volume = stated["model"].get("volume") or stated["model"].get("winding_integral")
         return {"volume": volume, "faces": stated["model"]["faces"],
-                "methods": [{k: v for k, v in m.items() if k not in ("deadlines", "budgets")}
+                "methods": [{k: v for k, v in m.items() if k not in ("deadlines", "budgets", "file")}
                             for m in stated["methods"]]}
 
     def bench(self, name, *options):
