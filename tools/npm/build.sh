@@ -19,6 +19,10 @@ relative=$(realpath --relative-to="$folder/lib" "$root")
 flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument"
 flags="$flags -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
 
+# What another version of this script has compiled may have other flags.
+cmp -s "$here/build.sh" "$folder/compiled_by.sh" || rm -rf "$deps" "$folder/lib" "$folder/lib-small"
+cp "$here/build.sh" "$folder/compiled_by.sh"
+
 # Downloads and unpacks the source packages.
 fetch_sources() {
     sh "$root/tools/packaging/debian_sources.sh" "$sources/files" libzstd zlib gmp nettle
@@ -107,11 +111,11 @@ build_gmp() {
 
 # Makes deps/lib/libebpoSUFFIX.a of folders of lib.
 build_library() { # suffix, folders as a regular expression, more flags
-    build=$folder/lib$1 settings=$folder/lib$1.ini
+    build=$folder/lib$1
     describe_library jansson 2.14 # which meson.build requires; the folders do not use it
     # shellcheck disable=SC2086
     words=$(printf "'%s', " $flags $3 "-I$deps/include")
-    cat >"$settings.new" <<EOF
+    cat >"$folder/emscripten.ini" <<EOF
 [binaries]
 c = 'emcc'
 ar = 'emar'
@@ -128,10 +132,8 @@ endian = 'little'
 [built-in options]
 c_args = [${words}'-DEBPO_NO_MESH_READERS']
 EOF
-    # meson reads the settings only when it makes a folder
-    cmp -s "$settings.new" "$settings" || { rm -rf "$build"; mv "$settings.new" "$settings"; }
     [ -f "$build/build.ninja" ] ||
-        meson setup "$build" "$root" --cross-file "$settings" --buildtype=plain \
+        meson setup "$build" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
     ninja -C "$build" build.ninja >/dev/null # lists files that are new since the last build
