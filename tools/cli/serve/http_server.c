@@ -312,21 +312,22 @@ static void end_all(http_server *server)
     pthread_mutex_unlock(&server->lock);
 }
 
-/* Write end of the pipe that ends the server. */
-static volatile sig_atomic_t ending_pipe = -1;
+/* Both ends of a pipe. The server ends when a byte has been written to it. */
+static int ending_pipe[2];
 
 static void end_server(int number)
 {
     int saved = errno;
     (void)number;
-    (void)!write(ending_pipe, "", 1);
+    (void)!write(ending_pipe[1], "", 1);
     errno = saved;
 }
 
-static bool catch_signals(int pipe_end)
+static bool catch_signals(void)
 {
     struct sigaction action, before;
-    ending_pipe = pipe_end;
+    if (pipe(ending_pipe) != 0)
+        return false;
     memset(&action, 0, sizeof action);
     action.sa_handler = end_server;
     action.sa_flags = (int)SA_RESETHAND; /* a second signal ends the process at once */
@@ -349,7 +350,7 @@ int http_server_listen(int *port)
     setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (bind(listener, (struct sockaddr *)&at, sizeof at) != 0 ||
         listen(listener, CONNECTIONS_MAX) != 0 ||
-        getsockname(listener, (struct sockaddr *)&at, &length) != 0) {
+        getsockname(listener, (struct sockaddr *)&at, &length) != 0 || !catch_signals()) {
         int saved = errno;
         close(listener);
         errno = saved;
@@ -362,9 +363,6 @@ int http_server_listen(int *port)
 bool http_server_run(int listener, http_find_fn find, void *user)
 {
     static http_server server; /* threads use it until the end */
-    int ends[2];
-    if (pipe(ends) != 0)
-        return false;
     server.find = find;
     server.user = user;
     pthread_mutex_init(&server.lock, NULL);
@@ -372,11 +370,9 @@ bool http_server_run(int listener, http_find_fn find, void *user)
     for (int i = 0; i < CONNECTIONS_MAX; i++)
         server.slot[i].socket = -1;
     fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
-    if (!catch_signals(ends[1]))
-        return false;
     for (bool refused = false;;) {
         bool full = refused || is_full(&server); /* refused: the system lacks resources */
-        struct pollfd p[2] = { { ends[0], POLLIN, 0 }, { full ? -1 : listener, POLLIN, 0 } };
+        struct pollfd p[2] = { { ending_pipe[0], POLLIN, 0 }, { full ? -1 : listener, POLLIN, 0 } };
         if (poll(p, 2, full ? FULL_MILLISECONDS : -1) < 0 && errno != EINTR)
             return false;
         if (p[0].revents)
@@ -391,7 +387,5 @@ bool http_server_run(int listener, http_find_fn find, void *user)
     }
     close(listener);
     end_all(&server);
-    close(ends[0]);
-    close(ends[1]);
     return true;
 }

@@ -19,12 +19,13 @@ typedef struct http_content {
  * response: HTTP_OK, HTTP_FOUND with a location, HTTP_NOT_FOUND, HTTP_GONE or HTTP_FAILED. */
 typedef int (*http_find_fn)(void *user, const char *path, bool has_query, http_content *out);
 
-/* Listens on 127.0.0.1. *port: 0 for any free port; set to the port that is used. Returns
+/* Listens on 127.0.0.1. *port: 0 for any free port; set to the port that is used. From now on,
+ * SIGINT and SIGTERM end the server, or prevent its start, and no longer end the process. Returns
  * the socket, or -1 with errno. */
 int http_server_listen(int *port);
 
 /* Serves until SIGINT or SIGTERM arrives, then ends all connections. Closes the socket. Returns
- * false, with errno, if the server cannot start. */
+ * false, with errno, if the server cannot wait for clients. */
 bool http_server_run(int listener, http_find_fn find, void *user);
 
 #endif
