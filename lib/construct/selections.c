@@ -273,9 +273,11 @@ static bool choose_offset(const ebpo_choice *choice, bool *chosen)
 
 /* --- k-medoids: the algorithm PAM, which the theses cite from Ng and Han 1994. It chooses k
  * candidates (medoids) so that the cost is small: the sum of the squared distances of all
- * candidates from their nearest medoids. In each step, a candidate replaces a medoid (a swap). One
- * pass over the candidates finds the best swap for all k medoids (Schubert and Rousseeuw 2019); the
- * result is the same as with k passes. --- */
+ * candidates from their nearest medoids. In each step, a candidate replaces a medoid (a swap); the
+ * algorithm ends when no swap lowers the cost. One pass over the candidates finds the best medoid
+ * that a given candidate can replace, and the swap is made at once if it lowers the cost (Schubert
+ * and Rousseeuw 2021). PAM evaluates all candidates before each swap; with thousands of medoids
+ * that takes hours, and ends at the same kind of minimum. --- */
 
 typedef struct clustering {
     int count, wanted;
@@ -284,7 +286,8 @@ typedef struct clustering {
     float *row;      /* [count] squared distances of one candidate */
     int *medoid;     /* [wanted] index of the candidate */
     bool *chosen;    /* [count] the candidate is a medoid; the caller's array */
-    int *nearest;    /* [count] index in `medoid` */
+    /* [count] the nearest and the second nearest medoid: indices in `medoid` */
+    int *nearest, *runner_up;
     /* [count] squared distances from the nearest and the second nearest medoid */
     float *first, *second;
     double *removal; /* [wanted] change of the cost if the medoid is removed */
@@ -343,14 +346,19 @@ static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[
 /* Maximum number of candidates for which all distances are stored. */
 enum { DISTANCES_KEPT = 4096 };
 
+/* Returns the squared distance of the candidates i and j. */
+static float distance_between(const clustering *c, int i, int j)
+{
+    double x = c->at[i][0] - c->at[j][0], y = c->at[i][1] - c->at[j][1],
+           z = c->at[i][2] - c->at[j][2];
+    return (float)(x * x + y * y + z * z);
+}
+
 /* Sets row[j] to the squared distance of the candidates i and j. */
 static void compute_row(const clustering *c, int i, float *row)
 {
-    for (int j = 0; j < c->count; j++) {
-        double x = c->at[i][0] - c->at[j][0], y = c->at[i][1] - c->at[j][1],
-               z = c->at[i][2] - c->at[j][2];
-        row[j] = (float)(x * x + y * y + z * z);
-    }
+    for (int j = 0; j < c->count; j++)
+        row[j] = distance_between(c, i, j);
 }
 
 /* Returns the squared distances of candidate i from all candidates, valid until the next call. */
@@ -375,12 +383,13 @@ static bool clustering_make(clustering *c, const ebpo_choice *choice, bool *chos
                        .medoid = ebpo_alloc(k, sizeof *c->medoid),
                        .chosen = chosen,
                        .nearest = ebpo_alloc(n, sizeof *c->nearest),
+                       .runner_up = ebpo_alloc(n, sizeof *c->runner_up),
                        .first = ebpo_alloc(n, sizeof *c->first),
                        .second = ebpo_alloc(n, sizeof *c->second),
                        .removal = ebpo_alloc(k, sizeof *c->removal),
                        .change = ebpo_alloc(k, sizeof *c->change) };
-    bool good = c->at && (c->distance || !kept) && c->row && c->medoid && c->nearest && c->first &&
-                c->second && c->removal && c->change;
+    bool good = c->at && (c->distance || !kept) && c->row && c->medoid && c->nearest &&
+                c->runner_up && c->first && c->second && c->removal && c->change;
     for (uint64_t i = 0; i < n && good; i++)
         place_normal(choice, choice->candidates[i].normal, c->at[i]);
     for (uint64_t i = 0; i < n && good && kept; i++)
@@ -395,6 +404,7 @@ static void clustering_free(clustering *c)
     free(c->row);
     free(c->medoid);
     free(c->nearest);
+    free(c->runner_up);
     free(c->first);
     free(c->second);
     free(c->removal);
@@ -413,23 +423,31 @@ static void choose_at_random(clustering *c, uint64_t seed)
     }
 }
 
-/* Finds the two nearest medoids of each candidate. */
-static void assign_medoids(clustering *c)
+/* Finds the two nearest medoids of candidate i. */
+static void assign_medoids(clustering *c, int i)
 {
-    for (int i = 0; i < c->count; i++) {
-        const float *row = distances_of(c, i);
-        c->first[i] = c->second[i] = INFINITY;
-        c->nearest[i] = 0;
-        for (int m = 0; m < c->wanted; m++) {
-            float d = row[c->medoid[m]];
-            if (d < c->first[i]) {
-                c->second[i] = c->first[i];
-                c->first[i] = d;
-                c->nearest[i] = m;
-            } else if (d < c->second[i])
-                c->second[i] = d;
+    c->first[i] = c->second[i] = INFINITY;
+    c->nearest[i] = c->runner_up[i] = 0;
+    for (int m = 0; m < c->wanted; m++) {
+        float d = distance_between(c, i, c->medoid[m]);
+        if (d < c->first[i]) {
+            c->second[i] = c->first[i];
+            c->runner_up[i] = c->nearest[i];
+            c->first[i] = d;
+            c->nearest[i] = m;
+        } else if (d < c->second[i]) {
+            c->second[i] = d;
+            c->runner_up[i] = m;
         }
     }
+}
+
+/* Computes the change of the cost by the removal of each medoid. */
+static void sum_removals(clustering *c)
+{
+    memset(c->removal, 0, (size_t)c->wanted * sizeof *c->removal);
+    for (int i = 0; i < c->count; i++)
+        c->removal[c->nearest[i]] += (double)c->second[i] - (double)c->first[i];
 }
 
 /* Returns the least change of the cost if candidate `h` replaces a medoid, and sets *which to the
@@ -454,31 +472,52 @@ static double best_swap_for(clustering *c, int h, int *which)
     return c->change[*which] + shared;
 }
 
-/* Makes the best swap. Returns false if no swap lowers the cost. */
-static bool swap_once(clustering *c)
+/* Replaces medoid m by candidate h. */
+static void swap_medoid(clustering *c, int m, int h)
 {
-    int leave = -1, enter = -1; /* index of the medoid to replace; the candidate that replaces it */
-    double best = -1e-9;        /* a change nearer to 0 is a rounding error */
-    memset(c->removal, 0, (size_t)c->wanted * sizeof *c->removal);
-    for (int i = 0; i < c->count; i++)
-        c->removal[c->nearest[i]] += (double)c->second[i] - (double)c->first[i];
-    for (int h = 0; h < c->count; h++) {
-        int which;
-        if (c->chosen[h])
-            continue;
-        double change = best_swap_for(c, h, &which);
-        if (change < best)
-            best = change, leave = which, enter = h;
+    const float *row = distances_of(c, h);
+    c->chosen[c->medoid[m]] = false;
+    c->chosen[h] = true;
+    c->medoid[m] = h;
+    for (int i = 0; i < c->count; i++) {
+        float d = row[i];
+        if (c->nearest[i] == m || c->runner_up[i] == m)
+            assign_medoids(c, i);
+        else if (d < c->first[i]) {
+            c->second[i] = c->first[i];
+            c->runner_up[i] = c->nearest[i];
+            c->first[i] = d;
+            c->nearest[i] = m;
+        } else if (d < c->second[i]) {
+            c->second[i] = d;
+            c->runner_up[i] = m;
+        }
     }
-    if (enter < 0)
-        return false;
-    c->chosen[c->medoid[leave]] = false;
-    c->chosen[enter] = true;
-    c->medoid[leave] = enter;
-    return true;
+    sum_removals(c);
 }
 
-/* Finds the best medoid if only one is wanted. (swap_once needs a second nearest medoid.) */
+/* Swaps until no candidate can replace a medoid at a lower cost. */
+static void improve_medoids(clustering *c)
+{
+    /* each swap lowers the cost; the limit prevents an endless loop caused by rounding errors */
+    enum { SWAPS_MAX = 10000000 };
+    for (int i = 0; i < c->count; i++)
+        assign_medoids(c, i);
+    sum_removals(c);
+    int swaps = 0, unchanged = 0; /* unchanged: number of candidates since the last swap */
+    for (int h = 0; unchanged < c->count && swaps < SWAPS_MAX; h = h + 1 < c->count ? h + 1 : 0) {
+        int m;
+        unchanged++;
+        /* a change nearer to 0 than 1e-9 is a rounding error */
+        if (c->chosen[h] || !(best_swap_for(c, h, &m) < -1e-9))
+            continue;
+        swap_medoid(c, m, h);
+        swaps++;
+        unchanged = 0;
+    }
+}
+
+/* Finds the best medoid if only one is wanted. (A swap needs a second nearest medoid.) */
 static void single_medoid(clustering *c)
 {
     double best = INFINITY;
@@ -498,8 +537,6 @@ static void single_medoid(clustering *c)
 /* Chooses by k-medoids, from random first medoids. Returns false when out of memory. */
 static bool choose_kmedoids(const ebpo_choice *choice, bool *chosen)
 {
-    /* each swap lowers the cost; the limit prevents an endless loop caused by rounding errors */
-    enum { SWAPS_MAX = 100000 };
     ebpo_choice all = *choice;
     if (choice->wanted < 1)
         return true;
@@ -510,12 +547,8 @@ static bool choose_kmedoids(const ebpo_choice *choice, bool *chosen)
         choose_at_random(&c, choice->seed);
         if (all.wanted == 1)
             single_medoid(&c);
-        else if (all.wanted < all.count) {
-            int swaps = 0;
-            do
-                assign_medoids(&c);
-            while (swap_once(&c) && ++swaps < SWAPS_MAX);
-        }
+        else if (all.wanted < all.count)
+            improve_medoids(&c);
     }
     clustering_free(&c);
     return good;
