@@ -317,6 +317,36 @@ async function modelFirst(browser, address) {
   await context.close();
 }
 
+// The second half of the page arrives late. The code waits for it, also if no model is requested.
+async function pageLate(browser, address) {
+  const html = Buffer.from(await (await fetch(address)).text()), { port } = new URL(address);
+  const server = createHttp((request, response) => {
+    if (!/^\/(\?|$)/.test(request.url))
+      return send({ port, path: request.url, headers: request.headers }, (far) => far.pipe(response.writeHead(far.statusCode, far.headers))).end();
+    response.writeHead(200, { 'content-type': 'text/html' }).write(html.subarray(0, html.indexOf('<body>')));
+    return setTimeout(() => response.end(html.subarray(html.indexOf('<body>'))), 3000);
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  for (const query of ['file=models/small.ebpo.h5', 'model=models/small.ebpo.h5&model=models/red.ebpo.h5']) {
+    const page = await show(browser, `http://localhost:${server.address().port}/?${query}`);
+    assert.equal((await settled(page)).error, undefined);
+    await page.close();
+  }
+  server.closeAllConnections();
+  server.close();
+}
+
+// The page's code fails. The page says so.
+async function codeFails(browser, address) {
+  const page = await browser.newPage({ viewport: SIZE }), failed = new Promise((done) => page.on('pageerror', done));
+  await page.route('**/app.js', (route) => route.abort());
+  await page.goto(`${address}?file=models/small.ebpo.h5`, { waitUntil: 'commit' });
+  await failed;
+  assert.match(await page.textContent('#openingText'), /The page's code could not be run/);
+  assert.ok(await page.isVisible('#openingText'));
+  await page.close();
+}
+
 // A file below 1 MiB takes one request. The second visit fetches no bytes, unless the file has changed.
 async function oneRequest(browser, address) {
   const name = 'small', file = join(models, `${name}.ebpo.h5`), context = await browser.newContext({ viewport: SIZE, reducedMotion: 'reduce' }), ways = [];
@@ -1074,6 +1104,8 @@ async function main() {
   await page.close();
   await step('errors state the problem and the next step', () => errors(browser, address));
   await step('the model is requested before the page\'s code is loaded', () => modelFirst(browser, address));
+  await step('the code waits for the page', () => pageLate(browser, address));
+  await step('a failure of the code is reported', () => codeFails(browser, address));
   await step('a small file needs one request, and is fetched again only after a change', () => oneRequest(browser, address));
   await step('the address describes the view, and Back works', () => shares(browser, address));
   await step('distances and sections agree with the faces', () => measures(browser, address));

@@ -39,8 +39,15 @@
     boot.context ??= document.getElementById('canvas').getContext('webgl2', boot.contextOptions);
   })), { once: true });
 
-  // app.js is fetched in parallel, but run only when the worker has HEAD_BYTES: the response passes through this thread, and three.js would delay it.
-  const begin = () => (boot.app ??= import('./app.js').catch((error) => boot.onerror?.(error)));
+  // app.js is fetched in parallel, but run only when the page is parsed, as app.js needs its elements and import map, and when the worker has HEAD_BYTES:
+  // the response passes through this thread, and three.js would delay it.
+  const parsed = new Promise((done) => addEventListener('DOMContentLoaded', done, { once: true }));
+  const begin = () => (boot.app ??= parsed.then(() => import('./app.js')).catch((error) => {
+    boot.over();
+    document.documentElement.classList.add('opening');
+    document.getElementById('openingText').textContent = `The page's code could not be run (${error.message}); reload the page`;
+    reportError(error);
+  }));
 
   try {
     boot.url = query.get('file') ? new URL(query.get('file'), location.href).href : undefined;
