@@ -179,8 +179,18 @@ build_package() {
 }
 
 mkdir -p "$deps/include"
-[ -f "$sources/.done" ] || { fetch_sources && touch "$sources/.done"; }
-[ -f "$deps/.complete" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.complete"; }
+# No "&&" in the braces: left of it, set -e does not end the script.
+[ -f "$sources/.done" ] || {
+    fetch_sources
+    touch "$sources/.done"
+}
+[ -f "$deps/.complete" ] || {
+    build_zstd
+    build_zlib
+    build_nettle
+    build_gmp
+    touch "$deps/.complete"
+}
 folders='core|geometry|io|hdf5_read|hdf5_write|mesh|format'
 build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
 build_library -small "$folders|levels_surface" -Os # for the viewers' module, whose size delays the first picture
