@@ -160,11 +160,14 @@ static ebpo_status check_paint_file(reader *r, ebpo_head_object root, ebpo_error
                               status == EBPO_OK && strcmp(format, "EBP-Octree in HDF5") == 0
                                   ? " but a model; paint files mostly end in .paint.h5"
                                   : "; name a .paint.h5 file");
-    status = ebpo_head_get_int(&r->head, root, "/", "format_version_major", &major, error);
-    if (status == EBPO_OK)
-        status = ebpo_head_get_int(&r->head, root, "/", "format_version_minor", &minor, error);
+    const char *name = "format_version_major";
+    status = ebpo_head_get_int(&r->head, root, "/", name, &major, error);
+    if (status == EBPO_OK) {
+        name = "format_version_minor";
+        status = ebpo_head_get_int(&r->head, root, "/", name, &minor, error);
+    }
     if (status == EBPO_E_ABSENT)
-        return fail_missing(r, "/", "format_version", error);
+        return fail_missing(r, "/", name, error);
     if (status == EBPO_OK && major != EBPO_PAINT_FORMAT_MAJOR)
         return ebpo_fail_file(error, EBPO_E_VERSION, r->input.shown,
                               "the paint file has version %" PRId64

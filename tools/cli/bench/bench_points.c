@@ -46,6 +46,12 @@ static int fill_from_mesh(bench_points *out, ebpo_file *file, const bench_scene 
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh mesh = { 0 };
     double square = 0;
+    if (out->kind != POINTS_RAYS && !(report->area > 0)) {
+        fputs("ebpo bench: no face of the model has an area, so there is no path on it; give "
+              "--points uniform\n",
+              stderr);
+        return EXIT_FAILED;
+    }
     if (ebpo_file_read_mesh(file, NULL, &mesh, &error) != EBPO_OK)
         return command_failed("bench", &error);
     for (int k = 0; k < 3; k++)

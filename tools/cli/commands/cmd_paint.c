@@ -320,28 +320,32 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uin
 
 /* --- baking --- */
 
-/* Returns the colours of vertices before painting, [vertex_count][4]: the colours of the model or,
- * if it has none, the colour of --base. Returns NULL after an error. */
-static uint8_t *base_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *error)
+/* Sets *rgba to the colours of vertices before painting, [vertex_count][4]: the colours of the
+ * model or, if it has none, the colour of --base. The caller frees *rgba. */
+static ebpo_status base_colours(paint_job *j, const ebpo_mesh *mesh, uint8_t **rgba,
+                                ebpo_error *error)
 {
     ebpo_colours colours;
     uint32_t base = 0xe6e6e6ff;
+    *rgba = NULL;
     if (j->v->base)
         (void)paint_read_colour(j->v->base, &base);
-    if (ebpo_mesh_colours(mesh, &colours, error) != EBPO_OK)
-        return NULL;
-    uint8_t *rgba = colours.vertex;
+    ebpo_status status = ebpo_mesh_colours(mesh, &colours, error);
+    if (status != EBPO_OK)
+        return status;
+    *rgba = colours.vertex;
     colours.vertex = NULL;
     ebpo_colours_free(&colours);
-    j->has_own_colours = rgba != NULL;
-    if (rgba)
-        return rgba;
-    rgba = malloc(4 * mesh->vertex_count);
-    if (!rgba)
-        (void)fail_paint(error, EBPO_E_MEMORY, "not enough memory for the colours of all vertices");
-    for (uint64_t i = 0; rgba && i < 4 * mesh->vertex_count; i++)
-        rgba[i] = (uint8_t)(base >> (24 - 8 * (i % 4)));
-    return rgba;
+    j->has_own_colours = *rgba != NULL;
+    if (*rgba)
+        return EBPO_OK;
+    *rgba = malloc(4 * mesh->vertex_count);
+    if (!*rgba)
+        return fail_paint(error, EBPO_E_MEMORY,
+                          "not enough memory for the colours of all vertices");
+    for (uint64_t i = 0; i < 4 * mesh->vertex_count; i++)
+        (*rgba)[i] = (uint8_t)(base >> (24 - 8 * (i % 4)));
+    return EBPO_OK;
 }
 
 static ebpo_status write_baked(paint_job *j, ebpo_mesh *mesh, const uint8_t *rgba,
@@ -378,9 +382,10 @@ static ebpo_status paint_bake(paint_job *j, ebpo_error *error)
         status = ebpo_file_read_source_mesh(j->file, &read, &mesh, NULL, error);
     if (status != EBPO_OK)
         return status;
-    uint8_t *rgba = base_colours(j, &mesh, error);
-    status = rgba ? ebpo_paint_bake(j->paint, j->context, &mesh, &options, rgba, &j->baked, error)
-                  : EBPO_E_MEMORY;
+    uint8_t *rgba;
+    status = base_colours(j, &mesh, &rgba, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_bake(j->paint, j->context, &mesh, &options, rgba, &j->baked, error);
     if (status == EBPO_OK)
         status = write_baked(j, &mesh, rgba, error);
     free(rgba);

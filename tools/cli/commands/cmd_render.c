@@ -21,6 +21,7 @@
 #include "cli/words.h"
 #include "cli/commands/commands.h"
 #include "cli/render/level_normals.h"
+#include "cli/render/level_surface.h"
 #include "cli/render/picture.h"
 #include "cli/render/raster.h"
 
@@ -139,18 +140,10 @@ static int parse_values(job *j)
 
 /* --- loading --- */
 
-/* Loads the simplified surface of a level. Reads no other parts of the file. */
 static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *error)
 {
-    const ebpo_info *info = ebpo_file_info(file);
-    ebpo_surface surface = { 0 };
     ebpo_surface_mesh made = { 0 };
-    uint64_t *patches = NULL, count = 0;
-    ebpo_status status = ebpo_file_read_surface(file, 0, t->level, &surface, error);
-    if (status == EBPO_OK)
-        status = ebpo_surface_select(&surface, t->level, &patches, &count, error);
-    if (status == EBPO_OK)
-        status = ebpo_surface_join(&surface, info, patches, count, &made, error);
+    ebpo_status status = level_surface(file, t->level, &made, error);
     if (status == EBPO_OK)
         snprintf(t->caption, sizeof t->caption, "level %d: %llu %s, error %.2g", t->level,
                  (unsigned long long)made.mesh.face_count,
@@ -158,8 +151,6 @@ static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *erro
     t->mesh = made.mesh;
     t->colours = made.colours;
     t->vertex_normals = made.normals;
-    ebpo_surface_free(&surface);
-    free(patches);
     return status;
 }
 

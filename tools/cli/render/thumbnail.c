@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/remote_args.h"
 #include "cli/render/level_normals.h"
+#include "cli/render/level_surface.h"
 #include "cli/render/picture.h"
 #include "cli/render/raster.h"
 
@@ -41,23 +42,15 @@ static int patch_level(const ebpo_surface *table)
 
 static ebpo_status load_surface(drawing *d, const ebpo_file *file, ebpo_error *error)
 {
-    ebpo_surface surface = { 0 };
+    ebpo_surface table = { 0 };
     ebpo_surface_mesh made = { 0 };
-    uint64_t *patches = NULL, count = 0;
-    ebpo_status status = ebpo_file_read_patches(file, &surface, error);
-    int level = status == EBPO_OK ? patch_level(&surface) : 0;
-    ebpo_surface_free(&surface);
+    ebpo_status status = ebpo_file_read_patches(file, &table, error);
     if (status == EBPO_OK)
-        status = ebpo_file_read_surface(file, 0, level, &surface, error);
-    if (status == EBPO_OK)
-        status = ebpo_surface_select(&surface, level, &patches, &count, error);
-    if (status == EBPO_OK)
-        status = ebpo_surface_join(&surface, ebpo_file_info(file), patches, count, &made, error);
+        status = level_surface(file, patch_level(&table), &made, error);
     d->mesh = made.mesh;
     d->colours = made.colours;
     d->vertex_normals = made.normals;
-    ebpo_surface_free(&surface);
-    free(patches);
+    ebpo_surface_free(&table);
     return status;
 }
 
