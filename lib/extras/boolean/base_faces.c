@@ -1,7 +1,7 @@
 /* Finds the faces of the first operand near the other operands.
  *
- * Every face that is not found is outside of all other operands. So the result either has all faces
- * that are not found, or none of them. */
+ * Every other face of the first operand is outside all other operands. So either all these faces
+ * bound the result, or none of them does. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/base_faces.h"

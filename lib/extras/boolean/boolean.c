@@ -2,10 +2,10 @@
  * difference and complement) at points of the world.
  *
  * An expression is a list of nodes. Each node refers to earlier nodes or to an operand. The states
- * of the operands (in, out, or unknown) give the possible results. If a point is on the boundary of
- * an operand, the result is computed on both sides of this boundary. Operands are queried until the
- * result is certain. Proofs: docs/develop/booleans.md. The object is immutable after creation; each
- * thread has separate contexts. */
+ * of the operands (in, out, or unknown) give the possible results. If a point is on a face of an
+ * operand, the result is computed on both sides of the face. Operands are queried until the result
+ * is certain. Proofs: docs/develop/booleans.md. The object is immutable after creation; each thread
+ * has separate contexts. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -152,8 +152,8 @@ uint64_t ebpo_expression_operands(const ebpo_expression *e)
     return operands;
 }
 
-/* Computes a box that contains the result of an operation on contents of the boxes a and b. The box
- * of a difference is a. */
+/* Computes a box that contains the result of an operation on two solids, one in box a and one in
+ * box b. The box of a difference is a. */
 static void combine_boxes(int32_t operation, const double a[6], const double b[6], double out[6])
 {
     bool smaller = operation == EBPO_BOOLEAN_INTERSECTION;
@@ -349,7 +349,8 @@ static bool same_plane(const double a[3][3], const double b[3][3])
     return true;
 }
 
-/* Adds the states of operand i. sides: the operand's winding numbers there. */
+/* Adds the states of operand i. sides: the operand's winding numbers at the point, on both sides of
+ * the face that contains the point. */
 static void add_states(operand_states *o, uint32_t i, ebpo_rule rule, const ebpo_posed_sides *sides)
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),
@@ -371,8 +372,8 @@ static void add_states(operand_states *o, uint32_t i, ebpo_rule rule, const ebpo
     o->on = true;
 }
 
-/* Sets the result. may: possible states that follow from the known states of operands. If all faces
- * through the point are in one plane, the states on both sides of the plane decide. */
+/* Sets the result. may: the result's possible states, computed from the known states of operands.
+ * If all faces through the point are in one plane, the states on both sides of the plane decide. */
 static void conclude_result(const ebpo_boolean *b, const operand_states *o, unsigned may,
                             ebpo_boolean_result *out)
 {

@@ -1,6 +1,6 @@
 /* Finds the cells of the result of a Boolean expression: cells of an octree of the world that are
- * entirely inside (in-cells), and cells of the finest level that may have points of both states
- * (mixed cells).
+ * entirely inside (in-cells), and cells of the finest level that may have points inside and outside
+ * (mixed cells). The other cells are entirely outside (out-cells).
  *
  * The search goes level by level. The children of all mixed cells are classified on all processor
  * cores, and mixed children continue to the next level. Cells are kept in the order of octcodes
@@ -55,7 +55,7 @@ typedef struct walk {
     ebpo_cells_options options;
     candidate *candidates;    /* [8 * PARENTS] cells of `level` */
     ebpo_world_cell *parents; /* mixed cells of the level above */
-    ebpo_world_cell *next;    /* mixed cells of `level` that have been found */
+    ebpo_world_cell *next;    /* mixed cells of `level`, found so far */
     uint64_t parent_count, parent_capacity, next_count, next_capacity;
     int level;
 } walk;
@@ -244,7 +244,8 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
  * Between an in-cell and an out-cell there is always a mixed cell. So each square is a side of a
  * mixed cell. */
 
-/* A corner of cells of the finest level: its coordinates in cells, 21 bits each; x is lowest. */
+/* A corner of cells of the finest level: its coordinates in units of a cell's edge, with 21 bits
+ * for each. The lowest bits are x. */
 typedef uint64_t corner;
 
 typedef struct squares {
@@ -305,8 +306,8 @@ static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, 
     return EBPO_OK;
 }
 
-/* Adds the sides of a mixed cell that are on the wanted surface. side: EBPO_BOOLEAN_INNER: sides to
- * in-cells; EBPO_BOOLEAN_OUTER: sides to out-cells. */
+/* Adds the sides of a mixed cell that are on the requested surface. EBPO_BOOLEAN_INNER requests the
+ * sides next to in-cells, EBPO_BOOLEAN_OUTER the sides next to out-cells. */
 static ebpo_status add_sides(squares *s, ebpo_octcode code, ebpo_boolean_side side,
                              ebpo_error *error)
 {

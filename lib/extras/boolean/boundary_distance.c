@@ -2,15 +2,15 @@
  *
  * A point has a *state*: it is in or out of the result. The boundary is a part of the operands'
  * faces, so it is not nearer than the nearest face. If a point just behind the nearest face has
- * another state than the given point, the distance of this face is returned. Otherwise a search
- * over cells of the world, the nearest first, bounds the distance of the points with the other
- * state. A cell that is completely in this state gives an upper bound. A cell that is completely in
- * the state of the given point is dropped. A mixed cell may have points of both states, and is
- * divided.
+ * another state than the given point, the distance of the nearest face is returned. Otherwise a
+ * search over cells of the world, the nearest first, bounds the distance of the points with the
+ * other state. A cell whose points all have the other state gives an upper bound. A cell whose
+ * points all have the given point's state is dropped. A mixed cell may have points of both states,
+ * and is divided.
  *
  * There are two searches. The first one does not divide cells that are small compared with their
- * distance and the tolerance. So it finds an upper bound soon; if it divided small cells, it could
- * spend all its cells along a near boundary. If the bounds are too wide, the second search divides
+ * distance and the tolerance. Otherwise it could reach the maximum number of cells along a near
+ * boundary before it finds an upper bound. If the bounds are too wide, the second search divides
  * down to the finest cells. Both searches stop at the maximum number of cells. */
 #include "core/strict_fp.h"
 
@@ -194,8 +194,8 @@ typedef struct measuring {
     ebpo_boundary_distance *out;
 } measuring;
 
-/* Evaluates a point q. If its state differs from the state of the given point, the boundary is not
- * farther away than q, and this distance becomes the upper bound. */
+/* Evaluates a point q. If the state of q differs from the state of the given point, the boundary is
+ * not farther away than q. Then the distance of q becomes the upper bound, if it is less. */
 static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *error)
 {
     ebpo_boolean_result result;
@@ -227,7 +227,7 @@ static ebpo_status try_behind(const measuring *m, const ebpo_posed_solid *s, con
 }
 
 /* Sets *lo to a lower bound of the distance of the operand's posed faces, and tries points behind
- * the nearest one. */
+ * the nearest point of these faces. */
 static ebpo_status inspect_operand(const measuring *m, uint32_t operand, double *lo,
                                    ebpo_error *error)
 {

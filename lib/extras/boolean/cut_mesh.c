@@ -19,7 +19,8 @@ static const char stage[] = "cut faces";
 
 enum { FACES_AT_ONCE = 1 << 14, GRAIN = 16 };
 
-/* This bit marks the number of a point of `set` until the number of corners is known. */
+/* Marks a vertex number as an index in ebpo_cut_mesh.set. number_vertices replaces such a number
+ * when the number of corners, which precede the points of the set, is known. */
 #define NEW_POINT (UINT32_C(1) << 31)
 
 typedef struct cutting {

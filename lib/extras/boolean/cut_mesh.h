@@ -19,8 +19,9 @@ typedef struct ebpo_cut_mesh {
     uint64_t faces_cut; /* faces of more than one triangle */
 } ebpo_cut_mesh;
 
-/* Cuts the faces, whose pairs have been found. Adds new points to the corners of the list if their
- * coordinates are doubles, else to out->set. Must be freed, also after a failure. */
+/* Cuts the faces along their intersections with their partners (face_list.h). Adds new points to
+ * the corners of the list if their coordinates are doubles, else to out->set. Must be freed, also
+ * after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_cut_mesh_make(ebpo_cut_mesh *out, ebpo_face_list *faces,
                                              const ebpo_progress *progress, ebpo_error *error);
 void ebpo_cut_mesh_free(ebpo_cut_mesh *cut);

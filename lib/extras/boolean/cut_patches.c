@@ -5,8 +5,8 @@
  * operands are constant in front of a patch, and constant behind it. The same holds for a component
  * of whole faces (operand_mesh.h), so its listed faces are joined to one patch. The winding numbers
  * are computed exactly at an inner point of one triangle of the patch. The patch bounds the result
- * if the expression differs on its two sides. This rule covers coplanar faces, operands that touch,
- * and operands that intersect themselves.
+ * if the expression has different values on the two sides of the patch. This rule covers coplanar
+ * faces, operands that touch, and operands that intersect themselves.
  *
  * The boundary of a set is closed. So each edge occurs in the selected triangles equally often in
  * both directions. This is checked before the result is used. */
@@ -47,7 +47,7 @@ static ebpo_status list_edges(edge_lists *e, const ebpo_cut_mesh *cut, ebpo_erro
     e->edge = ebpo_alloc(3 * cut->count, sizeof *e->edge);
     if (!e->begin || !e->edge)
         return ebpo_fail_memory(error, 8 * vertices + 24 * cut->count);
-    uint64_t *end = e->begin + 1; /* while filling: end[i + 1] is the end of list i */
+    uint64_t *end = e->begin + 1; /* end[i]: first the start of list i; after filling, its end */
     for (uint64_t t = 0; t < cut->count; t++)
         for (int i = 0; i < 3; i++) {
             uint32_t a = cut->triangle[t][i], b = cut->triangle[t][i == 2 ? 0 : i + 1];
@@ -74,8 +74,8 @@ static void free_edges(edge_lists *e)
 /* --- patches --- */
 
 /* Patches are kept in a disjoint-set forest. The entry of a triangle is (parent << 1 | flip). The
- * flip is 1 if the triangle and its parent have opposite orientations in the patch. Roots are the
- * first triangles of the patches. */
+ * flip is 1 if the triangle and its parent have opposite orientations: their normals point to
+ * different sides of the patch. The root of a patch is its first triangle. */
 
 /* Returns (root << 1 | flip), where the flip is that of the triangle relative to the root. Shortens
  * the path to the root. */
@@ -198,9 +198,9 @@ static void find_changes(const ebpo_cut_mesh *cut, uint32_t triangle,
             cut->cover[low].opposite ? -1 : 1;
 }
 
-/* Fails unless the base has the winding numbers of a simple solid, 0 or 1, on both sides of a
- * triangle. Faces of the base that are not listed stay as they are. So with another winding number,
- * the changed mesh would have winding numbers other than 0 and 1. */
+/* Fails if the base (face_list.h) has a winding number other than 0 and 1 on a side of a triangle.
+ * Faces of the base that are not listed do not change. So the changed mesh would have winding
+ * numbers other than 0 and 1, too. */
 static ebpo_status check_base(int32_t front, int32_t behind, ebpo_error *error)
 {
     if ((front == 0 || front == 1) && (behind == 0 || behind == 1))
@@ -316,7 +316,7 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
  * edge is a whole face of the same component, and is not listed. If the faces of the base that are
  * not listed stay in the result (keeps_base), the difference between the selected triangles and all
  * triangles of the base is tested. The base is closed, so the result is closed if this difference
- * is. */
+ * is closed. */
 static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)
 {
     for (uint64_t i = 0, next, all = 3 * cut->count, v = 0; i < all; i = next) {

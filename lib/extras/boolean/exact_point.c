@@ -199,9 +199,10 @@ int ebpo_exact_order(const ebpo_exact_point *p, const ebpo_exact_point *q)
     return order;
 }
 
-/* Returns the sign of the turn by rounded coordinates, or EBPO_SIGN_UNKNOWN. A coordinate of size
- * at most m has an error of at most 2^-53 m + 2^-1075, so a difference has an error of at most
- * 2^-51 (m + 2^-1000), and the sum of the errors of all products and roundings is below `bound`. */
+/* Returns the sign of the turn by rounded coordinates, or EBPO_SIGN_UNKNOWN. A coordinate with an
+ * absolute value of at most m has an error of at most 2^-53 m + 2^-1075, so a difference has an
+ * error of at most 2^-51 (m + 2^-1000), and the sum of the errors of all products and roundings is
+ * below `bound`. */
 static int filter_turn(int u, int v, const double a[3], const double b[3], const double c[3])
 {
     double bu = b[u] - a[u], bv = b[v] - a[v], cu = c[u] - a[u], cv = c[v] - a[v];

@@ -2,7 +2,8 @@
  * one number. Each object is for one thread. If memory is short, GMP ends the program.
  *
  * A plane or three points are *seen against an axis* by an observer who looks in the direction of
- * the negative axis: x, y and z axes are seen with y, z, x to the right and z, x, y upwards. */
+ * the negative axis. Seen against the x axis, y points to the right and z upwards; against the y
+ * axis, z to the right and x upwards; against the z axis, x to the right and y upwards. */
 #ifndef EBPO_BOOLEAN_EXACT_POINT_H
 #define EBPO_BOOLEAN_EXACT_POINT_H
 
@@ -15,7 +16,7 @@
 typedef struct ebpo_exact_point {
     mpz_t x[4];
     double at[3]; /* the coordinates, rounded to the nearest double; never -0 */
-    bool exact;   /* `at` are exactly the coordinates */
+    bool exact;   /* `at` is not rounded: it is exactly the point */
 } ebpo_exact_point;
 
 /* A plane: the points with n[0] x[0] + n[1] x[1] + n[2] x[2] + n[3] x[3] = 0. */

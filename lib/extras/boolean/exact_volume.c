@@ -1,11 +1,11 @@
 /* Computes the exact volume of the result of a Boolean expression, if no face of an operand
  * intersects a face of another operand, and no operand intersects itself.
  *
- * Then each patch of connected faces is entirely in or out of every other operand. So the result
- * is bounded by all faces of a patch, by all of them reversed, or by none of them. The volumes
- * below the bounding faces are summed without rounding (volume_sum.h), and the sum is rounded once.
- * If faces intersect, the result names a pair of intersecting faces as the reason why there is no
- * exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
+ * Without such intersections, each patch of connected faces is entirely in or out of every other
+ * operand. So the result is bounded by all faces of a patch, by all of them reversed, or by none of
+ * them. The volumes below the bounding faces are summed without rounding (volume_sum.h), and the
+ * sum is rounded once. If faces intersect, the result names a pair of intersecting faces as the
+ * reason why there is no exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -213,8 +213,8 @@ static ebpo_status own_winding(const operand *o, ebpo_context *context, const do
 static ebpo_status winding_in_front(const operand *o, unsigned worker, const double t[3][3],
                                     int32_t *front, ebpo_error *error)
 {
-    /* sign of the component of the normal along the infinitesimal shift: below 0, the shifted point
-     * is behind the face, where the winding number is greater by 1 */
+    /* sign of the component of the normal along the infinitesimal shift. If the sign is -1, the
+     * shifted point is behind the face, where the winding number is greater by 1. */
     int shifted = 0;
     for (int k = 0; k < 3 && shifted == 0; k++)
         shifted = ebpo_normal_sign(k, t[0], t[1], t[2]);
@@ -253,7 +253,7 @@ static int is_in(const operand *o, uint64_t around, int32_t winding)
     return ebpo_boolean_holds(o->m->b, in);
 }
 
-/* Computes the signs of patches. */
+/* Computes the signs of patches (operand.sign). */
 static ebpo_status query_patches(void *user, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -288,7 +288,8 @@ static ebpo_status add_faces(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Lists the first faces of patches. A face without area is a patch that is not listed. */
+/* Lists the first faces of patches. A face without area forms a patch alone, which is not
+ * listed. */
 static ebpo_status find_heads(operand *o, uint64_t faces, ebpo_error *error)
 {
     uint64_t capacity = 0;

@@ -4,7 +4,7 @@
  * of the planes. Each face has an interval on this line; the exact ends of both intervals are
  * compared. If two faces are in one plane, the edges of the other face are clipped to the face. All
  * segments and the edges of the face are divided where they intersect, and the face is triangulated
- * so that the undivided parts are edges.
+ * so that the parts between these points are edges.
  *
  * Both faces of a pair get the same points. So the triangles on both sides of a cut, and on both
  * sides of a common edge of two faces, have equal vertices. If several faces in one plane contain a
@@ -152,7 +152,8 @@ static bool note_edge_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint
  * face in the same plane. */
 static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo_exact_point *q)
 {
-    int of_p[3], of_q[3], count = 0; /* of_p[i]: p's side of edge i: 1 inner, -1 outer */
+    int of_p[3], of_q[3], count = 0; /* of_p[i]: side of edge i of the face on which p is: 1 inner,
+                                        -1 outer, 0: on the edge's line */
     bool added = true, p_in = true, q_in = true;
     uint32_t range[2] = { 0, 0 };
     for (int i = 0; i < 3; i++) {
@@ -307,7 +308,8 @@ static bool bound_triangles(ebpo_face_cutter *c)
 }
 
 /* Returns true if the other face contains the triangle. The triangle does not cross edges of the
- * other face, so it is in that face if its corners are. orientation: that of the other face. */
+ * other face, so it is in that face if its corners are. orientation: 1 if the other face is seen
+ * counter-clockwise, -1 if clockwise. */
 static bool is_covered(const ebpo_face_cutter *c, uint32_t triangle, int orientation)
 {
     const uint32_t *corner = c->triangulation.triangle[triangle].corner;

@@ -37,7 +37,8 @@ typedef struct ebpo_face_cutter {
     ebpo_triangulation triangulation;
     ebpo_exact_point corner[2][3]; /* corners of the face, and of the other face of a pair */
     ebpo_exact_plane plane[2];     /* planes of both faces */
-    ebpo_exact_point end[2][2];    /* ends of the part of each face in the plane of the other */
+    ebpo_exact_point end[2][2];    /* [face of the pair] ends of the segment in which the face
+                                      intersects the other face's plane */
     ebpo_exact_point copy;         /* used by add_point */
     uint32_t *coplanar;            /* other faces in the plane of the face */
     uint64_t coplanar_count, coplanar_capacity;
@@ -46,15 +47,17 @@ typedef struct ebpo_face_cutter {
     uint64_t kept_capacity;
     ebpo_cover *cover;
     uint64_t covers, cover_capacity;
-    struct ebpo_triangle_box *box; /* of the triangles, sorted by their least coordinate */
+    struct ebpo_triangle_box *box; /* boxes of the triangles, sorted by low[0] */
     uint64_t box_capacity;
 } ebpo_face_cutter;
 
-/* Begins. unit: all coordinates of the faces with partners are multiples of 2^unit. */
+/* Makes an empty cutter. unit: all coordinates of faces with partners (face_list.h) are multiples
+ * of 2^unit. */
 void ebpo_face_cutter_init(ebpo_face_cutter *cutter, const ebpo_face_list *faces, int unit);
 void ebpo_face_cutter_free(ebpo_face_cutter *cutter);
 
-/* Cuts a face along its intersections with its partners. Returns false without memory. */
+/* Cuts a face along its intersections with its partners, the faces that it intersects. Returns
+ * false without memory. */
 bool ebpo_face_cut(ebpo_face_cutter *cutter, uint32_t face, ebpo_face_pieces *out);
 
 #endif

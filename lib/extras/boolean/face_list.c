@@ -1,12 +1,12 @@
-/* Lists the faces that are cut, and the faces beside them.
+/* Lists the faces that are cut, and their neighbours.
  *
  * Pairs of intersecting faces are found first, in the hierarchies of the models. Then each operand
  * is read once to find which of its faces to list. So the size of the list depends on the cut, not
  * on the size of the models.
  *
  * The partners of a face are the faces with which it is paired. Faces without area bound nothing,
- * so they have no partners. The points of their edges are corners of faces with an area, and the
- * pairs of these faces are found. */
+ * so they get no partners. No cut is lost: the edges of such a face are also edges of faces with an
+ * area, whose pairs are found. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/face_list.h"
@@ -265,7 +265,8 @@ static ebpo_status list_partners(ebpo_face_list *faces, ebpo_error *error)
     faces->partner = ebpo_alloc(2 * faces->pairs, sizeof *faces->partner);
     if (!faces->begin || !faces->partner)
         return ebpo_fail_memory(error, 8 * (faces->count + faces->pairs));
-    uint64_t *end = faces->begin + 1; /* while filling: end[i + 1] is the end of face i's list */
+    uint64_t *end =
+        faces->begin + 1; /* end[i]: first the start of face i's list; after filling, its end */
     for (uint64_t i = 0; i < 2 * faces->pairs; i++)
         end[faces->pair[i / 2].face[i % 2] + 1]++;
     for (uint32_t f = 0; f < faces->count; f++)

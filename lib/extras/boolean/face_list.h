@@ -1,6 +1,6 @@
-/* Lists the faces of the operands that are cut, and the faces beside them, with one number for
- * equal corners. The other faces are not listed. They stay in the files, and one listed face of
- * each component of whole faces (operand_mesh.h) represents them. */
+/* Lists the faces of the operands that are cut, and their neighbours. Equal corners of listed faces
+ * get one number. Faces that are not listed stay in the files. Each of them belongs to a component
+ * of whole faces (operand_mesh.h), of which at least one face is listed. */
 #ifndef EBPO_BOOLEAN_FACE_LIST_H
 #define EBPO_BOOLEAN_FACE_LIST_H
 
@@ -19,7 +19,8 @@ typedef struct ebpo_face_list {
     const ebpo_boolean *boolean;
     ebpo_workspace *workspace; /* NULL: malloc */
     ebpo_corner_ids corners;
-    uint64_t given_corners;  /* number of corners of faces; cuts add more corners after these */
+    uint64_t
+        given_corners; /* number of corners before the faces are cut; cuts add corners after them */
     uint8_t *negative_zeros; /* for each given corner: a bit for each coordinate that is -0 */
     uint64_t negative_zeros_capacity;
     uint32_t (*face)[3]; /* corners of each face; EBPO_NO_CORNER first: the face has no area */
@@ -31,9 +32,9 @@ typedef struct ebpo_face_list {
      * is not listed (ebpo_boolean_find_equal) */
     uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX];
     ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand] */
-    /* changed_only: only the changes of operand 0, the *base*, are wanted. All faces of the base
-     * near other operands are listed, and no face of the base is whole. keeps_base: the faces of
-     * the base that are not listed are in the result. */
+    /* changed_only: the result gives only the changes of operand 0, the *base*. Then all faces of
+     * the base near other operands are listed, and no face of the base counts as whole. keeps_base:
+     * the base's faces that are not listed bound the result; if false, none of them does. */
     bool changed_only, keeps_base;
     uint32_t *base_source;   /* for each listed face of the base: its source index */
     ebpo_operand_pair *pair; /* intersecting pairs; freed when the partners are listed */

@@ -17,9 +17,10 @@ EBPO_MUST_USE ebpo_status ebpo_operand_mesh_read(ebpo_mesh *out, const ebpo_bool
 bool ebpo_moves_nothing(const ebpo_posing *posing);
 
 /* The faces of a posed mesh. A *whole* face has an area, and is in no pair of intersecting faces. A
- * *component* is a set of whole faces that are connected by edges (pairs of positions). An edge
- * connects if exactly two faces with an area have it, and both are whole. In front of all faces of
- * a component the winding numbers are equal, and behind all its faces, too. */
+ * *component* is a set of whole faces that are connected by edges. An edge is a pair of positions.
+ * It connects its faces if exactly two faces with an area have the edge, and both faces are whole.
+ * The winding numbers of all operands are the same in front of all faces of a component, and the
+ * same behind all its faces. */
 typedef struct ebpo_whole_faces {
     ebpo_workspace *workspace;
     /* [faces] number of the component; EBPO_NO_COMPONENT: the face is not whole. NULL: no face is
@@ -31,15 +32,15 @@ typedef struct ebpo_whole_faces {
      * - each face that is not whole,
      * - each whole face with two or more corners that are corners of faces in pairs,
      * - each whole face with an edge of more than two faces,
-     * - the first face of each component that has no face of the former kinds. */
+     * - the first face of each component without a face of these three kinds. */
     uint64_t *listed;
 } ebpo_whole_faces;
 
 #define EBPO_NO_COMPONENT UINT32_MAX
 
-/* Finds the components. paired: a bit for each face that is in a pair. Fails with EBPO_E_FORMAT if
- * the mesh is not closed: an edge of whole faces does not occur equally often in both directions.
- * Must be freed, also after a failure. */
+/* Finds the components. paired: one bit for each face, set if the face intersects another one.
+ * Fails with EBPO_E_FORMAT if the mesh is not closed: an edge of whole faces does not occur equally
+ * often in both directions. Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_whole_faces_find(ebpo_whole_faces *out, const ebpo_mesh *mesh,
                                                 const uint64_t *paired, unsigned threads,
                                                 const ebpo_progress *progress, ebpo_error *error);

@@ -26,8 +26,9 @@ typedef struct ebpo_carrying {
 /* Adds to the mesh the arrays of vertices and of faces that the operands of the expression have.
  * vertices, faces: numbers of rows for which memory is allocated. If an operand does not have an
  * array, its rows are 0, or 255 for bytes of colours. coloured: the faces of the mesh have colours
- * already. Notes in the mesh which arrays are not carried: arrays of other elements, lists, and
- * arrays with a name that the mesh already has. Must be freed, also after a failure. */
+ * already. Notes in the mesh which arrays are not carried: arrays of elements other than vertices
+ * and faces, lists, and arrays whose name the mesh already has. Must be freed, also after a
+ * failure. */
 EBPO_MUST_USE ebpo_status ebpo_carrying_begin(ebpo_carrying *c, const ebpo_boolean *b,
                                               ebpo_mesh *mesh, bool coloured, uint64_t vertices,
                                               uint64_t faces, ebpo_error *error);
@@ -35,9 +36,9 @@ EBPO_MUST_USE ebpo_status ebpo_carrying_begin(ebpo_carrying *c, const ebpo_boole
 /* Begins an operand, whose mesh has been read with its attributes. */
 void ebpo_carrying_operand(ebpo_carrying *c, const ebpo_posed_solid *solid, const ebpo_mesh *mesh);
 
-/* Fills row `row` of the arrays of vertices, unless it is filled already, with values interpolated
- * between three vertices of the operand. weight: weights of these vertices. sign: -1 if the face
- * is reversed, else 1. */
+/* Fills row `row` of the arrays of vertices with values interpolated between three vertices of the
+ * operand. Keeps a row that is filled already. weight: weights of these vertices. sign: -1 if the
+ * face is reversed, else 1. */
 void ebpo_carry_vertex(ebpo_carrying *c, uint64_t row, const uint32_t corner[3],
                        const double weight[3], int sign);
 /* Fills row `row` of the arrays of faces with the values of a face of the operand. */

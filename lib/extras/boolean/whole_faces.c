@@ -1,5 +1,5 @@
 /* Finds the connected components of an operand's whole faces. A whole face has an area, and is in
- * no pair of intersecting faces; neighbours with a common corner or edge are no such pair.
+ * no pair of intersecting faces; two faces that share only a corner or an edge are no such pair.
  *
  * Vertices at one position are one corner. Each edge of a face is listed at its corner with the
  * lower number. Edges are listed for one run (range) of consecutive corners after the other, so the
