@@ -3,8 +3,9 @@
  * Segments are sorted by the lower end of their boxes on the first axis of the projection; pairs
  * with overlapping boxes are compared by exact orientation tests of three points (turns). For each
  * segment, the points in its interior are recorded: ends of other segments, and points where other
- * segments cross it. Sorted along the segment, they divide it. Rounding keeps the order of
- * coordinates, so boxes of rounded coordinates overlap where the segments do. */
+ * segments cross it. The recorded points, sorted along the segment, divide it. Rounding keeps the
+ * order of coordinates, so if two segments intersect, their boxes of rounded coordinates
+ * overlap. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/plane_arrangement.h"
@@ -82,7 +83,7 @@ static bool record_point(ebpo_arrangement_2d *a, uint64_t segment, uint32_t poin
     return true;
 }
 
-/* Records a point on the segment's line if it is in the interior of the segment. */
+/* Records the point p, which is on the segment's line, if p is in the interior of the segment. */
 static bool record_if_inside(ebpo_arrangement_2d *a, uint64_t segment, uint32_t p)
 {
     const ebpo_plane_segment *s = &a->segment[segment];
@@ -105,7 +106,8 @@ static bool cross_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
            record_point(a, j, number);
 }
 
-/* Records the points of segment i on segment j, and of segment j on segment i. */
+/* Records the point where segments i and j cross, and each end of one segment that is in the
+ * interior of the other segment. */
 static bool compare_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
 {
     const ebpo_plane_segment s = a->segment[i], t = a->segment[j];

@@ -86,8 +86,8 @@ static void join_hull(ebpo_triangulation *t, uint32_t from, uint32_t to, uint32_
     t->inside[from] = inside;
 }
 
-/* Makes the first triangles. The first n points in order are on a line, and the next point is not.
- */
+/* Makes the first triangles. In the order, the first n points are on a line, and the next point is
+ * not on this line. */
 static void begin_hull(ebpo_triangulation *t, uint32_t n)
 {
     const uint32_t *p = t->order;
@@ -115,7 +115,8 @@ static void begin_hull(ebpo_triangulation *t, uint32_t n)
     }
 }
 
-/* Adds the point p, which follows all earlier points in the order. newest: the last of these. */
+/* Adds the point p, which follows all added points in the order. newest: the point that was added
+ * last. */
 static void enlarge_hull(ebpo_triangulation *t, uint32_t newest, uint32_t p)
 {
     uint32_t begin = newest, end = newest;

@@ -1,8 +1,8 @@
 /* Makes models of boxes and half-spaces.
  *
- * A result is cut by intersecting it with these models, so this cut is exact and closed by caps
- * like every other cut. The part of a half-space's plane is one triangle, because four rounded
- * points would not be in one plane. */
+ * A result is cut by intersecting it with these models, so the cut is exact, and faces in the plane
+ * of the cut (caps) close it. The model of a half-space has a single triangle in the plane, because
+ * four rounded points would not be in one plane. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/region_model.h"
@@ -99,9 +99,10 @@ ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6], ebpo_er
 
 /* --- half-spaces --- */
 
-/* A half-space: normal . x <= offset. Its model must be right in a ball around the box. */
+/* A half-space: normal . x <= offset. In a ball around the box, its model must contain the same
+ * points as the half-space. */
 typedef struct half_space {
-    double normal[3], offset; /* as given, but scaled by a power of two */
+    double normal[3], offset; /* the caller's numbers, scaled by a power of two */
     double length;            /* length of the normal */
     double centre[3], radius; /* the ball */
 } half_space;
@@ -179,13 +180,14 @@ static void move_into_plane(const half_space *h, int axis, double point[3])
     mpq_clears(sum, factor, x, NULL);
 }
 
-/* Makes the corners of the tetrahedron, in radii of the ball. The face in the plane is a triangle
- * around q, the projection of the ball's centre. Its corners are at a distance of 8 radii from q,
- * so its inscribed circle has 4 radii. The fourth corner is 12 radii behind q. The part of the
- * half-space in the ball is at most 3 radii behind the plane. There the inscribed circle of the
- * tetrahedron has 3 radii or more, and the ball is within one radius of the line through q, so the
- * tetrahedron contains this part. Corners are rounded to a grid of 1/8 of the radius or less before
- * they are moved into the plane, so that they have few digits. */
+/* Makes the corners of the tetrahedron. In this comment, lengths are in radii of the ball. The face
+ * in the plane is an equilateral triangle around q, the projection of the ball's centre to the
+ * plane. Its corners have a distance of 8 from q, so its inscribed circle has a radius of 4. The
+ * fourth corner is 12 behind q. The ball's points in the half-space are at most 3 behind the plane,
+ * and within 1 of the line from q to the fourth corner. At a depth of 3, the section of the
+ * tetrahedron has an inscribed circle with a radius of 3. So the tetrahedron contains these points.
+ * Corners are rounded to a grid of 1/8 or less before they are moved into the plane, so that they
+ * have few digits. */
 static void make_corners(const half_space *h, double corner[4][3])
 {
     double unit[3], side[2][3], q[3], grid = fmax(ldexp(1, ilogb(h->radius) - 3), 0x1p-1074);

@@ -33,7 +33,8 @@
 typedef struct output {
     const ebpo_cut_mesh *cut;
     const int8_t *sign; /* for each triangle: 1: added; -1: added, reversed; 0: not in the result */
-    int8_t *component_sign[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand][component] the same sign */
+    int8_t *component_sign[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand][component] sign of all faces of
+                                                          the component */
     bool doubles;            /* coordinates of the result are doubles, else floats */
     uint32_t *number;        /* [vertex of the cut mesh] its number in the result, or NO_NUMBER */
     ebpo_corner_ids rounded; /* rounded positions of the vertices that have a number */
@@ -387,15 +388,15 @@ static bool add_removed(output *o, uint64_t first, uint64_t count)
     return true;
 }
 
-/* Adds the triangles of the changed faces of the base, and the ranges of removed faces. A listed
- * face is not changed if it is one triangle that bounds the result. */
+/* Adds the triangles of the changed faces of the base (operand 0), and the ranges of removed faces.
+ * A listed face is not changed if it is one triangle that bounds the result. */
 static bool add_changes(operand_output *r)
 {
     output *o = r->o;
     const ebpo_cut_mesh *cut = o->cut;
     const ebpo_face_list *faces = cut->faces;
     uint64_t t = first_triangle(r),
-             after = 0; /* after: the file's face after the last listed one */
+             after = 0; /* index in the file of the face after the last listed face */
     for (uint32_t f = faces->first[0]; f < faces->first[1]; f++) {
         uint64_t end = t;
         while (end < cut->count && cut->face[end] == f)
@@ -486,8 +487,9 @@ static ebpo_status find_components(output *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns the number of faces of an operand that are in the result and are not listed. Faces of an
- * operand that is equal to an earlier one count there: its entry of `equal` is 0. */
+/* Returns the number of faces of an operand that are in the result and are not listed. If an
+ * earlier operand is equal to this one, returns 0, because the faces are counted for the earlier
+ * operand. */
 static uint64_t count_whole(const output *o, uint32_t operand)
 {
     const ebpo_face_list *faces = o->cut->faces;
@@ -501,8 +503,9 @@ static uint64_t count_whole(const output *o, uint32_t operand)
     return count;
 }
 
-/* Returns true if an operand, so perhaps the result, has coordinates beyond the range of floats.
- * Half-spaces are not tested, because the result is also in the box of the other operands. */
+/* Returns true if an operand has coordinates beyond the range of floats. Then the result may have
+ * such coordinates, too. Half-spaces are not tested, because the result is also in the box of the
+ * other operands. */
 static bool exceeds_floats(const ebpo_face_list *faces)
 {
     for (uint32_t i = 0; i < faces->boolean->first_plane; i++)

@@ -10,8 +10,8 @@
 #include "geometry/integer_vectors.h"
 
 /* Exponent of the unit of volumes. Every double is a multiple of 2^-1074, so a product of three
- * doubles is a multiple of the unit. The additional bits reduce the rounding of rational corners.
- */
+ * doubles is a multiple of the unit. The 3 * 52 additional bits make the rounding errors of volumes
+ * below faces with rational corners small. */
 enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
 
 void ebpo_volume_sum_begin(ebpo_volume_sum *s)
@@ -22,8 +22,9 @@ void ebpo_volume_sum_begin(ebpo_volume_sum *s)
 
 void ebpo_volume_sum_end(ebpo_volume_sum *s) { mpz_clear(s->by_integers); }
 
-/* Returns true if each product of three of these coordinates is a sum of doubles: the lowest bit of
- * a product is at least 2^(-3 (250 + 52)). */
+/* Returns true if each product of three of these coordinates is exactly a sum of doubles. This is
+ * true for coordinates from 2^-250 to 2^250, because the lowest bit of a product is then at least
+ * 2^(-3 (250 + 52)), which is a double. */
 static bool has_exact_products(const double t[3][3])
 {
     bool by_doubles = true;
@@ -162,7 +163,7 @@ ebpo_value_bounds ebpo_volume_sum_interval(const ebpo_volume_sum *s)
     out.lo = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
     mpz_add_ui(all, all, s->rounded);
     out.hi = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
-    if (out.lo != out.hi) { /* both were rounded to nearest, perhaps inwards */
+    if (out.lo != out.hi) { /* rounding to the nearest double may have moved both bounds inwards */
         out.kind = EBPO_VALUE_INTERVAL;
         out.lo = nextafter(out.lo, -INFINITY);
         out.hi = nextafter(out.hi, INFINITY);

@@ -32,8 +32,8 @@ typedef struct ball {
     unsigned nodes;  /* number of nodes visited after the first node that may have faces */
 } ball;
 
-/* Returns the squared distance of the cell from the ball's centre, with a relative error of 2^-50
- * unless it is almost 0. */
+/* Returns the squared distance of the cell from the ball's centre, with a relative error of at most
+ * 2^-50 if it is not almost 0. */
 static double square_to(const ball *b, ebpo_cell cell)
 {
     double low[3], high[3], sum = 0;
@@ -90,8 +90,8 @@ static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], doub
     return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
 }
 
-/* Decides the same by the distance of the nearest face. *may: EBPO_MAY_BOTH if a face may be in the
- * ball. */
+/* Decides by the distance of the nearest face if the ball is inside or outside. *may: EBPO_MAY_BOTH
+ * if a face may be in the ball. */
 static ebpo_status inspect_faces(ebpo_context *context, const double p[3], double radius,
                                  unsigned *may, ebpo_error *error)
 {

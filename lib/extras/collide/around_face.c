@@ -1,7 +1,7 @@
 /* Finds which sides of a posed face are in the interior of each of two models. The face belongs to
  * one of these models. All faces of both models that intersect the face cut it into pieces
  * (face_pieces.h). At a point of each piece, the winding numbers of both models show which sides of
- * the piece are in each model.
+ * the piece are in which model.
  *
  * All decisions are exact: coordinates of points are fractions, and posed coordinates are the
  * doubles that geometry/pose.h defines. Only faces close to a point or face are read from the
@@ -154,8 +154,9 @@ static bool shift_is_front(const ebpo_face_cuts *f)
     return sign > 0;
 }
 
-/* Sets *in to the sides of a piece that are in the interior of solid i. The winding numbers behind
- * the piece and in front of it differ by `jump`, to which the face itself contributes 1. */
+/* Sets *in to the sides of a piece that are in the interior of solid i. The winding number behind
+ * the piece minus the winding number in front of it is `jump`. The face itself contributes 1 to
+ * `jump` if it is a face of solid i. */
 static ebpo_status sides_of_solid(const piece_visit *v, const ebpo_piece *piece, int i,
                                   unsigned *in, ebpo_error *error)
 {
@@ -170,7 +171,7 @@ static ebpo_status sides_of_solid(const piece_visit *v, const ebpo_piece *piece,
 }
 
 /* Finds which sides of a piece are in each model, and calls the function v->visit. Returns
- * EBPO_E_CANCELLED if this function returns false, because it needs no more pieces. */
+ * EBPO_E_CANCELLED if v->visit returns false, because v->visit needs no more pieces. */
 static ebpo_status visit_around_piece(void *user, const ebpo_piece *piece, ebpo_error *error)
 {
     const piece_visit *v = user;
@@ -263,8 +264,8 @@ static bool record_side(void *user, const ebpo_around *around)
     return !q->in;
 }
 
-/* Examines a face that may contain the point x. Sets q->on if the face contains the point, and
- * q->in if, in addition, a side of the face at this point is in the model. */
+/* Examines a face that may contain the point x. Sets q->on if the face contains the point. Then
+ * also sets q->in if a side of the face at the point is in the model. */
 static ebpo_status query_face(face_query *q, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];

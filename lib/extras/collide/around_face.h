@@ -24,7 +24,7 @@ typedef struct ebpo_two_models {
  * must live longer. Fails with the errors of ebpo_posed_solid_make and ebpo_context_new. */
 EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *lookup,
                                                 ebpo_error *error);
-/* Releases the memory of subtrees until the next query. */
+/* Releases the memory of loaded subtrees. The next query loads them again. */
 void ebpo_two_models_let_go(ebpo_two_models *two);
 /* Returns the number of subtrees that `two` has loaded. */
 uint64_t ebpo_two_models_loads(const ebpo_two_models *two);
@@ -44,12 +44,12 @@ typedef struct ebpo_around {
 /* Called for each piece. Returns false to stop; ebpo_visit_around_face then returns EBPO_OK. */
 typedef bool (*ebpo_around_fn)(void *user, const ebpo_around *around);
 
-/* Sets `out` to the posed corners of a face of model m. *has_area is false if the corners are on
- * one line. */
+/* Sets `out` to the posed corners of a face of model m (0 or 1). face: the face's index in the
+ * file. *has_area is false if the corners are on one line. */
 EBPO_MUST_USE ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face,
                                                double out[3][3], bool *has_area, ebpo_error *error);
 
-/* Visits every piece of a face of model m; `face` is its number in the file. A face without area
+/* Visits every piece of a face of model m. face: the face's index in the file. A face without area
  * has no pieces. */
 EBPO_MUST_USE ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face,
                                                  ebpo_around_fn visit, void *user,

@@ -412,8 +412,8 @@ static ebpo_status divide_cell(level_search *g, ebpo_cell cell, ebpo_error *erro
 
 /* --- levels --- */
 
-/* Divides the open cells of the current level. A cell that cannot be deeper than the best point by
- * more than the tolerance is dropped; so are all cells after the deadline. */
+/* Divides the open cells of the current level. Drops a cell that cannot be deeper than the best
+ * point by more than the tolerance. After the deadline, drops all cells. */
 static ebpo_status divide_level(level_search *g, ebpo_error *error)
 {
     depth_search *s = g->s;

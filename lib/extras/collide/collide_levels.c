@@ -2,10 +2,11 @@
  * reports if both solids certainly have a common point.
  *
  * Pairs of nodes are visited in the order of the gaps of their envelopes, the least first
- * (subtree_search.h). A gap is a lower bound of the distance; two nodes with faces give an upper
- * bound. A black cell belongs entirely to the interior of its solid. So a black cell certainly has
- * a common point with the other model if it contains a whole cell with faces of the other model, or
- * if it contains a point of a black cell of the other model. A search runs in one thread. */
+ * (subtree_search.h). The gap of a pair is a lower bound of the distance of the models. If both
+ * nodes have faces, the pair also gives an upper bound. A black cell belongs entirely to the
+ * interior of its solid. So the models certainly have a common point if a black cell of one model
+ * contains a point of a black cell of the other model, or contains all of a cell that has faces of
+ * the other model. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,8 +29,8 @@ typedef struct level_search {
 
 static const char stage[] = "pairs of nodes"; /* for the progress function */
 
-/* Width of the margin along the faces of a black cell, as a share of the cell's side. Points in the
- * margin are not counted as inside the cell. */
+/* Width of a margin along the sides of a black cell, as a share of the cell's edge. Points in the
+ * margin do not count as inside the cell, because rounding may have moved them there. */
 static const double margin_share = 0x1p-14;
 
 /* --- nodes --- */
@@ -97,8 +98,8 @@ static void widen_cell(double corner[8][3], double share)
 /* Returns true if a black node certainly has a common point with the model of another node. black,
  * other: corners of both cells; other_black: the other node is black, too. If the other node is
  * black, the black cell must contain a corner or the middle of the other cell. If the other node
- * has faces, the black cell must contain the region of these faces: the other cell with a margin,
- * by which `other` is widened. */
+ * has faces, the black cell must contain the region in which these faces have a point: the other
+ * cell, which this function widens by a margin. */
 static bool shares_point(const level_search *g, double black[8][3], double other[8][3],
                          bool other_black)
 {
@@ -133,8 +134,8 @@ static bool certainly_intersect(const level_search *g, const ebpo_posed_node nod
 
 /* --- pairs --- */
 
-/* Adds a pair of nodes to the heap if it can change the result. gap: lower bound of the distance of
- * the pair from which the nodes were made. */
+/* Adds a pair of nodes to the heap if the pair can change the result. gap: lower bound of the
+ * distance of the pair from which the nodes were made. */
 static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2], double gap,
                                  ebpo_error *error)
 {
@@ -206,7 +207,7 @@ static bool is_full(const level_search *g)
 }
 
 /* Visits pairs in the order of their gaps. Skips pairs with a gap above g->lo (the least gap of the
- * pairs that are not divided further). Once a common point is certain, also skips pairs of which a
+ * pairs that are not divided further). Once a common point is certain, also skips pairs in which a
  * node has no faces. At the deadline, or if memory is used up, divides no more pairs. */
 static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {

@@ -161,7 +161,7 @@ static const char stage[] = "pairs of faces"; /* for the progress function */
 
 /* These numbers affect only how evenly the threads are used, not the result. */
 enum {
-    PARTS = 512, /* if there are so many parts or more, none is divided */
+    PARTS = 512, /* parts are divided until there are at least this many */
     TASKS = 64   /* number of groups of parts that are distributed to threads */
 };
 
@@ -222,8 +222,8 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Takes the walks that the collider keeps. Makes new walks if another query of the same collider
- * has taken its walks: the function that receives the pairs of a query may make a second query.
+/* Takes the walks that the collider keeps. Makes new walks if the collider keeps none. This happens
+ * if the function that receives the pairs of a query begins another query of the same collider.
  * Returns false if memory is short. */
 static bool acquire_walks(pair_gathering *g)
 {

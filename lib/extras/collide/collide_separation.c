@@ -327,9 +327,9 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
  * that lists the model's face. The envelopes of both subtrees contain the point, so the last
  * contact of the envelopes is not earlier than the last contact of the faces. */
 typedef struct node_search {
-    ebpo_subtree_search subtrees; /* a heap whose least gap comes first; here ebpo_node_gap.gap is
-                                   * -t; t: upper bound of the time of the envelopes' last contact
-                                   */
+    ebpo_subtree_search
+        subtrees; /* a heap whose least gap comes first; here, ebpo_node_gap.gap is -1 times an
+                     upper bound of the time of the envelopes' last contact */
     separation_search *search;
 } node_search;
 

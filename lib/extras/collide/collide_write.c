@@ -112,7 +112,7 @@ ebpo_status ebpo_red_meshes_print(const ebpo_red_mesh *meshes, int count, ebpo_p
 
 /* --- HDF5 --- */
 
-/* The datasets of the file. Those before POINTS have a row for each pair, and all other datasets
+/* The datasets of the file. The datasets before POINTS have a row for each pair, and the others
  * have a row for each contact. */
 enum { PAIR_FACES, PAIR_FILE_FACES, PAIR_KIND, POINTS, CONTACT_FACES, CONTACT_ON, TABLES };
 

@@ -1,5 +1,5 @@
-/* Declares a collider (two models, options of queries, and data that queries keep for the next
- * query), and the first step of all queries. */
+/* Declares a collider (two models, options, and data that a query keeps for the next query), and
+ * functions that all queries of a collider use. Every query begins with ebpo_collision_begin. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -30,8 +30,8 @@ struct ebpo_collider {
     struct ebpo_face_two *nearest; /* nearest pair of the last distance query, in the caller's
                                     * order of the models; NULL: no query has found a pair */
     ebpo_context *context[2];      /* contexts of depth queries; NULL before the first query */
-    uint32_t *slots[2]; /* ebpo_face_slots of models that are entirely in memory; NULL before the
-                         * first query that needs the array */
+    uint32_t *slots[2]; /* results of ebpo_face_slots for models that are entirely in memory; NULL
+                           before the first query that needs the array */
 };
 
 /* A query with checked options. Its models are in the query's order, which stays the same when the
@@ -67,11 +67,11 @@ uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 /* Returns true if a model is not entirely in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
 
-/* Begins a walk. `walk` must be zero or have been used before; then its memory is used again.
- * `pair` must live as long as the walk is used. */
+/* Begins a walk. `walk` is zero, or has been used before, and then its memory is used again. `pair`
+ * must exist as long as the walk is used. */
 void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 
-/* Adds a walk's counts to the collider's counts, and resets them. */
+/* Adds a walk's counts to the collider's counts, and sets the walk's counts to 0. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
 /* Converts a pair of local face indices of two accels (acceleration structures of subtrees) to the
@@ -79,15 +79,15 @@ void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_found_pair *pair);
 
-/* Finds the pairs of ebpo_collide_self at a pose. pose_a and pose_b of the options must be equal.
- */
+/* Finds the same pairs as ebpo_collide_self, but for the model at a pose: pose_a and pose_b of the
+ * options, which must be equal. */
 EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   const ebpo_collide_options *options,
                                                   ebpo_pairs_fn take, void *user,
                                                   ebpo_error *error);
 
-/* Returns the interval lo .. hi as a result: exact if lo = hi, a bound if one end is trivial (0 or
- * infinite), otherwise an interval. */
+/* Returns lo and hi with their kind: exact if lo = hi, a bound if lo is 0 or hi is infinite,
+ * otherwise an interval. */
 static inline ebpo_value_bounds ebpo_value_bounds_of(double lo, double hi)
 {
     bool bound = lo != hi && (lo == 0 || isinf(hi));

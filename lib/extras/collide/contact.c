@@ -218,8 +218,8 @@ static void end_of(const edge *e, double out[3])
     compute_piercing(&p, out);
 }
 
-/* Returns one of two edges with the same piercing point: the edge that ends at this point, or, if
- * neither does, the edge whose ends precede in the order of coordinates. */
+/* Returns one of two edges with the same piercing point: an edge that ends at this point, or, if no
+ * edge ends there, the edge whose ends come first in the order of coordinates. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_in_plane || b->ends_in_plane)
@@ -245,9 +245,9 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
     ebpo_pair_kind kind;
     if (!ebpo_prepare_pair(a, b, &t, &kind))
         return;
-    bool reversed =
-        t.flipped_a != t.flipped_b; /* the intervals below have the opposite direction */
-    edge of_a[2], of_b[2];          /* the edges from t.a[0] and t.b[0] to corners 1 and 2 */
+    bool reversed = t.flipped_a !=
+                    t.flipped_b; /* the intervals below run against the direction of the result */
+    edge of_a[2], of_b[2];       /* the edges from t.a[0] and t.b[0] to corners 1 and 2 */
     for (int i = 0; i < 2; i++) {
         of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
         of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };

@@ -51,8 +51,8 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
 /* Returns true if the exact distances of the pairs a, b and c, d are certainly equal: if both pairs
  * have the same corners, or if both distances are distances of the same two corners or edges, or of
  * the same two planes perpendicular to an axis. Such pairs are common around an edge or corner, and
- * on flat sides of models. Returns false if this function does not find a reason. ab, cd: results
- * of ebpo_triangles_distance_bounds for the two pairs. */
+ * on flat sides of models. Returns false if none of these reasons applies; the distances may still
+ * be equal. ab, cd: results of ebpo_triangles_distance_bounds for the two pairs. */
 bool ebpo_same_distance(const double a[3][3], const double b[3][3],
                         const ebpo_pair_distance_bounds *ab, const double c[3][3],
                         const double d[3][3], const ebpo_pair_distance_bounds *cd);

@@ -26,10 +26,10 @@ bool ebpo_corner_ids_reserve(ebpo_corner_ids *ids, uint64_t count);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
 /* Finds the patches of the faces that a subtree owns (a subtree owns a face if no earlier subtree
- * lists the face). Faces of a patch are connected by corners with equal coordinates. The owned face
- * i has the index subtree->first_face + i in the file; (*out)[i] is the least i of the owned
- * faces in the patch of this face. `omitted` has a bit for each face of the file; a face whose bit
- * is set is a separate patch and connects no other faces. slots: result of ebpo_face_slots. The
+ * lists the face). Faces of a patch are connected by corners with equal coordinates. Owned face i
+ * has the index subtree->first_face + i in the file. (*out)[i] is the number of the first owned
+ * face in the patch of owned face i. `omitted` has a bit for each face of the file. A face whose
+ * bit is set is a separate patch and connects no other faces. slots: result of ebpo_face_slots. The
  * caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *omitted, uint32_t **out,

@@ -76,7 +76,8 @@ void ebpo_face_cuts_free(ebpo_face_cuts *f);
 
 /* --- pieces --- */
 
-/* A point of a piece, and what other faces in the plane of the cut face contribute there. */
+/* A point of a piece, and the contribution of other faces in the plane of the cut face to the
+ * winding numbers at this point. */
 typedef struct ebpo_piece {
     const mpq_t *x; /* [3] the point */
     /* [model] at least one other face of the model is in the plane and contains the point */

@@ -1,6 +1,7 @@
 /* Walks through pairs of nodes of two hierarchies to find the nearest faces of two models, eight
- * children at a time, in floats. This file is compiled for several instruction sets with the same
- * results. Names that end in 8 handle eight values at once.
+ * children at a time, in floats. Lengths are in the unit of ebpo_block_unit. This file is compiled
+ * for several instruction sets with the same results. Names that end in 8 handle eight values at
+ * once.
  *
  * The distance of two nodes has three lower bounds: the gap of their boxes, the gap of their
  * bounding cylinders, and the gap along the direction of the best pair of faces (the nearest pair
@@ -8,8 +9,8 @@
  * least bound first. In a pair of blocks, the distance of each pair of faces is bounded by means of
  * two points, one of each face, that are the nearest points except for rounding. A pair is dropped
  * only if it is certainly not nearer than the limit; collide_distance.c decides the remaining
- * pairs. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces".
- */
+ * pairs. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two
+ * faces". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -100,8 +101,8 @@ EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
     return out;
 }
 
-/* Offers the nearest points of two edges to n: of edge i of a, which begins at p, and of edge j of
- * b, which begins at q. */
+/* Offers the nearest points of two edges to n: edge i of a begins at p, and edge j of b begins at
+ * q. */
 EBPO_EIGHT void offer_edges8(nearest8 *n, const point8 *p, const edges8 *a, int i, const point8 *q,
                              const edges8 *b, int j)
 {
@@ -143,8 +144,8 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
 }
 
 /* Bounds the distances of eight pairs of faces by *low and *high. *direction: the vectors from A's
- * nearest points to B's nearest points. Coordinates are at most `size`, and differ from their exact
- * values by at most `error`. */
+ * nearest points to B's nearest points. Coordinates have absolute values of at most `size`, and
+ * differ from their exact values by at most `error`. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
                                  f8 *low, f8 *high, point8 *direction)
 {
@@ -503,9 +504,9 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
 }
 
 /* If one of eight pairs is nearer than the best pair so far, makes the nearest of the eight pairs
- * the best pair, and its direction the direction of the search. high: upper bounds of the
- * distances. used: a bit for each valid pair. at: index in `near` of the first of the eight pairs.
- */
+ * the best pair, and the direction of this pair the direction of the search. high: upper bounds of
+ * the distances. used: a bit for each valid pair. at: index in `near` of the first of the eight
+ * pairs. */
 EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const point8 *direction, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
