@@ -4,8 +4,8 @@
  * one thread.
  *
  * ebpo_pair_walk_decide exactly decides the pairs of faces that the filter, which uses floats,
- * leaves undecided. If both models are the same mesh, a corner or edge that neighbouring faces
- * share is no contact. */
+ * leaves undecided. If all faces belong to one mesh, a corner or edge that neighbouring faces share
+ * is no contact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -77,9 +77,9 @@ static bool is_on_side(const double n[3], const double corner[3], const double p
 }
 
 /* Returns true if a plane through the common corner (corner i of a, corner k of b) certainly
- * separates the faces, so that they have only this corner in common. The plane is between an edge
- * of a and an edge of b, which form the least angle of such edges at the corner. Its normal may be
- * rounded. */
+ * separates the faces, so that they have only this corner in common. Of all pairs of an edge of a
+ * and an edge of b at the corner, one pair forms the least angle. The plane bisects this angle. The
+ * plane's normal may be rounded, because the sides of the plane are tested with an error bound. */
 static bool separate_at_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     const double *p[4] = { a[(i + 1) % 3], a[(i + 2) % 3], b[(k + 1) % 3], b[(k + 2) % 3] };

@@ -25,9 +25,9 @@ typedef struct ebpo_found_pair {
     int32_t kind; /* ebpo_pair_kind, not EBPO_PAIR_APART */
 } ebpo_found_pair;
 
-/* A node's children in the frame of the node's model. Members with a 2 in the name are the children
- * in the other model's frame: rotated, but not translated. Coordinates are relative to the node's
- * origin. */
+/* A node's children in the frame of the node's model. Members with a 2 in the name describe the
+ * children in the axes of the other model's frame; they are rotated, but not translated.
+ * Coordinates are relative to the node's origin. */
 typedef struct ebpo_turned_node {
     _Alignas(32) float c[3][8], e[3][8]; /* middles and half sides of boxes */
     float c2[3][8], e2[3][8];            /* boxes around these boxes, along the axes of the other
@@ -110,8 +110,8 @@ void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uin
 
 /* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct ebpo_gap_visit {
-    float key; /* square of a lower bound of the distance; negative if the children may intersect,
-                * and the lesser, the more they overlap */
+    float key; /* square of a lower bound of the distance; negative if the children may intersect;
+                  the more they overlap, the lower the key */
     uint32_t child[2];
     uint32_t direction; /* direction_number of the direction for which the key was computed */
 } ebpo_gap_visit;
@@ -188,7 +188,7 @@ void ebpo_gap_free(ebpo_gap_search *g);
  * and keep_going. max_coordinate: as for ebpo_block_unit. */
 void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
                     const ebpo_posing posing[2], double max_coordinate);
-/* Sets the limit if this lowers it. */
+/* Sets g->limit to `limit` if `limit` is lower. */
 void ebpo_gap_set_limit(ebpo_gap_search *g, float limit);
 /* Makes a pair of faces the best pair, if the upper bound `best` of its distance is less than
  * g->best. Then also sets the limit. */
@@ -199,8 +199,9 @@ void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3]);
 
 /* Makes space for the pairs of children of two nodes. Returns false if memory is short. */
 bool ebpo_gap_capacity(ebpo_gap_search *g);
-/* Makes space for all pairs of faces of two blocks among the waiting pairs: removes or decides
- * waiting pairs if necessary. Returns false if decide_waiting returned false. */
+/* Makes space for all pairs of faces of two blocks among the waiting pairs. If necessary, removes
+ * waiting pairs beyond the limit, and then decides the others. Returns false if decide_waiting
+ * returned false. */
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g);
 
 /* The function of a search, compiled for several processors, with the same results. */

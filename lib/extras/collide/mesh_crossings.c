@@ -26,8 +26,8 @@ typedef struct crossings {
     ebpo_self_intersections_options options;
     ebpo_self_intersections_fn take; /* the caller's function, or NULL, and its argument */
     void *user;
-    ebpo_tree tree;  /* the built tree; when the file has been written, only the mesh is kept, in
-                      * the workspace */
+    ebpo_tree tree;  /* the built tree; after the file has been written, only its mesh is kept, in
+                        the workspace */
     ebpo_file *file; /* the temporary file */
     ebpo_model *model;
     ebpo_collider *collider;
@@ -71,8 +71,8 @@ static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *err
     return ebpo_tree_store(&c->tree, folder, "ebpo-crossings", &options, &c->file, error);
 }
 
-/* Least memory budget of the model in bytes. Only tests have workspaces whose memory is so small
- * that the model would get less. */
+/* Least memory budget of the model in bytes. A quarter of the workspace's memory is less than this
+ * only in tests. */
 enum { LEAST_MODEL = 1 << 20 };
 
 /* Makes the model and its collider. memory: number of bytes that the workspace, the model and the

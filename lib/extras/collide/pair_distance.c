@@ -1,7 +1,7 @@
 /* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
- * Bounds follow from a point of each face. These two points are the nearest points except for
- * rounding. The distance of the points is an upper bound. The gap of the faces along the line
+ * To compute bounds, one point of each face is found. These two points are the nearest points
+ * except for rounding. Their distance is an upper bound. The gap of the faces along the line
  * through both points is a lower bound. All coordinates are relative to A's first corner, so that
  * rounding does not depend on the position of the faces. If bounds do not decide a comparison, the
  * squared distance is computed as a fraction of integers. It is the least of the squared distances
@@ -172,9 +172,9 @@ static bool is_on(int corner, int feature)
 }
 
 /* Returns true if the features of the points certainly contain the nearest points. n: vector from
- * A's point to B's point. The features are certain if, in the direction of n, the corners of A that
- * are not on A's feature are behind A's point, and the corners of B that are not on B's feature are
- * ahead of B's point, by more than the errors of n and of the points: docs/develop/collision.md,
+ * A's point to B's point. In the direction of n, the corners of A that are not on A's feature must
+ * be behind A's point, and the corners of B that are not on B's feature must be ahead of B's point.
+ * They must be so by more than the errors of n and of the points. Proof: docs/develop/collision.md,
  * "Which features are nearest". */
 static bool features_certain(const search *s, const double n[3])
 {
@@ -361,7 +361,8 @@ static bool within_edge(edges *e, int which)
 }
 
 /* Computes the squared distance of two edges. Returns false if the edges are parallel, or if a
- * nearest point of their lines is not on an edge: then the nearest points include an end. */
+ * nearest point of their lines is not on its edge. In both cases, an end of an edge is a nearest
+ * point, and update_by_corners finds the distance. */
 static bool edges_square(edges *e, fraction *out)
 {
     ebpo_vectorz_subtract(&e->between, &e->from[1], &e->from[0]);
@@ -413,8 +414,8 @@ static void update_by_edges(fraction *best, const double a[3][3], const double b
 
 /* --- faces --- */
 
-/* Updates *best by the distances of the corners of one face from the other face, except those that
- * are certainly greater than `hi`. */
+/* Updates *best by the distances of the corners of one face from the other face. Skips corners
+ * whose distance is certainly greater than `hi`. */
 static void update_by_corners(fraction *best, const double corner[3][3], const double face[3][3],
                               double hi, int unit)
 {

@@ -5,8 +5,8 @@
  * of both faces, the second test compares the corners of each face with the plane of the other
  * face, and the third test compares the intervals of both faces on the common line of the planes.
  * Pairs that no test decides are undecided; the caller decides them exactly.
- * docs/develop/collision.md ("The filter of eight pairs") explains the letters. Names that end in 8
- * handle eight values at once. */
+ * docs/develop/collision.md ("The filter of eight pairs") explains the letters in the code. Names
+ * that end in 8 handle eight values at once. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -117,7 +117,8 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* --- the common line --- */
 
-/* Masks for a face: which of its corners is alone on one side of the other face's plane. */
+/* Masks for a face: the other two corners are on the other side of the other face's plane, so one
+ * corner is alone on its side. */
 typedef struct alone8 {
     f8 is0, is1; /* corner 0 is alone; corner 1 is alone; if neither is set, corner 2 is alone */
     f8 above;    /* the corner that is alone is above the plane */

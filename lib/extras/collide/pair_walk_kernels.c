@@ -4,9 +4,9 @@
  * Boxes and bounding cylinders of one model's nodes are transformed into the other model's frame
  * and compared along the axes of both frames. Bounds are rounded outwards, so no pair is lost. Both
  * nodes of a pair are divided, or only the larger node if it is much larger. The faces of two
- * blocks are compared by the filter of pairs (pair_filter_kernels.c); ebpo_pair_walk_decide decides
- * the pairs that the filter does not exclude. See docs/develop/collision.md, "Going down two
- * hierarchies". */
+ * blocks are compared by the filter of pairs (pair_filter_kernels.c). The function
+ * ebpo_pair_walk_decide decides the pairs that the filter does not exclude. See
+ * docs/develop/collision.md, "Going down two hierarchies". */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -205,7 +205,8 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
 }
 
 /* Returns a bit for each child of P, 1 if the child may intersect child j of Q (or if the computed
- * gap is NaN). first: sets `key` to the keys of the pairs. */
+ * gap is NaN). If `first`, sets key[i] to ebpo_node_pair.key of the pair of child i of P and child
+ * j of Q. */
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
     f8 gap = box_gaps(t, j);
@@ -321,8 +322,9 @@ EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int side, uin
  * child is divided. */
 #define LONGER 4.0f
 
-/* Returns the index, 0 or 1, of the child to be divided; 2: both children. a, b: the node or block
- * that each child is; at least one child is a node. size_a, size_b: sizes of their boxes. */
+/* Returns the index, 0 or 1, of the child to be divided; 2: both children. a, b: entries of the
+ * children (nodes or blocks); at least one child is a node. size_a, size_b: sizes of the children's
+ * boxes. */
 EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b)
 {
     if (a & EBPO_IS_BLOCK)

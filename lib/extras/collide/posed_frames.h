@@ -11,7 +11,7 @@
 #include "geometry/pose.h"
 #include "query/accel.h"
 
-/* A pose, prepared for posing blocks. */
+/* A pose, prepared for transforming blocks. */
 typedef struct ebpo_block_posing {
     ebpo_posing posing;
     double unit;        /* a power of two: floats are world coordinates times the unit */
@@ -19,8 +19,8 @@ typedef struct ebpo_block_posing {
     float size;         /* upper bound of the lengths of the rows of `matrix` */
     float uncertainty;  /* bound of the distance of posed coordinates from the exact motion of the
                          * vertex, times unit */
-    bool fits;          /* the matrix is in the range of floats; if false, only blocks of doubles
-                         * are used */
+    bool fits; /* the matrix is in the range of floats; if false, all blocks are posed in doubles
+                  (ebpo_posed_block_make_wide) */
 } ebpo_block_posing;
 
 /* Returns the unit for two models whose posed coordinates have absolute values of at most

@@ -327,7 +327,7 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
 /* --- winding numbers at points whose coordinates are fractions --- */
 
 /* A path from w to x, where w has the doubles nearest to the coordinates of x. The path consists of
- * three segments parallel to the axes. Points and corners are integers: coordinates in the unit
+ * three segments parallel to the axes. Points and corners have integer coordinates, in the unit
  * 2^unit / denominator. */
 typedef struct path {
     const ebpo_posed_solid *solid;

@@ -5,8 +5,8 @@
  * An envelope is computed from the cell of a node: the planes of the node and of its nearest
  * ancestors, which are in memory, cut the cell, and the resulting polytope is posed. A hash table
  * keeps envelopes by octcode (locational code). A gap is a lower bound of the distance of two
- * convex sets. It is found by the iteration of Gilbert (1966), in which every direction gives a
- * bound, so the iteration may stop at any time. */
+ * convex sets. The iteration of Gilbert (1966) finds the gap. Each step tries a direction, which
+ * gives a lower bound, so the iteration may stop after any step. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -123,10 +123,11 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
     return status;
 }
 
-/* Finds the side of the other model on which the faces without contact of a subtree are: sets *in
- * to 1 (inside), 0 (outside) or -1 (unknown). The ball around the subtree's cell contains a point
- * of each face that the subtree owns. If no face of the other model intersects the ball, the ball
- * is entirely inside or outside the other model, and so is each face without contact. */
+/* Finds out if the faces without contact of a subtree are inside the other model. Sets *in to 1
+ * (all are inside), 0 (all are outside) or -1 (unknown). The ball around the subtree's cell
+ * contains a point of each face that the subtree owns. If no face of the other model intersects the
+ * ball, the ball is entirely inside or outside the other model, and so is each face without
+ * contact. */
 static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
                                          ebpo_error *error)
 {

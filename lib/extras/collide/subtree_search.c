@@ -4,8 +4,8 @@
  *
  * Queries of levels, distances and separation distances use this search, and decide when it ends.
  * The larger of two nodes is divided first. If one model is entirely in memory and the other model
- * is partly loaded, several pairs of nodes may need the same subtree, which is visited once. A
- * search runs in one thread. */
+ * is partly loaded, several pairs of nodes may need the same pair of subtrees, which is visited
+ * once. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>

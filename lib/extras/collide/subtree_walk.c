@@ -9,8 +9,8 @@
  * before they are returned.
  *
  * If the collider's memory is too small for all pairs of faces, the search has several rounds. A
- * round drops the pairs of the last faces of the first model, and the next round finds these pairs
- * again. */
+ * round that finds too many pairs drops the pairs of the last faces of the first model, and the
+ * next round finds the dropped pairs again. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -603,7 +603,7 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
     return g->end ? EBPO_OK : ebpo_fail_memory(error, g->subtrees[0].count * sizeof *g->end);
 }
 
-/* Adds the counts to the collider's counts, and frees the memory. */
+/* Adds the counts of the search to the collider's counts, and frees the memory. */
 static void end_gathering(gathering_parts *g)
 {
     g->collision->collider->bytes_read += ebpo_collision_bytes_read(g->collision) - g->read_before;
