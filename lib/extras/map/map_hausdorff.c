@@ -3,10 +3,11 @@
  *
  * The method is branch and bound over triangles, which are divided into four quarters at the
  * middles of their edges. If a point moves, its distance from the model changes by at most the
- * length of the motion. So the distance of each point of a triangle is at most the distance of a
+ * length of the move. So the distance of each point of a triangle is at most the distance of a
  * corner plus the length of the longer edge at this corner. This sum is the triangle's bound. Faces
- * are searched in batches, and a batch in rounds. A round divides all triangles with great bounds,
- * and their number does not depend on the number of threads, so the result does not either. */
+ * are searched in batches, and a batch in rounds. A round divides all triangles with great bounds.
+ * The choice of these triangles does not depend on the number of threads, so the result does not
+ * depend on it. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -22,8 +23,8 @@
 
 enum {
     BATCH_FACES = 1 << 17,   /* number of faces that are searched together (a batch) */
-    TRIANGLES_MAX = 1 << 20, /* greatest number of triangles in the list of a round; further
-                              * triangles are not divided, and their bounds are final */
+    TRIANGLES_MAX = 1 << 20, /* greatest number of triangles in the list of a round; triangles
+                                beyond this number are not divided, and their bounds are final */
     PIECE_TRIANGLES = 256    /* number of triangles that a thread divides at a time */
 };
 
@@ -44,15 +45,15 @@ typedef struct search {
     const ebpo_mesh *mesh;
     const double *distances; /* [mesh->vertex_count] signed or unsigned distance of each vertex */
     ebpo_map_hausdorff_options options; /* the caller's options, or the defaults */
-    double slack;                 /* upper bound of the rounding errors of positions and lengths */
-    ebpo_map_hausdorff range;     /* bounds of the result so far */
-    uint64_t allowed;             /* no division begins in the current batch after range.queries has
-                                   * this value */
+    double slack;             /* upper bound of the rounding errors of positions and lengths */
+    ebpo_map_hausdorff range; /* bounds of the result found so far */
+    uint64_t allowed; /* no division begins in the current batch when range.queries has reached this
+                         value */
     triangles current, next;      /* triangles of this round and of the next round */
     uint64_t divided;             /* number of triangles that this round divides: the first ones of
                                    * `current` */
     double (*middle)[3][3];       /* [divided] middles of the edges from each corner to the next */
-    double (*middle_distance)[3]; /* [divided] distances of these middles from the model */
+    double (*middle_distance)[3]; /* [divided] distances of the middles from the model */
     uint64_t middle_capacity, distance_capacity; /* of middle and middle_distance, in triangles */
 } search;
 
@@ -149,8 +150,9 @@ static void quarter_of(const search *s, uint64_t i, int which, triangle *out)
 
 /* Chooses the triangles that this round divides, moves them to the front of s->current, and sets
  * s->divided to their number. These are triangles whose bounds are at least half of the greatest
- * bound: divisions of triangles with smaller bounds do not improve the result yet. A division needs
- * three queries, and the remaining number of queries limits the number of divisions. */
+ * bound, because dividing triangles with smaller bounds does not lower the greatest bound. A
+ * division needs three queries, and the remaining number of queries limits the number of
+ * divisions. */
 static void choose_triangles(search *s)
 {
     double most = 0;
@@ -220,8 +222,8 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
                           : m->xyz64[3 * (uint64_t)vertex + c];
 }
 
-/* Searches a batch: faces begin .. end - 1. The allowed number of queries is shared by the batches
- * in proportion to their numbers of faces. */
+/* Searches a batch: faces begin .. end - 1. Each batch may use a share of the allowed queries in
+ * proportion to its number of faces. */
 static ebpo_status search_batch(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;

@@ -5,7 +5,7 @@
  * and the processor's caches keep the data. Each thread has a separate query context, which is made
  * at its first query. Results do not depend on the number of threads.
  *
- * Source: docs/guide/maps.md. */
+ * See docs/guide/maps.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -40,7 +40,8 @@ ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_queries){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* the call for no points fails early if the model has no distances */
+    /* this call with 0 points fails now, before the threads start, if distances of the model cannot
+     * be queried */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;
@@ -67,8 +68,8 @@ ebpo_status ebpo_map_query(ebpo_map_queries *queries, unsigned worker, const dou
 typedef struct points_job {
     ebpo_map_queries queries;
     const double *points;  /* [3 * number of points] */
-    const uint64_t *order; /* indices of points in the order along the Morton curve, where
-                            * consecutive points are close to each other; NULL: input order */
+    const uint64_t *order; /* indices of points in their order along the Morton curve, in which
+                              consecutive points are close to each other; NULL: input order */
     double *distances;     /* [number of points] the result, in input order */
 } points_job;
 
@@ -205,8 +206,9 @@ static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, uns
     return status;
 }
 
-/* Checks the number of points, and checks that the eight corners of the lattice are finite. Then
- * all points are finite, because each coordinate is monotonic in the three indices. */
+/* Checks the number of points, and checks that the eight corners of the lattice are finite. If they
+ * are finite, all points are finite, because each coordinate is monotonic in each of the three
+ * indices. */
 static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
 {
     uint64_t points = 0;
@@ -235,7 +237,7 @@ static uint64_t layers_of_slab(const ebpo_lattice *l)
     return layers < l->count[2] ? layers : l->count[2];
 }
 
-/* Computes the distances of all points of the slab, with progress reports in points. */
+/* Computes the distances of all points of the slab. Progress is reported as a number of points. */
 static ebpo_status map_slab(slab_job *j, const ebpo_map_options *o, ebpo_error *error)
 {
     const uint64_t size[3] = { j->lattice->count[0], j->lattice->count[1], j->layers };

@@ -59,7 +59,7 @@ static void rgb_of_oklab(double light, double a, double b, uint8_t rgb[3])
 
 /* Computes a colour of the diverging palette. share: distance / range, -1 to 1. The hues are 255
  * degrees inside and 50 degrees outside, which colour-blind readers can distinguish. Distance 0 is
- * light grey, and colours are darker and stronger for greater distances. */
+ * light grey. Greater distances have darker and stronger colours. */
 static void palette_diverging(double share, uint8_t rgb[3])
 {
     /* cosine and sine of the hues inside and outside */

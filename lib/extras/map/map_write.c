@@ -28,15 +28,15 @@
 
 /* The values are divided by their sizes into three bins of small, ordinary and large values, whose
  * limits are 2^-400 and 2^400 (see add_to). The units of values in bins 0, 1 and 2 are
- * 2^-MAP_BIN_UNIT, 1 and 2^MAP_BIN_UNIT. In these units, all values are between 2^-474 and 2^424,
- * so that their squares are normal numbers. */
+ * 2^-MAP_BIN_UNIT, 1 and 2^MAP_BIN_UNIT. In the unit of its bin, every value except 0 has an
+ * absolute value between 2^-474 and 2^424, so that its square is a normal number. */
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
 /* The state of statistics while values are added. Percentiles are computed separately. */
 typedef struct map_sums {
     ebpo_map_stats stats; /* only counts, min and max are set */
-    /* Sums of the values in each bin, of their absolute values, and of their squares. The unit of
-     * sums of squares is the square of the bin's unit. */
+    /* Sums of the values in each bin, of their absolute values, and of their squares. A sum of
+     * squares has the square of the bin's unit. */
     ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
 } map_sums;
 

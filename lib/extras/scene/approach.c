@@ -3,17 +3,17 @@
  * time.
  *
  * Both searches evaluate the distance at some times, and use one bound: the distance of two
- * instances changes by at most their motion. The first search goes forward in time from one
- * evaluation to the next. Between two evaluations the motion is shorter than the distance minus the
- * clearance, so no contact is missed.
- * The second search divides the interval of time into shorter intervals, and keeps these in a heap,
- * ordered by a lower bound of the distance in each interval. It repeatedly halves the first
- * interval of the heap, until the result is within the tolerance. Routes jump only at ends of
- * intervals.
+ * instances changes by at most the sum of their motions. The first search goes forward in time from
+ * one evaluation to the next. Between two evaluations the motion is shorter than the distance minus
+ * the clearance, so no contact is missed.
+ * The second search divides the interval of time into shorter intervals. It keeps the shorter
+ * intervals in a heap, ordered by a lower bound of the distance in each of them. It repeatedly
+ * halves the first interval of the heap, until the result is within the tolerance. Routes jump only
+ * at ends of intervals.
  * A result is a pair of guaranteed bounds. A search that reaches the maximum number of evaluations
  * returns its current bounds.
  *
- * Source: docs/guide/scenes.md. */
+ * See docs/guide/scenes.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -59,9 +59,9 @@ static ebpo_status next_evaluation(const approach_search *search,
     return status;
 }
 
-/* Called if the motion to the next representable time is already too long. If this motion is
- * INFINITY, because a route jumps at that time, sets *next to that time. Otherwise the bound of the
- * rounding alone is too long, and *next stays unchanged. */
+/* Handles the case that the motion up to the next double after result->time is already too long. If
+ * a route jumps at this double, the motion is INFINITY, and *next is set to the double. Otherwise
+ * the bound of the rounding alone is too long, and *next is not changed. */
 static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
                                   const ebpo_scene_approach_result *result, double *next,
                                   ebpo_error *error)
@@ -81,7 +81,7 @@ static bool is_reached(const approach_search *search, const ebpo_scene_approach_
 }
 
 /* Evaluates the distance at result->time, and sets the result's bounds. Fails with EBPO_E_ABSENT if
- * omitted faces may be within the clearance and the faces in the files are not. */
+ * the faces in the files are not within the clearance, but omitted faces may be. */
 static ebpo_status approach_evaluate(const approach_search *search,
                                      ebpo_scene_evaluations *evaluations,
                                      ebpo_scene_approach_result *result, ebpo_error *error)
@@ -96,9 +96,9 @@ static ebpo_status approach_evaluate(const approach_search *search,
                                    result->time, false, error);
 }
 
-/* Evaluates the distance at increasing times. Ends when the pair is within its clearance, at the
- * end of the interval of time, or without a decision (result->reached is -1) at the maximum number
- * of evaluations or if no later time is possible. */
+/* Evaluates the distance at increasing times. Ends when the pair is within its clearance, or at the
+ * end of the interval of time. Ends without a decision (result->reached is -1) at the maximum
+ * number of evaluations, or if no later time is possible. */
 static ebpo_status follow_pair(const approach_search *search, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *result, ebpo_error *error)
 {

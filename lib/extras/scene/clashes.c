@@ -7,7 +7,7 @@
  * and the distance if it is less than the clearance. If faces that are omitted from a subset may
  * change a result, the query fails with EBPO_E_ABSENT.
  *
- * Source: docs/guide/scenes.md. */
+ * See docs/guide/scenes.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -63,10 +63,11 @@ static void set_location(ebpo_scene_clash *clash, const double location[3])
 /* Counts pairs of faces by kind, and keeps the pair with the least indices. */
 typedef struct tally {
     ebpo_scene_clash *clash;
-    ebpo_pair_faces *faces; /* for finding locations; NULL: not requested */
+    ebpo_pair_faces *faces; /* gives the corners of faces, to find locations; NULL: locations are
+                               not requested */
     ebpo_face_pair first;
-    bool kind_only;    /* stop at the first crossing pair, which decides the kind, and do not
-                        * change `first` */
+    bool kind_only; /* stop at the first crossing pair, which decides the kind of the clash, and do
+                       not change `first` */
     ebpo_error *error; /* error of `status` */
     ebpo_status status;
 } tally;
@@ -239,9 +240,9 @@ static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_p
                                                           : status;
 }
 
-/* Returns true if a point of one model may be inside the other model. If it returns false, the
- * depths are 0 without a search. (The search would take long for faces that overlap in one plane.)
- */
+/* Returns true if a point of one model may be inside the other model. If the function returns
+ * false, the depths are 0, and no search is needed. (A search would take long for faces that
+ * overlap in one plane.) */
 static bool is_any_inner(int32_t relation)
 {
     return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
@@ -281,8 +282,9 @@ static ebpo_clash_kind kind_of(const ebpo_scene_clash *clash)
                              : EBPO_CLASH_NONE;
 }
 
-/* Compares the distance with the clearance, which takes less time than computing the distance. Only
- * if the distance is less than the clearance, computes it and sets the kind EBPO_CLASH_NEAR. */
+/* Compares the distance with the clearance, which takes less time than computing the distance.
+ * Computes the distance, and sets the kind EBPO_CLASH_NEAR, only if the distance is less than the
+ * clearance. */
 static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_collide_distance_options limit = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
@@ -298,8 +300,7 @@ static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *clash
     return status;
 }
 
-/* Sets the relation. Replaces the kind of the clash by a kind that follows from the relation, if
- * there is one. */
+/* Sets the relation. If the relation determines a kind of clash, sets this kind. */
 static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_relation_result found;

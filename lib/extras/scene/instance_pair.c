@@ -177,8 +177,8 @@ static ebpo_status bound_omitted(const ebpo_scene *scene, uint64_t self, uint64_
 ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
                                double *distance, uint64_t *omitted_in, ebpo_error *error)
 {
-    /* from_a: bound of the distance between b and the faces that the file of a omits; from_b: the
-     * converse */
+    /* from_a: lower bound of the distance between instance b and the faces that the file of a
+     * omits; from_b: the same with a and b exchanged */
     double from_a, from_b;
     ebpo_status status = bound_omitted(scene, pair->a, pair->b, time, &from_a, error);
     if (status == EBPO_OK)
@@ -251,8 +251,8 @@ static double motion_on_one_route(const ebpo_scene *scene, const ebpo_scene_pair
                                                         a.size + b.size });
 }
 
-/* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
- * jump. shares_route: result of follows_one_route. */
+/* Sets *out to an upper bound of the change of the pair's distance between two times; INFINITY if a
+ * route jumps between them. shares_route: result of follows_one_route. */
 static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                bool shares_route, double from, double to, double *out,
                                ebpo_error *error)
@@ -410,8 +410,8 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
     ebpo_collide_distance_result found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     query.tolerance = l->tolerance;
     /* A warm query begins with the result of the previous query of its collider, so lo and hi may
-     * depend on it. Each pair of instances has a separate collider, so that results do not depend
-     * on the order in which pairs are evaluated. */
+     * depend on the previous query. Each pair of instances has a separate collider, so that results
+     * do not depend on the order in which pairs are evaluated. */
     query.warm = true;
     ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)

@@ -17,7 +17,8 @@ typedef struct ebpo_scene_bounds {
 typedef struct ebpo_scene_relative_box {
     ebpo_scene_bounds box;
     double rounding; /* length by which `box` has been widened on each side because of rounding */
-    double unit;     /* least length in the world of a length of 1 in these coordinates */
+    double unit;     /* least length in the world that a vector of length 1 in these coordinates can
+                        have */
 } ebpo_scene_relative_box;
 
 /* Computes a box that contains the box of the instance `other` at a time. The computed box is in
@@ -46,7 +47,7 @@ ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pa
                                     ebpo_error *error);
 
 /* Returns the next time after `from` at which a route of the pair has a key (a time at which a
- * route gives a pose), or `to` if that is earlier. */
+ * route gives a pose), or `to` if `to` is earlier. */
 double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                             double to);
 
@@ -60,7 +61,7 @@ typedef struct ebpo_scene_pairs_list {
 /* Lists the pairs of ebpo_scene_pairs. On failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
                                                 ebpo_scene_pairs_list *out, ebpo_error *error);
-/* Computes the result of one pair. context: that of ebpo_scene_search. */
+/* Computes the result of one pair. context: the context in ebpo_scene_search. */
 typedef ebpo_status (*ebpo_scene_find_fn)(const void *context, const ebpo_scene_pair *pair,
                                           void *result, ebpo_error *error);
 
@@ -108,8 +109,8 @@ typedef struct ebpo_scene_evaluations {
 } ebpo_scene_evaluations;
 
 /* Begins evaluations. tolerance: tolerance of the caller's result; each evaluation uses a quarter
- * of it, but not less than the rounding of poses allows. The caller frees the collider, even on
- * failure. */
+ * of this tolerance, or a greater tolerance if the rounding errors of poses require that. The
+ * caller frees the collider, even on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *evaluations,
                                                        const ebpo_scene *scene,
                                                        const ebpo_scene_pair *pair,

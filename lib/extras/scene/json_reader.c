@@ -10,7 +10,7 @@
  * evaluated, and ebpo_json_leave afterwards. Unknown members are errors, except private members,
  * whose names begin with "x-".
  *
- * Source: format-spec/scene.md. */
+ * See format-spec/scene.md. */
 #include "core/strict_fp.h"
 
 #include <stdarg.h>
@@ -27,7 +27,7 @@ size_t ebpo_scene_bom_length(const char *text, size_t size)
     return (size_t)ebpo_text_bom_length(text, size);
 }
 
-/* Returns the index after the string that begins at text[i], or `size`. */
+/* Returns the index after the string that begins at text[i]; `size` if the string does not end. */
 static size_t skip_string(const char *text, size_t size, size_t i)
 {
     for (i++; i < size && text[i] != '"'; i++)

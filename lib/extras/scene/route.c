@@ -5,9 +5,9 @@
  * sums, products, quotients and square roots are used, so that a pose has the same bits on every
  * machine.
  *
- * Between two times with no key between them, three quantities have upper bounds: the length of the
- * motion, its distance from the straight line, and the motion that rounding alone causes. The
- * bounds are rounded upwards. */
+ * For two times with no key between them, functions return upper bounds of three lengths: the
+ * length of the motion, the distance of the motion from a straight line, and the motion that
+ * rounding alone causes. The bounds are rounded upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>

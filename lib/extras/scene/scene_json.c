@@ -6,7 +6,7 @@
  * a file of poses names its columns time, x, y, z, qx, qy, qz, qw and scale in any order. The bytes
  * of all such files are limited. Numbers are read in the C locale.
  *
- * Source: format-spec/scene.md. */
+ * See format-spec/scene.md. */
 #include "core/strict_fp.h"
 
 #include <locale.h>

@@ -1,13 +1,15 @@
 /* Makes a scene: adds and returns its members, and checks names and the paths of files.
  *
- * Models, routes and cameras each have a separate name space. A rule gives the clearance of pairs
- * of instances, or ignores them. It names both sets of instances by selectors: "*", the name of an
- * instance, or the name of a layer or a group with the prefix "layer:" or "group:". Every instance
- * belongs to the set of all instances, to a set that has only this instance, to the set of its
- * layer and to the sets of its groups.
+ * Models, routes and cameras each have a separate name space. A rule applies to the pairs of an
+ * instance of one set and an instance of another set. It requires a clearance of these pairs, or
+ * ignores them. It names each of the two sets by a selector: "*", the name of an instance, or the
+ * name of a layer or a group with the prefix "layer:" or "group:". Every instance belongs to the
+ * set of all instances, to a set that has only this instance, to the set of its layer and to the
+ * sets of its groups.
  *
- * A scene file is untrusted input. It may name only files in its folder or below that, unless the
- * options allow other files. Symbolic links that lead out of the folder are rejected. */
+ * A scene file is untrusted input. It may name only files in its folder or in folders below its
+ * folder, unless the options allow other files. Symbolic links that lead out of the folder are
+ * rejected. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -264,7 +266,7 @@ void ebpo_scene_free(ebpo_scene *scene)
     free(scene);
 }
 
-/* Ensures capacity for one more item, and sets *number to its index. */
+/* Makes space for one more item of a list of the scene, and sets *number to the item's index. */
 #define SPACE(scene, list, number, error)                                            \
     (*(number) = (scene)->list##_count,                                              \
      ebpo_grow(&(scene)->list, &(scene)->list##_capacity, (scene)->list##_count + 1, \

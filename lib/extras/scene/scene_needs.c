@@ -2,13 +2,13 @@
  * box for collisions and for inside tests, and the last level for views.
  *
  * Boxes are in the coordinates of the model, and contain all points that come near another
- * instance. They are computed over steps of time so short that no instance moves far. They are
- * rounded outwards, so that the subset of a file with this box returns the same results as the
+ * instance. They are computed for steps of time that are so short that no instance moves far. Boxes
+ * are rounded outwards, so that the subset of a file with this box returns the same results as the
  * whole file.
  *
  * A view needs the levels up to the first one whose cells have a diagonal of at most one pixel. A
- * node's envelope and its content are both in its cell, so finer levels make no visible difference.
- */
+ * node's envelope and its content are both in its cell, so finer levels make no visible
+ * difference. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -98,7 +98,8 @@ static ebpo_status near_box(const near_search *n, double from, double to, double
             ebpo_scene_make_relative_box(n->scene, n->self, n->other, to, &last, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    /* The last term bounds the rounding errors of the boxes at all times between these two. */
+    /* The last term bounds the rounding errors of the boxes at all times between `from` and
+     * `to`. */
     double grow =
         (n->clearance + n->margin + motion) / fmin(first.unit, last.unit) * (1 + 0x1p-40) +
         2 * fmax(first.rounding, last.rounding);
@@ -181,8 +182,8 @@ static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
     return size * pose.scale;
 }
 
-/* Returns the default margin of a pair: 1/32 of the size of the smaller instance, or, if that is a
- * point, of the larger one. */
+/* Returns the default margin of a pair: 1/32 of the size of the smaller instance, or of the larger
+ * one if the smaller one is a point. */
 static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     double a = size_of(needs->scene, pair->a, needs->from);
@@ -241,7 +242,7 @@ ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs)
     return status;
 }
 
-/* Initialises the needs of files; two models of one file share one need. */
+/* Initialises the needs of files. If two models have the same file, the file has one need. */
 static void begin_files(ebpo_scene_needs *needs)
 {
     for (uint64_t i = 0; i < needs->scene->models_count; i++) {

@@ -7,9 +7,11 @@
 
 /* The needed content of a file. */
 typedef struct ebpo_scene_file_need {
-    uint64_t users;          /* number of pairs of instances, or of cameras, that need the file */
-    bool any;                /* false: so far only the root node is needed */
-    ebpo_scene_bounds box;   /* contains the faces that collisions and inside tests need */
+    uint64_t users; /* number of pairs of instances that need the file; for views, the number of the
+                       scene's cameras */
+    bool any;       /* false: so far only the root node is needed */
+    ebpo_scene_bounds
+        box; /* needed box: contains the faces that collisions and inside tests need */
     ebpo_scene_bounds whole; /* box of all faces */
     int last_level;          /* last level that views need; -1: all levels */
     uint32_t parts;          /* needed parts of the file, as EBPO_PART_... bits */
@@ -28,12 +30,13 @@ typedef struct ebpo_scene_needs {
  * caller frees `files`, even on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_begin_needs(ebpo_scene_needs *needs);
 
-/* For each pair of instances that may come near each other: adds to the needed boxes the points of
- * both models that may be near the other instance. Uses the pairs of ebpo_scene_pairs. */
+/* Adds the needs of all pairs of instances that may come near each other (ebpo_scene_pairs). For
+ * each pair, extends the needed box of each model by the model's points that may be near the other
+ * instance. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs);
 
-/* Completes the needs after all were added. If no need was added for a file, only its root is
- * needed. */
+/* Completes the needs after all needs have been added. If no need was added for a file, only its
+ * root is needed. */
 void ebpo_scene_end_needs(ebpo_scene_needs *needs);
 
 /* Returns the need of a file as options for a subset. */

@@ -2,8 +2,8 @@
  *
  * Models of the same path share one open file. If a scene file has a digest for a model, the
  * content_sha256 of the model's file must be equal to that digest. Loading sets the box of each
- * model, from which motions are bounded. An ebpo_model for queries is made when it is first
- * needed. */
+ * model. Bounds of motions are computed from this box. An ebpo_model for queries is made when it is
+ * first needed. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -321,8 +321,8 @@ static uint64_t sum_of_files(const packing *p)
     return sum;
 }
 
-/* If the sum of the files' sizes is above the target size, writes files again, each reduced by the
- * same factor. A file of which only the root is needed is not reduced. */
+/* If the sum of the files' sizes is above the target size, writes files again, each of them smaller
+ * by the same factor. A file of which only the root is needed is not written again. */
 static ebpo_status shrink_to_target(packing *p)
 {
     /* fixed: bytes of the files that are not reduced */

@@ -310,8 +310,8 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
     for (double at = from; route && at < to;) {
         double next = ebpo_scene_route_next(route, at, to);
         sum += ebpo_scene_route_step(route, at, next, extent).length;
-        /* true if `next` is the time of a key, but not of the first one: then the key that follows
-         * `next` is later than the key that follows `at` */
+        /* true if `next` is the time of a key other than the first key; in this case the key that
+         * follows `next` is later than the key that follows `at` */
         bool ends_at_key =
             next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
                                               ebpo_scene_route_next(route, at, INFINITY);
@@ -399,8 +399,8 @@ static int best_axis(const sweep *s)
     return best;
 }
 
-/* Exchanges the first axis of each box with the chosen axis. Boxes are sorted and swept along the
- * first axis. */
+/* Exchanges the first axis of each box with the chosen axis, because boxes are sorted and compared
+ * along the first axis. */
 static void swap_axes(sweep *s, int axis)
 {
     for (uint64_t i = 0; i < s->count; i++) {

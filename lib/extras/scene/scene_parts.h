@@ -39,14 +39,14 @@ typedef struct ebpo_scene_route {
  * a set that has only this instance, and in the sets of its layer and its groups. */
 typedef struct ebpo_scene_instance_entry {
     ebpo_scene_instance description; /* as added by the caller; the entry owns its name */
-    uint64_t *sets;                  /* in ascending order, once the rules are sorted */
+    uint64_t *sets; /* indices of sets; in ascending order after ebpo_scene_sort_rules */
     uint32_t set_count;
 } ebpo_scene_instance_entry;
 
 /* A rule for pairs of an instance of set a and an instance of set b; a <= b. */
 typedef struct ebpo_scene_rule_entry {
     uint64_t a, b;
-    double clearance; /* below 0: the pairs are ignored */
+    double clearance; /* required distance; below 0: the pairs are ignored */
 } ebpo_scene_rule_entry;
 
 /* Declares the members of a growing list: the items, their number and the capacity. */
@@ -69,7 +69,7 @@ struct ebpo_scene {
     uint64_t ignored_count, clearance_count; /* numbers of rules that ignore pairs, and of rules
                                               * that require a clearance, before sorting */
     char *folder;                            /* base of relative paths, "" or ending with "/" */
-    char *text; /* JSON text from which the scene was read; NULL: the scene was not read */
+    char *text; /* JSON text from which the scene was read; NULL: a program made the scene */
     size_t text_size;
     uint64_t text_models, text_instances; /* numbers of models and instances in that text */
     bool allow_outside;                   /* files that the scene names may be outside the folder */
@@ -92,8 +92,8 @@ uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const c
 
 /* --- adding members --- */
 
-/* Add members that only scene files can have. Names are copied; indices in `camera` must be valid.
- */
+/* These functions add members that only scene files can have. They copy names. Indices in `camera`
+ * must be valid. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name,
                                                ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name,
@@ -129,8 +129,8 @@ EBPO_MUST_USE ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *te
 /* --- routes --- */
 
 /* Appends a key and normalises its quaternion. Fails with EBPO_E_ARGUMENT if a number is not
- * finite, the time is not later than the time of the last key or is beyond 2^1000, the quaternion
- * is 0, or the scale is out of range. */
+ * finite, the quaternion is 0, or the scale is out of range. Also fails with EBPO_E_ARGUMENT if the
+ * time is not later than the time of the last key, or is beyond 2^1000. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
                                              ebpo_error *error);
 /* Returns the quaternion nearest to a matrix; its length is not 0, but need not be 1. */
@@ -140,8 +140,8 @@ void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4])
 void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out);
 /* Computes the pose that applies `inner` first, and then `outer`. */
 void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out);
-/* Returns the time of the first key after `from`, or `to` if that is earlier. Between `from` and
- * this time the motion is smooth. */
+/* Returns the time of the first key after `from`, or `to` if `to` is earlier. The motion is smooth
+ * between `from` and the returned time. */
 double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double to);
 
 /* Returns an upper bound of the length of a vector. Squares do not overflow or underflow. */
@@ -149,23 +149,24 @@ double ebpo_scene_length_above(const double vector[3]);
 
 /* Bounds of a set of points that follow a route, in the coordinates of the route. */
 typedef struct ebpo_scene_extent {
-    double max_distance; /* upper bound of their distance from the route's origin */
-    double size; /* 1-norm of the coordinates from which max_distance is computed; it determines
-                  * the rounding error */
+    double max_distance; /* upper bound of the points' distance from the route's origin */
+    double size; /* 1-norm of the coordinates from which max_distance is computed; the rounding
+                    error is proportional to it */
 } ebpo_scene_extent;
 
 /* Bounds of the motion of points between two times. */
 typedef struct ebpo_scene_step {
     double length; /* upper bound of the distance of a point from its first position */
-    double sag;    /* upper bound of the distance of a point from another point that moves at
-                    * constant speed on the straight line from the first to the last position */
+    double sag; /* upper bound of the distance between the point and a second point, which moves at
+                   constant speed on the straight line from the first point's first position to its
+                   last position */
 } ebpo_scene_step;
 /* Returns the bounds for points of this extent. No key may be between the two times. */
 ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
                                       ebpo_scene_extent extent);
 
-/* Returns an upper bound of the motion that rounding alone causes. It does not become smaller in
- * shorter intervals of time. */
+/* Returns an upper bound of the motion that rounding alone causes. This bound is the same for short
+ * and long intervals of time. */
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_extent extent);
 
 /* Returns an upper bound of the change of the distance of two instances on one route between the
