@@ -8,12 +8,13 @@
  * contact, the closest node is visited first.
  *
  * The work of a haptic step is bounded. If the limit is reached, the piece ends where the next node
- * may be in contact; or, if that is near the beginning, the next haptic step continues the search.
- * The search also ends if the contacts found so far hold the ball in its position.
+ * may be in contact; or, if that place is near the beginning, the next haptic step continues the
+ * search. The search also ends if the contacts found so far hold the ball in its position.
  *
- * The planes of the contacts bound a cone of allowed motions. One motion of the cone is nearest to
- * the wanted motion: the wanted motion itself, its projection onto a plane or onto the line of two
- * planes, or 0. All these are tried, because there are few planes. */
+ * The planes of the contacts bound a cone of allowed motions. The walk needs the motion in the cone
+ * that is nearest to the wanted motion. It is the wanted motion itself, its projection onto a plane
+ * or onto the line of two planes, or 0. All these candidates are tried, because there are few
+ * planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -142,8 +143,8 @@ void ebpo_ball_walk_free(ebpo_ball_walk *w)
     w->queue.item = NULL;
 }
 
-/* Returns true if the ball comes nearer to no point of `e`. Rounding is ignored, because it is less
- * than the slacks of ebpo_ball_motion. */
+/* Returns true if the ball's motion leads nearer to no point of `e`. Rounding is ignored, because
+ * it is less than the slacks of ebpo_ball_motion. */
 static bool moves_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;

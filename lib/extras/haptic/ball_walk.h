@@ -17,9 +17,9 @@ typedef struct ebpo_held_planes {
 /* Adds a plane, unless an equal plane is present or there is no space. */
 void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
 
-/* Finds the vector `out` nearest to `want` with n . out >= 0 for the normals n of all planes; `out`
- * is 0 if rounding prevents finding another vector. Returns the tolerance: n . out is at least
- * minus this value. */
+/* Finds the vector `out` nearest to `want` with n . out >= 0 for the normals n of all planes; if
+ * rounding makes all other candidates violate a plane, `out` is 0. Returns the tolerance: n . out
+ * is at least minus this value. */
 double ebpo_project_motion(const ebpo_held_planes *planes, const double want[3], double out[3]);
 
 /* Maximum number of faces and of nodes that a haptic step examines. The next step continues the
@@ -49,7 +49,7 @@ typedef struct ebpo_ball_walk {
     ebpo_held_planes contacts; /* normals of the contacts at this point of the path */
     bool work_limited;         /* the path ends before the contact, because the limit
                                 * of work was reached */
-    double to[3];              /* end of the piece, known after the search */
+    double to[3];              /* end of the piece, set after the stage EBPO_BALL_SEARCHES */
     ebpo_near_queue queue;     /* nodes to be visited in the stage EBPO_BALL_SEARCHES */
     uint64_t stack[64]; /* [depth] nodes to be visited in the stage EBPO_BALL_CHECKS; at most one
                          * node of each level */

@@ -8,8 +8,8 @@
  *
  * Distances are computed in doubles, with errors of a few ulps. Winding numbers are exact: along a
  * straight path from a point whose winding number is known, the winding number changes at each face
- * whose interior the path crosses. If the path crosses an edge, or begins in a face's plane, it is
- * replaced by a detour through another point; almost every other point is suitable. */
+ * whose interior the path crosses. If the path crosses an edge, or begins in a face's plane, a
+ * detour through another point replaces the path. Almost every other point is suitable. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -233,7 +233,8 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
         } else {
             double l = box_square_distance(&box->node[2 * node], around);
             double r = box_square_distance(&box->node[2 * node + 1], around);
-            bool first = l <= r; /* the child that is visited first is pushed last */
+            bool first = l <= r; /* the left child is nearer; the nearer child is pushed last, so
+                                    that it is visited first */
             stack[depth].node = 2 * node + first;
             stack[depth++].lower = first ? r : l;
             stack[depth].node = 2 * node + !first;
@@ -399,7 +400,8 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
         if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -orientation &&
             ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -orientation)
             return false;
-    /* if pq is on the line of an edge, no such line separates them, so compare intervals */
+    /* if pq is on the line of an edge, none of these lines separates the segment from the face, so
+     * compare intervals */
     for (int i = 0; i < 2; i++)
         if (fmax(a[i], b[i]) < fmin(corner[0][i], fmin(corner[1][i], corner[2][i])) ||
             fmin(a[i], b[i]) > fmax(corner[0][i], fmax(corner[1][i], corner[2][i])))

@@ -27,10 +27,10 @@ static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
 }
 
 typedef struct ebpo_face_box {
-    ebpo_extent allowed;      /* allowed positions of the proxy: all faces within the margin of
-                               * these positions are loaded */
-    ebpo_extent loaded;       /* `allowed`, widened by the margin: all faces that intersect this
-                               * extent are loaded */
+    ebpo_extent allowed; /* allowed positions of the proxy: all faces that are not farther from one
+                            of these positions than the margin are loaded */
+    ebpo_extent loaded;  /* `allowed`, widened by the margin: all faces that intersect this
+                          * extent are loaded */
     uint64_t count, capacity; /* number of loaded faces; greatest possible number */
     uint64_t leaves;          /* number of leaves of the tree: a power of two */
     double (*corner)[3][3];   /* [capacity] */
@@ -54,9 +54,9 @@ EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *c
                                              ebpo_error *error);
 
 /* Finds the faces whose boxes intersect `around`, and writes their indices in box->corner to
- * found[most]. Sets *count to their number. Returns false if there are more than `most` faces or
- * more than *visits nodes; *count faces have then been found. Reduces *visits by the number of
- * visited nodes. */
+ * found[most]. Sets *count to their number. Reduces *visits by the number of visited nodes. Returns
+ * false if there are more than `most` faces, or if *visits is too small to visit all nodes that are
+ * needed. Then *count faces have been found. */
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count);
 
@@ -84,22 +84,22 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 typedef struct ebpo_ball_motion {
     const double *from, *motion; /* [3] first centre, and vector to the last one */
     double radius, band;         /* contact begins at a distance of radius + band */
-    /* Lengths: a face is ignored if the ball comes nearer to it by less than this over the whole
-     * path. `least_slack` applies while the distance is at most the radius, `slack` while it is
-     * greater. */
+    /* A face is ignored if the ball's distance from the face decreases by less than a slack over
+     * the whole path. This slack is `least_slack` while the distance is at most the radius, and
+     * `slack` while the distance is greater. Both are lengths. */
     double slack, least_slack;
 } ebpo_ball_motion;
 
 /* Returns the fraction of the path, 0 to 1, after which the ball touches the face; the result may
- * be slightly too small. Returns 2 if the ball does not touch the face. `away` is as in
- * ebpo_face_near, at that point of the path. */
+ * be slightly too small. Returns 2 if the ball does not touch the face. `away` is set as in
+ * ebpo_face_near, for the ball's centre at the returned fraction. */
 double ebpo_ball_first_contact(const ebpo_ball_motion *ball, const double face[3][3],
                                double away[3]);
 
-/* Returns false if the segment pq and the face, both with their ends and edges, certainly have no
- * common point. Returns true if they have a common point, or if coordinates are so large or small
- * that only GMP integers could decide, which would need memory. Returns false for a face without
- * area. */
+/* Returns false if the segment pq, with its ends, and the face, with its edges, certainly have no
+ * common point. Returns true if they have a common point. Also returns true if coordinates are so
+ * large or small that only GMP integers could decide, because GMP allocates memory. Returns false
+ * for a face without area. */
 bool ebpo_segment_may_intersect(const double p[3], const double q[3], const double face[3][3]);
 
 /* --- a heap of nodes of the tree over a box's faces --- */
@@ -131,7 +131,7 @@ typedef struct ebpo_known_winding {
 /* Moves the point to `place`. The work is bounded: at most twelve attempts, each with at most
  * `most` faces and `visits` nodes. found[most] is workspace. Adds the number of faces to *work.
  * Returns true if the point is now at `place`. If not, the point is at the last position whose
- * winding number was found, or, if it is outside the box, `known` is false. */
+ * winding number was found; if this position is outside box->allowed, `known` is false. */
 bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box,
                              const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
                              uint64_t *work);

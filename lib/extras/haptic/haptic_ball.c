@@ -5,7 +5,7 @@
  * surface. A step allocates no memory, takes no lock and reads no file: its data are made before
  * the step or come from the loading thread. A device position that is infinite or NaN is ignored.
  *
- * Documentation: docs/guide/haptic.md. */
+ * See docs/guide/haptic.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -37,9 +37,9 @@ uint32_t ebpo_haptic_stopped(const ebpo_haptic *t)
 static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_IDLE; }
 
 /* Applies Coulomb friction. Without friction the proxy has slid from `from` to its position.
- * Friction shortens this path: the proxy stops where the tangential force is equal to the friction,
- * or stays at `from` if the friction is greater. Both forces are proportional to lengths, so
- * lengths are compared. Returns bits of ebpo_haptic_flag. */
+ * Friction shortens this path: the proxy stops where the tangential force is equal to the friction.
+ * If the friction is greater on the whole path, the proxy stays at `from`. Both forces are
+ * proportional to lengths, so lengths are compared. Returns bits of ebpo_haptic_flag. */
 static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const double device[3],
                                ebpo_ball_work *work)
 {
@@ -85,8 +85,8 @@ static void keep_from_faces(const ebpo_haptic *t, bool near, const double depth[
     /* the first contact may be an edge beside the ball, so the nearest face counts, too */
     if (near && ebpo_vec3_dot(t->away, depth) >= 0)
         ebpo_held_planes_add(&planes, t->away);
-    /* a face towards which the spring itself pulls is the other face of a narrow corner, and does
-     * not count */
+    /* if the spring itself pulls towards a face, this face is the other face of a narrow corner,
+     * and does not count */
     for (int i = 0; i < t->holding_planes.count; i++)
         if (ebpo_vec3_dot(t->holding_planes.normal[i], depth) >= 0)
             ebpo_held_planes_add(&planes, t->holding_planes.normal[i]);
@@ -311,8 +311,8 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
 }
 
 /* Returns true if a box contains the proxy, and makes this box the current one. The previous box is
- * tested, too: it may be a box that ebpo_haptic_take_box rejected because of an earlier position of
- * the proxy, and the loader makes no further box if that box contains the new position. */
+ * tested, too. It may be a box that ebpo_haptic_take_box rejected because of an earlier position of
+ * the proxy. If such a box contains the new position, the loader makes no further box. */
 static bool has_box(ebpo_haptic *t)
 {
     if (ebpo_extent_holds(&t->box[t->current_box].allowed, t->proxy) || ebpo_haptic_take_box(t))

@@ -39,7 +39,7 @@ static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error
 }
 
 /* Queries distance and winding number at the probe's position, and passes them to the haptic step.
- * Does nothing, and sets *moved to false, if the position is the position of the last query. */
+ * If the probe has not moved since the last query, only sets *moved to false. */
 static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
     ebpo_probe_query *known = &t->known[t->loader_result];

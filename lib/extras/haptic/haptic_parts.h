@@ -43,13 +43,14 @@ struct ebpo_haptic {
     /* --- constant members --- */
     ebpo_model *model;
     ebpo_haptic_options options;
-    ebpo_extent root;              /* contains all faces */
-    double diagonal;               /* diagonal of the root cell */
-    double contact_distance, band; /* `radius` (here radius plus skin) and `band` (tolerance of
-                                    * contact) of ebpo_ball_motion */
-    double margin;                 /* faces within this distance of the proxy are loaded */
+    ebpo_extent root; /* contains all faces */
+    double diagonal;  /* diagonal of the root cell */
+    double contact_distance,
+        band;      /* contact_distance: radius plus skin, used as ebpo_ball_motion.radius; band:
+                      tolerance of contact, used as ebpo_ball_motion.band */
+    double margin; /* faces within this distance of the proxy are loaded */
     bool solid;
-    ebpo_held_levels levels; /* for probes */
+    ebpo_held_levels levels; /* upper levels of the octree, for probes */
 
     /* --- used by the thread of haptic steps --- */
     unsigned current_box, previous_box;   /* indices of the current and the previous box */
@@ -90,13 +91,14 @@ struct ebpo_haptic {
 
     /* --- used by the loading thread --- */
     ebpo_context *loading;
-    unsigned loader_box;                /* index of the box that the loading thread may write */
-    unsigned loader_result;             /* index in known[] of the result that it may write */
-    double last_query[3];               /* position of the last query for a probe */
-    ebpo_extent newest_allowed;         /* `allowed` of the newest box */
-    double half_side;                   /* half of the side of `allowed` of the next box */
-    double speed_position[3], speed[3]; /* position at speed_time; speed before that */
-    uint64_t speed_time;                /* time of the last measurement, in ns */
+    unsigned loader_box;    /* index of the box that the loading thread may write */
+    unsigned loader_result; /* index in known[] of the result that the loading thread may write */
+    double last_query[3];   /* position of the last query for a probe */
+    ebpo_extent newest_allowed; /* `allowed` of the newest box */
+    double half_side;           /* half of the side of `allowed` of the next box */
+    double speed_position[3],
+        speed[3];        /* position of the device at speed_time, and its speed before speed_time */
+    uint64_t speed_time; /* time of the last measurement, in ns */
     pthread_t thread;
     bool has_thread;
 
@@ -124,11 +126,11 @@ const ebpo_probe_query *ebpo_haptic_newest_probe_query(ebpo_haptic *t);
 EBPO_MUST_USE ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error);
 void ebpo_haptic_loader_stop(ebpo_haptic *t);
 
-/* haptic_step.c: if the waiting box is fresh, takes it as the previous box. If this box contains
- * the proxy, makes it the current box and returns true. */
+/* haptic_step.c: if the waiting box is fresh (no step has taken it), takes it as the previous box.
+ * If this box contains the proxy, makes it the current box and returns true. */
 bool ebpo_haptic_take_box(ebpo_haptic *t);
-/* haptic_step.c: exchanges the current and the previous box if the previous box contains the proxy,
- * because the previous box may extend further in the direction of the device. */
+/* haptic_step.c: exchanges the current and the previous box if the previous box contains the proxy.
+ * This helps if the previous box extends further towards the device. */
 void ebpo_haptic_try_previous_box(ebpo_haptic *t);
 
 /* haptic_ball.c: returns EBPO_HAPTIC_STOPPED if the loading thread has failed, or 0. */

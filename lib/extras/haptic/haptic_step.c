@@ -190,7 +190,7 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 typedef struct path_step {
     ebpo_haptic *t;
     const double *goal;                   /* [3] */
-    double motion[3], slack, least_slack; /* of the current piece, as in ebpo_ball_motion */
+    double motion[3], slack, least_slack; /* members of ebpo_ball_motion for the current piece */
     uint32_t flags;                       /* bits of ebpo_haptic_flag, for the caller */
     ebpo_ball_work *work;
 } path_step;
@@ -300,8 +300,8 @@ static bool begin_piece(path_step *s)
     return true;
 }
 
-/* Makes space for more planes: drops the planes from which the last piece moved away, and, if the
- * list is still full, the last plane. Three planes are enough to hold the proxy. */
+/* Makes space for more planes: drops the planes from which the last piece moved away. If the list
+ * is still full, drops the last plane, because three planes are enough to hold the proxy. */
 static void reserve_space(ebpo_held_planes *along, const double motion[3])
 {
     double length = sqrt(ebpo_vec3_dot(motion, motion));
@@ -361,8 +361,8 @@ static uint32_t held_flags(const path_step *s)
     return vectors_differ(motion, want) ? EBPO_HAPTIC_CONTACT : 0;
 }
 
-/* Follows pieces towards the goal. First completes a piece that an earlier haptic step began, which
- * leads to an earlier position of the device. Returns bits of ebpo_haptic_flag. */
+/* Follows pieces towards the goal. If an earlier haptic step began a piece, first completes this
+ * piece, which leads to an earlier position of the device. Returns bits of ebpo_haptic_flag. */
 static uint32_t follow_pieces(path_step *s)
 {
     ebpo_haptic *t = s->t;

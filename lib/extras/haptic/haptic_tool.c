@@ -5,9 +5,9 @@
  * The path of a step consists of pieces. A piece is computed in two passes. The first pass follows
  * each point that may hit a face, and ends the piece where the first point comes too close to a
  * face. The second pass examines these points at their new positions: exact arithmetic checks that
- * no point has crossed a face, and distances check that no point is too close. After that, the tool
- * moves to the end of the piece. If many points are close to faces, a pass may take several haptic
- * steps. */
+ * no point has crossed a face, and computed distances show that no point is too close to a face.
+ * After that, the tool moves to the end of the piece. If many points are close to faces, a pass may
+ * take several haptic steps. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
@@ -60,8 +60,8 @@ static void box_of_segment(const double p[3], const double q[3], double wide, eb
     }
 }
 
-/* Returns a distance within which no face is around `e`. It is computed from the faces of the box
- * and the boundary of the loaded region, or from the box of the model. */
+/* Returns a lower bound of the distance of `e` from all faces. The bound is computed from the faces
+ * of the box and the boundary of the loaded region, or from the box of the model. */
 static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
 {
     double out = 0, inside = INFINITY;
@@ -189,10 +189,10 @@ static void add_contact(const tool_piece *p, const ebpo_close_point *close, uint
     ebpo_tool_contact_add(&tool->next, &c);
 }
 
-/* Adds the contacts of a point. A face directly below the point pushes along its normal, but its
- * neighbours would push at an angle, from the shared edge. So a face counts only if its nearest
- * point is in its interior, or if no other face is nearer. near: nearest points of close->count
- * faces. */
+/* Adds the contacts of a point. A face directly below the point pushes the point along the face's
+ * normal. A neighbouring face would push from the shared edge, at an angle. So a face counts only
+ * if the face's nearest point is in its interior, or if no other face is nearer. near: nearest
+ * points of close->count faces. */
 static void add_contacts(const tool_piece *p, const ebpo_close_point *close,
                          const ebpo_face_near *near)
 {
@@ -253,8 +253,8 @@ static void end_piece(const tool_piece *p)
     tool->stage = EBPO_TOOL_IDLE;
 }
 
-/* Shortens a motion whose angle or length is too great, and then sets a bit of *flags. The path of
- * a point differs from a straight path by at most lever * angle^2 / 8. */
+/* If a motion's angle or length is too great, shortens the motion and sets a bit of *flags. The
+ * path of a point differs from a straight path by at most lever * angle^2 / 8. */
 static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -302,8 +302,8 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     return true;
 }
 
-/* Abandons the piece: too many faces are close, or the tool may not be at the end of the piece.
- * Makes the next piece shorter. */
+/* Abandons the piece, because too many faces are close or the tool must not move to the end of the
+ * piece. Makes the next piece shorter. */
 static uint32_t give_up_piece(tool_piece *p)
 {
     p->t->max_piece = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
@@ -402,8 +402,9 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
     return flags | EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
-/* Computes the vector from device to proxy, or only the component of this vector that contacts
- * cause. Returns the number of contacts that hold the tool. */
+/* Computes the vector from device to proxy, or, in cases that are explained below, only the
+ * component of this vector that contacts cause. Returns the number of contacts that hold the
+ * tool. */
 static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t flags,
                       double out[EBPO_SCREW])
 {

@@ -1,10 +1,10 @@
-/* Keeps the first levels of an octree in memory for probes. They give bounds of the distance to the
- * surface, and the winding numbers of cells without faces.
+/* Keeps the first levels of an octree in memory for probes. These levels give bounds of the
+ * distance to the surface, and the winding numbers of cells without faces.
  *
  * At most 2^17 nodes of at most 6 levels below the root are kept. A node has its box, its children,
- * a flag for faces in or near its cell, and, if there are no such faces, its winding number.
- * Bounds are certain: they include the rounding of the model's coordinates. The caller limits the
- * number of visited nodes; with a smaller limit the bounds are wider. */
+ * a flag for faces in or near its cell, and, if there are no such faces, its winding number. Bounds
+ * are certain: they include the rounding of the model's coordinates. The caller limits the number
+ * of visited nodes; with a smaller limit the bounds are wider. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"

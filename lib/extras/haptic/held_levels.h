@@ -22,7 +22,8 @@ typedef struct ebpo_held_levels {
     double slack; /* bound of the rounding of the model's coordinates */
 } ebpo_held_levels;
 
-/* Reads the root and up to 6 levels below it, as many as have at most 2^17 nodes in total. */
+/* Reads the root and the levels below it: the greatest number of levels, 6 at most, that have at
+ * most 2^17 nodes in total. */
 EBPO_MUST_USE ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out,
                                                 ebpo_error *error);
 void ebpo_held_levels_free(ebpo_held_levels *levels);

@@ -5,10 +5,10 @@
  * measured as a length: its angle times the arm, the root mean square distance of the tool's points
  * from its centre.
  *
- * Contacts constrain the motion of a tool: some motions bring no point closer to a face than
- * allowed, and the tool makes the one of these that is nearest to the wanted motion. Hildreth's
- * method finds this motion for a few active contacts, which are added one at a time, the most
- * violated contact first.
+ * Contacts constrain the motion of a tool: allowed motions bring no point closer to a face than the
+ * contact permits. The tool makes the allowed motion that is nearest to the wanted motion.
+ * Hildreth's method finds this motion for a few active contacts, which are added one at a time, the
+ * most violated contact first.
  *
  * Forces are passive: a force is reduced if it could give the device more energy than the device
  * has given. */
@@ -310,7 +310,8 @@ static void add_cluster(ebpo_tool *t, const numbered_point *p, uint64_t first, u
         c->radius = fmax(c->radius, point_distance(p[first + i].p, c->middle));
 }
 
-/* Sorts points into clusters. */
+/* Splits points [first, first + count) at the middle of their longest side until each part is a
+ * cluster. */
 static void split_points(ebpo_tool *t, numbered_point *p, uint64_t first, uint64_t count)
 {
     static int (*const compare[3])(const void *, const void *) = { along_x, along_y, along_z };

@@ -1,6 +1,6 @@
-/* Declares a tool (points that move together), its contacts, rigid motions and passive forces. For
- * each point a distance is stored within which there is no face; the point is examined again only
- * after it may have moved by this distance. */
+/* Declares a tool (points that move together), its contacts, rigid motions and passive forces. Each
+ * point has a known distance within which there is no face. The point is examined again only after
+ * it may have moved by this distance. */
 #ifndef EBPO_HAPTIC_TOOL_H
 #define EBPO_HAPTIC_TOOL_H
 
@@ -89,8 +89,8 @@ typedef struct ebpo_tool_contacts {
     int count;
 } ebpo_tool_contacts;
 
-/* Adds a contact. If the heap is full, the contact replaces the one with the largest gap, or is
- * ignored if its own gap is not smaller. */
+/* Adds a contact. If the heap is full, the new contact replaces the contact with the largest gap;
+ * the new contact is ignored if its own gap is not smaller. */
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
 /* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts. The error
@@ -115,7 +115,8 @@ typedef struct ebpo_tool_cluster {
     uint32_t first, count;    /* indices of its points: first .. first + count - 1 */
     double middle[3], radius; /* a ball around the points, in the tool's coordinates */
     double travelled;         /* upper bound of the length of each point's path, over all pieces */
-    double safe_until;        /* no point can hit a face until `travelled` is greater than this */
+    double safe_until; /* no point of the cluster can hit a face before `travelled` is greater than
+                          this value */
 } ebpo_tool_cluster;
 
 /* A point that may hit faces in the current piece: the faces pool[first] to pool[first + count -
@@ -135,8 +136,8 @@ typedef struct ebpo_tool {
     double (*point)[3]; /* in the tool's coordinates, cluster after cluster */
     uint32_t *number;   /* [count] index of each point in the caller's array */
     double *safe_until; /* [count] as ebpo_tool_cluster.safe_until, for one point */
-    double radius, arm; /* greatest distance of the points from the centre; root of the mean square
-                         * of these distances */
+    double radius, arm; /* radius: greatest distance of a point from the centre; arm: root of the
+                           mean square of the distances of all points */
     ebpo_tool_cluster *cluster;
 
     ebpo_rigid proxy, device;
@@ -154,7 +155,7 @@ typedef struct ebpo_tool {
     double from_matrix[3][3];  /* rotation at the beginning of the piece */
     double to_matrix[3][3];    /* rotation at the end of the whole piece */
     double end_matrix[3][3];   /* rotation of `end` */
-    uint32_t flags;            /* bits of ebpo_haptic_flag, if the piece is completed */
+    uint32_t flags; /* bits of ebpo_haptic_flag that the step returns when the piece is complete */
     uint64_t next_index; /* index of the cluster or of the close point that is examined next */
     ebpo_close_point *close_points; /* [close_count] */
     uint64_t close_count;

@@ -4,9 +4,10 @@
  * with the point's face within this ball (paint_reach.h). A stroke covers the faces and vertices in
  * the reaches of its points. The strokes of a layer are applied in order. The layers are then
  * blended in order over the original colours of the vertices. Colours are stored in the mesh's
- * existing columns of colours, in their types; a mesh without colours gets new columns.
+ * existing columns of colours, and converted to the types of these columns; a mesh without colours
+ * gets new columns.
  *
- * Source: format-spec/paint.md, section 5. */
+ * See format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -212,9 +213,9 @@ typedef struct bake {
     uint8_t *rgba;
     ebpo_context *context;
     ebpo_reach_pool *reach_pool;
-    uint32_t *numbers;         /* [face] source index of each face of the mesh, ascending; NULL: a
-                                * face's source index is its index in the mesh */
-    uint32_t *slot;            /* [vertex_count] index in `vertices`, plus 1; 0: not covered */
+    uint32_t *numbers; /* [face] source index of each face of the mesh, ascending; NULL: a
+                        * face's source index is its index in the mesh */
+    uint32_t *slot;    /* [vertex_count] the vertex's index in `vertices`, plus 1; 0: not covered */
     coloured_vertex *vertices; /* [count] */
     uint64_t count, capacity;  /* of `vertices` */
     uint64_t done;             /* number of points that have been evaluated */

@@ -130,7 +130,7 @@ static ebpo_status find_nearest(ebpo_context *context, const double place[3], do
     return ebpo_distance(context, place, &options, out, error);
 }
 
-/* Returns true if find_nearest found a point. */
+/* Returns true if find_nearest has found a point. */
 static bool is_found(const ebpo_distance_result *at)
 {
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
@@ -229,8 +229,8 @@ static const ebpo_reach_face *face_of(const ebpo_reach_search *reach, uint64_t f
     return NULL;
 }
 
-/* Adds points that are scattered around `middle` within its reach; more points with more pressure.
- */
+/* Adds points that are scattered around `middle` within its reach. Adds more points if the pressure
+ * is greater. */
 static ebpo_status scatter_points(drawing *d, const ebpo_distance_result *middle,
                                   const ebpo_paint_input *input, ebpo_error *error)
 {
@@ -341,7 +341,7 @@ static ebpo_status follow_path(drawing *d, const ebpo_paint_input *input, uint64
     return status;
 }
 
-/* Adds all strokes to the paint. After a failure, removes those that were added. */
+/* Adds all strokes to the paint. After a failure, removes the strokes that this call has added. */
 static ebpo_status keep_strokes(drawing *d, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;

@@ -2,13 +2,14 @@
  *
  * Faces are halved repeatedly at their longest edge, until it is certain to which stroke a part
  * belongs, or the part is small. In each layer the newest stroke decides: if one of its balls
- * contains the part, the part belongs to this stroke. If a ball only intersects the part, the area
- * outside the ball may belong to older strokes. So lower and upper bounds are summed.
+ * contains the part, the part belongs to this stroke. If a ball only intersects the part, the
+ * part's area outside the ball may belong to older strokes. So lower bounds and upper bounds of
+ * areas are summed.
  *
  * Faces are distributed to a fixed number of work items. The sums of the items are added in order,
  * so results do not depend on the number of threads.
  *
- * Source: format-spec/paint.md, section 6. */
+ * See format-spec/paint.md, section 6. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -115,8 +116,8 @@ static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 /* Copies the balls of a layer that matter for a triangle. The balls [from, end) are ordered from
  * the newest stroke to the oldest. Copies the balls that intersect the triangle to position `to`.
  * Stops at the first ball that contains the triangle; keeps only this ball of its stroke. Returns
- * the number of copied balls. *sure is true if no ball intersects the triangle, or if the newest
- * stroke that intersects it has a ball that contains it. */
+ * the number of copied balls. *sure is true if no ball intersects the triangle. It is also true if
+ * the newest stroke that intersects the triangle has a ball that contains the triangle. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
@@ -139,8 +140,8 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
 }
 
 /* Calls sift_layer for each layer of the balls [from, from + count). The copied balls are on the
- * stack after these balls. Returns the number of copied balls. *sure is true if it is true for all
- * layers. */
+ * stack after these balls. Returns the number of copied balls. *sure is true if sift_layer sets it
+ * to true for all layers. */
 static uint64_t sift_layers(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                             bool *sure)
 {
@@ -331,8 +332,8 @@ static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count
 
 /* --- the model --- */
 
-/* Limits. PIECES_MAX: work items. SUMS_MAX: sums over all items and keys. FINENESS_MAX: value of
- * the option `fineness`. */
+/* Limits. PIECES_MAX: greatest number of work items. SUMS_MAX: greatest number of sums, one for
+ * each item and key. FINENESS_MAX: greatest value of the option `fineness`. */
 enum { PIECES_MAX = 64, SUMS_MAX = 1 << 22, FINENESS_MAX = 1 << 16 };
 
 /* A pair of a point and a face in its reach. */

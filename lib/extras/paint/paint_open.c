@@ -7,7 +7,7 @@
  * The table states for each array its path, its element type, and the member of a stroke or a point
  * that it contains. paint_save.c writes files by the same table.
  *
- * Source: format-spec/paint.md. */
+ * See format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -65,8 +65,8 @@ static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint6
     return rows + row * (c->of_points ? sizeof *p->point : sizeof *p->stroke) + c->offset;
 }
 
-/* Copies a number of 1, 2, 4 or 8 bytes, and swaps its bytes on a big-endian machine. So it
- * converts a number from the file's byte order to the order in memory, or back. */
+/* Copies a number of 1, 2, 4 or 8 bytes, and swaps its bytes on a big-endian machine. This converts
+ * a number from the file's byte order to the byte order in memory, or back. */
 static void convert_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 {
     const uint16_t two = bytes == 2 ? ebpo_load16(from) : 0;

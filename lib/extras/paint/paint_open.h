@@ -1,5 +1,5 @@
-/* Lists the arrays of a paint file. Each array is a column: it has a member of all strokes or of
- * all points (format-spec/paint.md, section 3). */
+/* Lists the arrays of a paint file. Each array is a column: it has the values of one member of all
+ * strokes, or of all points (format-spec/paint.md, section 3). */
 #ifndef EBPO_PAINT_PAINT_OPEN_H
 #define EBPO_PAINT_PAINT_OPEN_H
 

@@ -66,7 +66,8 @@ typedef struct ebpo_paint_file {
 struct ebpo_paint {
     ebpo_paint_file *file;
     char generator[64], model_sha256[65], model_name[256], unit[32];
-    bool source_numbers; /* face indices are those in the source (true) or in the file (false) */
+    bool source_numbers; /* true: face indices are indices in the source; false: indices in the file
+                          */
     ebpo_layer_data *layer;
     ebpo_note_data *note;
     ebpo_stroke_data *stroke;
@@ -87,8 +88,8 @@ static inline double ebpo_paint_radius(const ebpo_stroke_data *stroke,
     return stroke->radius * point->size * 0x1p-15;
 }
 
-/* Return a message about what is wrong with a point or a stroke; NULL if it is valid. layers:
- * number of layers. */
+/* These functions return a message about what is wrong with a point or a stroke; NULL if it is
+ * valid. layers: number of layers. */
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *point);
 const char *ebpo_paint_stroke_wrong(const ebpo_stroke_data *stroke, uint64_t layers);
 

@@ -3,12 +3,12 @@
  *
  * Faces in the ball's box are joined into sets: at common corners (equal positions) within the
  * ball, and at common edges that intersect the ball. The set that contains the point's face is the
- * reach. So paint does not pass through a part of a model that is thinner than the ball.
+ * reach. So paint on one side of a thin wall does not reach the other side, although the ball does.
  *
  * Points of a stroke are evaluated in batches on all cores. Their reaches are kept until they are
  * requested. Results do not depend on the number of threads.
  *
- * Source: format-spec/paint.md, section 4. */
+ * See format-spec/paint.md, section 4. */
 #include "core/strict_fp.h"
 
 #include <math.h>

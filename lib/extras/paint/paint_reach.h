@@ -39,9 +39,9 @@ typedef struct ebpo_reach_search {
     uint64_t position_count, position_capacity, edge_count, edge_capacity;
     uint32_t *slot; /* [slots] hash table, first of positions, then of edges; an entry is 0 (free)
                      * or an index plus 1 */
-    uint32_t
-        *root; /* union-find sets of faces, positions and edges, in this order: each entry is
-                * the index of another member of the set or, for its representative, of itself */
+    uint32_t *root; /* union-find sets of faces, positions and edges, in this order: each entry is
+                       the index of another member of the same set; the entry of the set's
+                       representative is its own index */
     uint64_t slots, slot_capacity, root_capacity;
     bool short_of_memory, too_many; /* the reason why gathering faces failed */
 } ebpo_reach_search;
@@ -62,8 +62,8 @@ void ebpo_reach_end(ebpo_reach_search *reach);
 EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach_search *reach, const ebpo_reach_ball *ball,
                                           bool *complete, ebpo_error *error);
 
-/* Sets *fits to false if a position is not on the face. *fits is true, too, if this is not known
- * because the model's file is a subset without this face or without faces around it. */
+/* Sets *fits to false if a position is not on the face. *fits is also true if the position cannot
+ * be tested, because the model's file is a subset without this face or without faces around it. */
 EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach_search *reach, const double place[3],
                                            uint64_t face, bool *fits, ebpo_error *error);
 

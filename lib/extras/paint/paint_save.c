@@ -1,11 +1,11 @@
 /* Writes paint files: annotations of a model (layers, strokes, notes). The table ebpo_paint_columns
- * (paint_open.c) lists their arrays.
+ * (paint_open.c) lists the arrays of a file.
  *
  * A file is written under a temporary name and published when it is complete. An existing file is
  * replaced only if it has not changed since the annotations were read from it or last saved to it.
  * So a change by another program is not lost.
  *
- * Source: format-spec/paint.md. */
+ * See format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
