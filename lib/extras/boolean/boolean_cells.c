@@ -1,6 +1,6 @@
-/* Finds the cells of the result of a Boolean expression: cells of an octree of the world that are
- * entirely inside (in-cells), and cells of the finest level that may have points inside and outside
- * (mixed cells). The other cells are entirely outside (out-cells).
+/* Divides the world into cells of an octree, and finds the cells of the result of a Boolean
+ * expression. In-cells are entirely inside the result. Mixed cells are cells of the finest level
+ * that may have points inside and outside. The other cells are entirely outside (out-cells).
  *
  * The search goes level by level. The children of all mixed cells are classified on all processor
  * cores, and mixed children continue to the next level. Cells are kept in the order of octcodes

@@ -82,7 +82,7 @@ static double distance_to(const boundary_search *s, const ebpo_world *w, ebpo_ce
     return scaled_length(d);
 }
 
-/* Adds a cell to the queue, unless it is farther away than the upper bound. */
+/* Adds a cell to the queue if the cell is nearer than the upper bound. */
 static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queue *q,
                              const ebpo_world_cell *c, ebpo_error *error)
 {
@@ -90,8 +90,8 @@ static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queu
     return distance < s->hi ? push_waiting(q, (waiting){ distance, *c }, error) : EBPO_OK;
 }
 
-/* If the search is for a point that is out, lowers the upper bound to the distance of the root
- * cell's sides, because all points outside the root cell are out. */
+/* All points outside the root cell are out. So if the search is for a point that is out, lowers the
+ * upper bound to the distance of the root cell's sides. */
 static void bound_by_root_sides(boundary_search *s, const ebpo_world *w)
 {
     for (int k = 0; k < 3 && s->state == EBPO_MAY_IN; k++)

@@ -1,15 +1,15 @@
 /* Finds the triangles that bound the result of the expression.
  *
- * A patch is a set of triangles that are connected by edges of exactly two triangles. Around such
- * an edge, the two triangles separate the space into two sectors. So the winding numbers of all
- * operands are constant in front of a patch, and constant behind it. The same holds for a component
- * of whole faces (operand_mesh.h), so its listed faces are joined to one patch. The winding numbers
- * are computed exactly at an inner point of one triangle of the patch. The patch bounds the result
- * if the expression has different values on the two sides of the patch. This rule covers coplanar
- * faces, operands that touch, and operands that intersect themselves.
+ * A patch is a set of triangles that are connected by edges of exactly two triangles. The two
+ * triangles of such an edge separate the space around the edge into two sectors. So the winding
+ * numbers of all operands are constant in front of a patch, and constant behind it. The same holds
+ * for a component of whole faces (operand_mesh.h), so its listed faces are joined to one patch. The
+ * winding numbers are computed exactly at an inner point of one triangle of the patch. The patch
+ * bounds the result if the expression has different values on the two sides of the patch. This rule
+ * covers coplanar faces, operands that touch, and operands that intersect themselves.
  *
  * The boundary of a set is closed. So each edge occurs in the selected triangles equally often in
- * both directions. This is checked before the result is used. */
+ * both directions. ebpo_cut_mesh_classify checks this property of the selected triangles. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -77,8 +77,8 @@ static void free_edges(edge_lists *e)
  * flip is 1 if the triangle and its parent have opposite orientations: their normals point to
  * different sides of the patch. The root of a patch is its first triangle. */
 
-/* Returns (root << 1 | flip), where the flip is that of the triangle relative to the root. Shortens
- * the path to the root. */
+/* Returns (root << 1 | flip). The flip is 1 if the triangle and the root have opposite
+ * orientations. Shortens the path to the root. */
 static uint32_t find_root(uint32_t *parent, uint32_t triangle)
 {
     uint32_t flips = 0;
@@ -312,8 +312,8 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
 
 /* Returns true if each edge occurs in the selected triangles equally often in both directions.
  *
- * An edge of only one triangle is not tested if the triangle's face is whole: the other face of the
- * edge is a whole face of the same component, and is not listed. If the faces of the base that are
+ * An edge of only one triangle is not tested if the triangle's face is whole. Then the edge's other
+ * face is a whole face of the same component that is not listed. If the faces of the base that are
  * not listed stay in the result (keeps_base), the difference between the selected triangles and all
  * triangles of the base is tested. The base is closed, so the result is closed if this difference
  * is closed. */

@@ -1,5 +1,6 @@
-/* Computes points and planes in integers of any size. Every new point is where a line through two
- * points intersects a plane, so coordinates stay fractions of integers with one denominator.
+/* Computes points and planes in integers of any size. Every new point is the intersection of a
+ * plane and the line through two points. So its coordinates are fractions of integers with one
+ * denominator.
  *
  * Each point also has its coordinates rounded to the nearest double. Rounding keeps the order, so
  * different rounded coordinates decide comparisons. Equal points have equal rounded coordinates,
@@ -200,8 +201,8 @@ int ebpo_exact_order(const ebpo_exact_point *p, const ebpo_exact_point *q)
 }
 
 /* Returns the sign of the turn by rounded coordinates, or EBPO_SIGN_UNKNOWN. A coordinate with an
- * absolute value of at most m has an error of at most 2^-53 m + 2^-1075, so a difference has an
- * error of at most 2^-51 (m + 2^-1000), and the sum of the errors of all products and roundings is
+ * absolute value of at most m has an error of at most 2^-53 m + 2^-1075. So a difference has an
+ * error of at most 2^-51 (m + 2^-1000). The sum of the errors of all products and roundings is
  * below `bound`. */
 static int filter_turn(int u, int v, const double a[3], const double b[3], const double c[3])
 {

@@ -44,19 +44,19 @@ void ebpo_exact_plane_along(ebpo_exact_plane *out, int axis, const ebpo_exact_po
 /* Returns the side of the plane, -1, 0 or 1, on which the point is. */
 int ebpo_exact_side(const ebpo_exact_plane *plane, const ebpo_exact_point *p);
 
-/* Computes the point where the line through p and q intersects the plane. p and q must not both be
- * in the plane, and `out` must be neither of them. */
+/* Computes the point where the line through p and q intersects the plane. At least one of p and q
+ * must be outside the plane. `out` must be a third point. */
 void ebpo_exact_intersect(ebpo_exact_point *out, const ebpo_exact_plane *plane,
                           const ebpo_exact_point *p, const ebpo_exact_point *q, int unit);
 
-/* Compares coordinate k of two points: -1, 0 or 1. */
+/* Compares coordinate k of two points. Returns -1 (p is less), 0 or 1. */
 int ebpo_exact_compare(const ebpo_exact_point *p, const ebpo_exact_point *q, int k);
 
-/* Compares two points by x, then y, then z. */
+/* Compares two points by x, then y, then z. Returns -1 (p is less), 0 or 1. */
 int ebpo_exact_order(const ebpo_exact_point *p, const ebpo_exact_point *q);
 
 /* Returns the turn (the orientation) of three points seen against the axis: 1 if a, b, c are
- * counter-clockwise, -1 if they are clockwise, 0 if they are on a line. */
+ * counter-clockwise, -1 if they are clockwise, 0 if their projections are on a line. */
 int ebpo_exact_turn(int axis, const ebpo_exact_point *a, const ebpo_exact_point *b,
                     const ebpo_exact_point *c);
 

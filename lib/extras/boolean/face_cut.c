@@ -3,8 +3,8 @@
  * If two faces are in different planes, they intersect in a segment or a point on the common line
  * of the planes. Each face has an interval on this line; the exact ends of both intervals are
  * compared. If two faces are in one plane, the edges of the other face are clipped to the face. All
- * segments and the edges of the face are divided where they intersect, and the face is triangulated
- * so that the parts between these points are edges.
+ * segments and the edges of the face are divided at the points where they intersect. The face is
+ * triangulated so that the parts between these points are edges of triangles.
  *
  * Both faces of a pair get the same points. So the triangles on both sides of a cut, and on both
  * sides of a common edge of two faces, have equal vertices. If several faces in one plane contain a

@@ -28,8 +28,8 @@ typedef struct ebpo_face_list {
     uint32_t count;
     uint64_t face_capacity, file_face_capacity;
     uint32_t first[EBPO_BOOLEAN_OPERANDS_MAX + 1]; /* first face of each operand */
-    /* [operand] a bit for each operand that is equal to this one, itself included; 0: the operand
-     * is not listed (ebpo_boolean_find_equal) */
+    /* [operand] a bit for each operand that is equal to this operand, and the bit of this operand;
+     * 0: the operand is not listed (ebpo_boolean_find_equal) */
     uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX];
     ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand] */
     /* changed_only: the result gives only the changes of operand 0, the *base*. Then all faces of

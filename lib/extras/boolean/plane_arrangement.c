@@ -1,10 +1,10 @@
 /* Divides segments in one plane at the points where they intersect.
  *
- * Segments are sorted by the lower end of their boxes on the first axis of the projection; pairs
- * with overlapping boxes are compared by exact orientation tests of three points (turns). For each
- * segment, the points in its interior are recorded: ends of other segments, and points where other
- * segments cross it. The recorded points, sorted along the segment, divide it. Rounding keeps the
- * order of coordinates, so if two segments intersect, their boxes of rounded coordinates
+ * Segments are sorted by the lower end of their boxes on the first axis of the projection. Pairs of
+ * segments with overlapping boxes are compared by exact orientation tests of three points (turns).
+ * For each segment, the points in its interior are recorded: ends of other segments, and points
+ * where other segments cross it. The recorded points, sorted along the segment, divide it. Rounding
+ * keeps the order of coordinates, so if two segments intersect, their boxes of rounded coordinates
  * overlap. */
 #include "core/strict_fp.h"
 

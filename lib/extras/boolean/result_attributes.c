@@ -40,9 +40,9 @@ static bool same_layout(const ebpo_attribute *a, const ebpo_attribute *b)
            strcmp(a->element, b->element) == 0 && strcmp(a->names, b->names) == 0;
 }
 
-/* Returns true if the mesh of the result cannot get the array: a column of the same element has the
- * name of one of its columns, or the array has colours and the faces of the result have colours by
- * operand. */
+/* Returns true if the mesh of the result cannot get the array. One reason is that the mesh has a
+ * column with the same element and the same name. The other reason is that the array has colours,
+ * and the faces of the result have colours by operand. */
 static bool is_taken(const ebpo_carrying *c, const ebpo_attribute *like)
 {
     const ebpo_attributes *all = c->mesh->attributes;

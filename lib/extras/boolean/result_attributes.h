@@ -11,7 +11,8 @@ typedef struct ebpo_carried {
     bool of_faces;    /* one row for each face; else for each vertex */
     int normal;       /* index of the first of three columns with a normal; -1: no normals */
     uint64_t *filled; /* a bit for each vertex whose row has been filled; NULL if `of_faces` */
-    const ebpo_attribute *from; /* array of the current operand; NULL: it has no such array */
+    const ebpo_attribute
+        *from; /* array of the current operand; NULL: the operand does not have the array */
 } ebpo_carried;
 
 /* All carried arrays. A zero struct carries nothing. */

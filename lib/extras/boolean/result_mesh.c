@@ -7,8 +7,8 @@
  *
  * Vertices are numbered in the order of their first use. A corner of a listed face gets the number
  * of its vertex in the cut mesh, so whole faces and triangles share vertices. If requested, each
- * face of the result gets the index of its original face: the source index, or, if the operand's
- * file has no source indices, the index in the file. */
+ * face of the result gets the index of its original face. This is the source index if the operand's
+ * file has source indices, else the index in the file. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/result_mesh.h"
@@ -104,8 +104,8 @@ static const ebpo_exact_point *get_cut_vertex(const output *o, uint32_t v, doubl
     return p;
 }
 
-/* Gives a vertex of the cut mesh a number in the result, and adds it to the mesh unless a vertex
- * with the same rounded position exists. Returns false without memory. */
+/* Gives a vertex of the cut mesh a number in the result. If no vertex with the same rounded
+ * position exists, adds the vertex to the mesh. Returns false without memory. */
 static bool number_cut_vertex(output *o, uint32_t v)
 {
     double at[3], out[3], moved;

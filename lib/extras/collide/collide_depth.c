@@ -1,6 +1,6 @@
 /* Computes how deep the surface of one model is in another model, which is a solid. The depth of a
- * point inside the solid is its distance from the solid's boundary, and the depth of the surface is
- * the greatest depth of its points inside the solid.
+ * point inside the solid is its distance from the solid's boundary. The depth of the surface is the
+ * greatest depth of the surface's points inside the solid.
  *
  * A branch-and-bound search visits the cells of the surface's octree, then faces and parts of
  * faces. A ball encloses each cell, face or part; the distance of the ball's centre from the
@@ -136,9 +136,8 @@ static bool is_search_late(const depth_search *s)
 }
 
 /* Returns true if a part or cell with the bound `most` need not be divided, and records the bound
- * in s->dropped_max. A part whose depth is uncertain only because of rounding is not divided:
- * otherwise the search would divide without end where a face of the surface is on a face of the
- * solid. */
+ * in s->dropped_max. A part whose depth is uncertain only because of rounding is not divided.
+ * Otherwise the search would not end if a face of the surface is on a face of the solid. */
 static bool is_settled(depth_search *s, double most, double rounding)
 {
     if (most > s->lo + s->tolerance + 4 * (rounding + s->position_error))

@@ -1,11 +1,11 @@
 /* Computes the distance of two posed models, and a pair of faces at that distance (a nearest pair).
  *
  * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats, and drop pairs that are
- * certainly farther apart than the limit (ebpo_gap_search.limit). They store the remaining pairs of
- * faces as waiting pairs. This file decides the waiting pairs in doubles with error bounds
- * (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of several pairs at the
- * same distance, the first pair in file order is returned, so the result is the same with every
- * processor and number of threads.
+ * certainly farther apart than the limit (ebpo_gap_search.limit). The kernels store the remaining
+ * pairs of faces as waiting pairs. This file decides the waiting pairs in doubles with error bounds
+ * (ebpo_triangles_distance_bounds), and exactly if the bounds of two pairs overlap. Of several
+ * pairs at the same distance, the first pair in file order is returned, so the result is the same
+ * with every processor and number of threads.
  *
  * Partly loaded models are searched in pairs of subtrees, in the order of the gaps of their
  * envelopes. A subtree is loaded only if its envelope is nearer than the best pair so far. A
@@ -247,7 +247,7 @@ static void set_distance_bounds(nearest_pair *n)
     n->lo = fmax(n->lo, 0);
 }
 
-/* Sets the output from what the search has found. */
+/* Sets the output from the result of the search. */
 static void nearest_pair_end(nearest_pair *n)
 {
     bool has_threshold = !isnan(n->at_least);
@@ -372,7 +372,7 @@ typedef struct node_search {
 /* --- two accels (acceleration structures of subtrees) --- */
 
 /* Continues the search in another pair of hierarchies of the query's models. may_intersect: first
- * search for a contact, because lower bounds exclude few pairs where models intersect. */
+ * search for a contact, because lower bounds exclude few pairs if the models intersect. */
 static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel *const accel[2],
                                       bool may_intersect, nearest_pair *n, ebpo_error *error)
 {
@@ -409,8 +409,8 @@ static ebpo_status search_pair(node_search *s, const ebpo_node_gap *pair, ebpo_e
                : status;
 }
 
-/* Adds a pair of nodes to the heap, unless the nodes are too far apart. gap: lower bound of the
- * distance of the pair from which the nodes were made. */
+/* Adds a pair of nodes to the heap if the nodes are near enough. gap: lower bound of the distance
+ * of the pair from which the nodes were made. */
 static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], double gap,
                                  ebpo_error *error)
 {

@@ -1,13 +1,13 @@
 /* Computes how far one model has to move along a direction until both models have no common point.
- * The distance is given as the time t of the last contact: at the time t, the model has moved by
- * t * direction.
+ * The distance is given as the time t of the last contact: at the time t, the model has moved by t
+ * * direction.
  *
  * A heap holds pairs of nodes; its first pair is the pair whose last contact may be the latest. The
  * extents of the nodes along the direction, and along two axes perpendicular to the direction,
  * bound the time of the nodes' last contact. The last contact of two faces is bounded in doubles
  * (ebpo_sweep_max) and computed exactly (ebpo_sweep_last). Partly loaded models are searched in
- * pairs of subtrees: a subtree is loaded only if the last contact of its envelope may be later than
- * the latest contact that has been found. A search runs in one thread. Bounds:
+ * pairs of subtrees. A subtree is loaded only if the last contact of the subtree's envelope may be
+ * later than the latest contact that has been found. A search runs in one thread. Bounds:
  * docs/develop/collision.md, "Separation distance along a direction". */
 #include "core/strict_fp.h"
 

@@ -19,7 +19,7 @@
 #include "hdf5_write/h5.h"
 #include "io/publish.h"
 
-/* Functions of an ebpo_red_source for a mesh in memory. They cannot fail. */
+/* Functions of an ebpo_red_source for a mesh in memory. These functions cannot fail. */
 static ebpo_status mesh_vertex(void *user, uint64_t number, double out[3], ebpo_error *error)
 {
     const ebpo_mesh *mesh = user;

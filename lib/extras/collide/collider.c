@@ -1,8 +1,8 @@
 /* Makes a collider: two models, options, and data that a query keeps for the following queries.
  *
- * All queries begin with ebpo_collision_begin. This function checks the options and puts the models
- * in an order (the query's order) that does not change when the caller swaps the models, so results
- * do not depend on the caller's order.
+ * All queries begin with ebpo_collision_begin. ebpo_collision_begin checks the options, and puts
+ * the models in an order (the query's order) that does not change when the caller swaps the models.
+ * So results do not depend on the caller's order.
  *
  * A collider belongs to one thread at a time. ebpo_collider_new refuses models that are subsets;
  * ebpo_collider_of_parts accepts them for callers that know which parts are omitted. */

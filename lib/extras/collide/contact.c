@@ -65,9 +65,9 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
     return sum;
 }
 
-/* Sets *share to the position of the piercing point as a fraction of the edge: height[0] /
- * (height[0] - height[1]), where height[i] is the height of end i over the plane. Returns false if
- * the error of *share may be too large. */
+/* Sets *share to the position of the piercing point as a fraction of the edge. This is height[0] /
+ * (height[0] - height[1]); height[i] is the height of end i over the plane. Returns false if the
+ * error of *share may be too large. */
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
     ebpo_pair e[3], f[3], normal[3], height[2]; /* e, f: two edges of the face in the plane */
@@ -230,8 +230,8 @@ static const edge *choose_edge(const edge *a, const edge *b)
     return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
 }
 
-/* Sets an end of the segment. order < 0: the end is the point where A's edge pierces B; order > 0:
- * the end is the point where B's edge pierces A; 0: both points are equal. */
+/* Sets an end of the segment. If order < 0, the end is the point where A's edge pierces B. If order
+ * > 0, the end is the point where B's edge pierces A. If order is 0, both points are equal. */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
     end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);

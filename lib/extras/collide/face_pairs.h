@@ -1,8 +1,8 @@
 /* Computes for a single pair of faces (triangles) the segment where the faces cross, their
  * distance, and their last contact when one face moves. Also declares the filter, which decides
- * eight pairs at a time in floats. Functions accept all finite coordinates. They accept faces
- * without area unless a comment excludes such faces. All functions are pure and can be called from
- * any thread; results do not depend on compilers and their flags. Bounds and proofs:
+ * eight pairs at a time in floats. Functions accept all finite coordinates. If no comment excludes
+ * faces without area, functions accept them, too. All functions are pure and can be called from any
+ * thread; results do not depend on compilers and their flags. Bounds and proofs:
  * docs/develop/collision.md. */
 #ifndef EBPO_COLLIDE_FACE_PAIRS_H
 #define EBPO_COLLIDE_FACE_PAIRS_H
@@ -48,11 +48,12 @@ typedef struct ebpo_pair_distance_bounds {
 void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
                                     ebpo_pair_distance_bounds *out);
 
-/* Returns true if the exact distances of the pairs a, b and c, d are certainly equal: if both pairs
- * have the same corners, or if both distances are distances of the same two corners or edges, or of
- * the same two planes perpendicular to an axis. Such pairs are common around an edge or corner, and
- * on flat sides of models. Returns false if none of these reasons applies; the distances may still
- * be equal. ab, cd: results of ebpo_triangles_distance_bounds for the two pairs. */
+/* Returns true if the exact distances of the pairs a, b and c, d are certainly equal for one of
+ * three reasons. Both pairs have the same corners. Or both distances are distances of the same two
+ * corners or edges. Or both distances are distances of the same two planes, which are perpendicular
+ * to an axis. These cases are common around an edge or corner, and on flat sides of models. Returns
+ * false if none of these reasons applies; the distances may still be equal. ab, cd: results of
+ * ebpo_triangles_distance_bounds for the two pairs. */
 bool ebpo_same_distance(const double a[3][3], const double b[3][3],
                         const ebpo_pair_distance_bounds *ab, const double c[3][3],
                         const double d[3][3], const ebpo_pair_distance_bounds *cd);

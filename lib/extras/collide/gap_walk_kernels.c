@@ -3,14 +3,14 @@
  * for several instruction sets with the same results. Names that end in 8 handle eight values at
  * once.
  *
- * The distance of two nodes has three lower bounds: the gap of their boxes, the gap of their
- * bounding cylinders, and the gap along the direction of the best pair of faces (the nearest pair
- * so far). The walk is depth-first until a limit is known; then a heap returns the pair with the
- * least bound first. In a pair of blocks, the distance of each pair of faces is bounded by means of
- * two points, one of each face, that are the nearest points except for rounding. A pair is dropped
- * only if it is certainly not nearer than the limit; collide_distance.c decides the remaining
- * pairs. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two
- * faces". */
+ * The distance of two nodes has three lower bounds: the gap of the nodes' boxes, the gap of their
+ * bounding cylinders, and their gap along the direction of the best pair. The best pair is the
+ * nearest pair of faces so far. The walk is depth-first until a limit is known; then a heap returns
+ * the pair with the least bound first. In a pair of blocks, the bounds of the distance of two faces
+ * are computed from one point of each face. These two points are the nearest points except for
+ * rounding. A pair is dropped only if it is certainly not nearer than the limit; collide_distance.c
+ * decides the remaining pairs. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and
+ * "Distance of two faces". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -334,7 +334,7 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
 /* --- pairs to be visited --- */
 
 /* Prefetches the memory of the pair that is now first on the stack or heap, and will be visited
- * next unless a nearer pair is found. */
+ * next if no nearer pair is found. */
 EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
 {
     if (g->count == 0)
@@ -395,8 +395,8 @@ EBPO_EIGHT ebpo_gap_visit pop_visit(ebpo_gap_search *g)
     return out;
 }
 
-/* Pushes the pairs of each child of p, a node of model `side`, with child j of q, unless they are
- * too far apart. base: as for push_visit. */
+/* Pushes the pairs of each child of p, a node of model `side`, with child j of q. Omits pairs that
+ * are too far apart. base: as for push_visit. */
 EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const ebpo_gap_node *p,
                            const ebpo_gap_node *q, int j)
 {

@@ -105,8 +105,9 @@ static bool separate_at_corner(const double a[3][3], int i, const double b[3][3]
 }
 
 /* Returns the kind of two faces with one common corner: corner i of a and corner k of b. If the
- * faces have another common point, the ray from the corner through this point leaves one of the
- * faces at the edge opposite the corner, at a point that the other face contains. */
+ * faces have a second common point, consider the ray from the corner through this point. The ray
+ * leaves one of the faces, at the edge opposite the corner, at a point that the other face
+ * contains. So it suffices to test these edges. */
 static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     if (separate_at_corner(a, i, b, k))

@@ -4,10 +4,10 @@
  * except for rounding. Their distance is an upper bound. The gap of the faces along the line
  * through both points is a lower bound. All coordinates are relative to A's first corner, so that
  * rounding does not depend on the position of the faces. If bounds do not decide a comparison, the
- * squared distance is computed as a fraction of integers. It is the least of the squared distances
- * of a corner from the other face, and of two edges whose nearest points are not ends. See
- * docs/develop/collision.md, "Distance of two faces". All functions are pure and can be called from
- * any thread; results do not depend on compilers and their flags. */
+ * squared distance is computed as a fraction of integers. The squared distance of two faces is the
+ * least of the squared distances of a corner from the other face, and of two edges whose nearest
+ * points are not ends. See docs/develop/collision.md, "Distance of two faces". All functions are
+ * pure and can be called from any thread; results do not depend on compilers and their flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -174,8 +174,8 @@ static bool is_on(int corner, int feature)
 /* Returns true if the features of the points certainly contain the nearest points. n: vector from
  * A's point to B's point. In the direction of n, the corners of A that are not on A's feature must
  * be behind A's point, and the corners of B that are not on B's feature must be ahead of B's point.
- * They must be so by more than the errors of n and of the points. Proof: docs/develop/collision.md,
- * "Which features are nearest". */
+ * The distances of these corners behind and ahead must be greater than the errors of n and of the
+ * points. Proof: docs/develop/collision.md, "Which features are nearest". */
 static bool features_certain(const search *s, const double n[3])
 {
     const double margin = 0x1p-24; /* more than the relative errors */

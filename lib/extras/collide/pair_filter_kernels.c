@@ -2,11 +2,11 @@
  * that certainly cross. This file is compiled for several instruction sets with the same results.
  *
  * Three tests follow each other, each with a proved error bound. The first test compares the boxes
- * of both faces, the second test compares the corners of each face with the plane of the other
- * face, and the third test compares the intervals of both faces on the common line of the planes.
- * Pairs that no test decides are undecided; the caller decides them exactly.
- * docs/develop/collision.md ("The filter of eight pairs") explains the letters in the code. Names
- * that end in 8 handle eight values at once. */
+ * of both faces. The second test compares the corners of each face with the plane of the other
+ * face. The third test compares the intervals of both faces on the common line of the planes. Pairs
+ * that no test decides are undecided; the caller decides them exactly. docs/develop/collision.md
+ * ("The filter of eight pairs") explains the letters in the code. Names that end in 8 handle eight
+ * values at once. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -175,9 +175,9 @@ EBPO_EIGHT f8 error_bound8(f8 e, f8 m, f8 n1, f8 n2)
     return f8_mul(m, f8_add(inputs, rounding));
 }
 
-/* Returns a bound of the error of determinants for a plane whose face has edges of at most the
- * length l, and for corners of the other face that are at most d away from the first corner of the
- * plane's face. */
+/* Returns a bound of the error of the determinants that compare corners of one face with the plane
+ * of the other face. l: greatest length of an edge of the plane's face. d: greatest distance of a
+ * corner of the one face from the first corner of the plane's face. */
 EBPO_EIGHT f8 plane_bound8(f8 e, f8 l, f8 d)
 {
     return error_bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));

@@ -2,12 +2,13 @@
  * along a direction.
  *
  * Projected along the direction, both faces are convex polygons. The height of a point of a face is
- * the point's coordinate along the direction. Where the polygons overlap, the difference of the
- * heights of both faces is concave, so it is greatest at a corner of a polygon or where edges of
- * both polygons cross. The exact time is a fraction of integers (GMP). A bound in doubles follows
- * from separating axes: the direction, the normals, and the vector products of edges of both faces,
- * and of edges and the direction. See docs/develop/collision.md, "Separation distance along a
- * direction". All functions are pure and can be called from any thread. */
+ * the point's coordinate along the direction. In the overlap of the polygons, the difference of the
+ * heights of both faces is a concave function. So this difference is greatest at a corner of a
+ * polygon, or at a point where edges of both polygons cross. The exact time is a fraction of
+ * integers (GMP). A bound in doubles follows from separating axes: the direction, the normals, and
+ * the vector products of edges of both faces, and of edges and the direction. See
+ * docs/develop/collision.md, "Separation distance along a direction". All functions are pure and
+ * can be called from any thread. */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"

@@ -4,9 +4,9 @@
  * The query point is transformed into the model's coordinates with an error bound. If no face is
  * within the bound of the transformed point, the result is the model's winding number at this
  * point. Otherwise the faces close to the point are posed. A segment parallel to an axis leads from
- * an anchor (a point farther away, whose winding number is known) to the query point, and its
- * crossings with posed faces are counted exactly. If the coordinates of the query point are
- * fractions, three segments parallel to axes lead to the query point from the point whose
+ * an anchor to the query point. The anchor is a point farther away, whose winding number is known.
+ * The segment's crossings with posed faces are counted exactly. If the coordinates of the query
+ * point are fractions, three segments parallel to axes lead to the query point from the point whose
  * coordinates are the nearest doubles.
  *
  * Functions do not change a posed solid: several threads may use the same posed solid, each thread
@@ -65,7 +65,7 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
 
 /* --- points in the coordinates of the model --- */
 
-/* Factor by which bounds are widened. It covers the rounding errors of their computation. */
+/* Factor by which bounds are widened, because of the rounding errors of their computation. */
 static const double margin_factor = 1 + 0x1p-40;
 
 /* Sets the box of all posed vertices. */

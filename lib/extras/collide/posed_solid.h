@@ -38,8 +38,8 @@ typedef struct ebpo_posed_solid {
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
-/* Returns false if w is certainly farther than `margin` (0 or more) from all posed vertices and
- * faces: if it is beyond the box by more than `margin` on an axis. */
+/* Returns false if w is beyond the box by more than `margin` (0 or more) on an axis. Then w is
+ * certainly farther than `margin` from all posed vertices and faces. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
 
 /* Returns the greatest of the gaps between two boxes on the three axes; negative if they overlap on
@@ -70,10 +70,11 @@ typedef struct ebpo_posed_sides {
     bool on;            /* a posed face with an area contains the point */
     bool flat;          /* all posed faces that contain the point are in one plane */
     double plane[3][3]; /* if `on`: corners of a face that contains the point */
-    /* Winding numbers next to the point, on both sides of the plane: `above` on the side of greater
-     * x (of greater y if the plane is parallel to the x axis, of greater z if it is also parallel
-     * to the y axis), `below` on the other side. Both are equal if `on` is false. If `on` is true
-     * and `flat` is false, only `above` is valid: the winding number at some point next to the
+    /* Winding numbers next to the point, on both sides of the plane: `above` is the winding number
+     * on the side of greater x. If the plane is parallel to the x axis, it is the side of greater
+     * y, and if the plane is also parallel to the y axis, the side of greater z. `below` is the
+     * winding number on the other side. `above` and `below` are equal if `on` is false. If `on` is
+     * true and `flat` is false, only `above` is valid: the winding number at some point next to the
      * query point. */
     int32_t above, below;
 } ebpo_posed_sides;

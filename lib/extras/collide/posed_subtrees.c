@@ -2,11 +2,11 @@
  * of envelopes. A partly loaded model has subtrees that are loaded on demand; a model that is
  * entirely in memory (a whole model) is a single subtree.
  *
- * An envelope is computed from the cell of a node: the planes of the node and of its nearest
- * ancestors, which are in memory, cut the cell, and the resulting polytope is posed. A hash table
- * keeps envelopes by octcode (locational code). A gap is a lower bound of the distance of two
- * convex sets. The iteration of Gilbert (1966) finds the gap. Each step tries a direction, which
- * gives a lower bound, so the iteration may stop after any step. */
+ * An envelope is computed from the cell of a node. The planes of the node and of its nearest
+ * ancestors, which are in memory, cut the cell. The resulting polytope is posed. A hash table keeps
+ * envelopes by octcode (locational code). A gap is a lower bound of the distance of two convex
+ * sets. The iteration of Gilbert (1966) finds the gap. Each step tries a direction, which gives a
+ * lower bound, so the iteration may stop after any step. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -52,10 +52,11 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
  * iterations is a valid bound, but is not accurate. */
 enum { ITERATIONS = 32 };
 
-/* The distance of both hulls is equal to the distance of the origin from the set of all differences
- * of a point of b and a point of a, which is convex. `v` is a point of this set. Each iteration
- * finds the point w of the set that is least along v, which gives a lower bound of the distance.
- * Then v becomes the point nearest to the origin on the segment from v to w (Gilbert 1966). */
+/* Consider the set of all differences of a point of b and a point of a. This set is convex, and its
+ * distance from the origin is the distance of both hulls. `v` is a point of this set. Each
+ * iteration finds the point w of the set that is least along v. The component of w along v is a
+ * lower bound of the distance. Then v becomes the point nearest to the origin on the segment from v
+ * to w (Gilbert 1966). */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
     double v[3], w[3], middle[3], best = 0;

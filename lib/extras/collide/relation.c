@@ -231,8 +231,8 @@ static bool record_piece(void *user, const ebpo_around *a)
     return !is_decided(r);
 }
 
-/* Examines a face, unless it has been examined. If one model is a solid and the other model is a
- * surface, examines only faces of the surface. Returns false if the search must end: the relation
+/* Examines a face if the face has not been examined. If one model is a solid and the other model is
+ * a surface, examines only faces of the surface. Returns false if the search must end: the relation
  * is decided, the deadline has passed, or r->status is a failure. */
 static bool inspect_face(relation_search *r, int m, uint64_t face)
 {

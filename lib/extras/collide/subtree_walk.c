@@ -107,8 +107,8 @@ static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
     return !s->model->whole && s->model->top->below[number].pruned;
 }
 
-/* Adds the pair of subtrees whose roots are the two nodes, unless their envelopes are certainly
- * apart. */
+/* Adds the pair of subtrees whose roots are the two nodes. Omits the pair if the envelopes are
+ * certainly apart. */
 static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
@@ -209,10 +209,10 @@ static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_e
 }
 
 /* Finds the pairs of subtrees that may have intersecting faces, sorted by sort_back_and_forth, so
- * that loaded subtrees are used again soon. Two intersecting faces have a common point, and each
- * model has a subtree that lists the model's face and whose cell contains the point; these two
- * subtrees are a pair of the result. self: both models are the same model at the same pose; each
- * pair is found once, with rank_a <= rank_b. The caller frees out->pair, even after a failure. */
+ * that loaded subtrees are used again soon. Two intersecting faces have a common point. Each model
+ * has a subtree that lists the model's face and whose cell contains the point. These two subtrees
+ * are a pair of the result. self: both models are the same model at the same pose; each pair is
+ * found once, with rank_a <= rank_b. The caller frees out->pair, even after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
                                       ebpo_posed_subtrees *b, double max_coordinate, bool self,
                                       ebpo_error *error)
@@ -303,7 +303,7 @@ static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *p
 
 /* --- one pair of subtrees --- */
 
-/* Loads a subtree, unless its model is entirely in memory. */
+/* Gets a subtree. Loads the subtree if its model is only partly loaded. */
 static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
                                 ebpo_error *error)
 {

@@ -14,7 +14,7 @@ typedef struct ebpo_held_planes {
     int count;
 } ebpo_held_planes;
 
-/* Adds a plane, unless an equal plane is present or there is no space. */
+/* Adds a plane. Does nothing if an equal plane is present or there is no space. */
 void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
 
 /* Finds the vector `out` nearest to `want` with n . out >= 0 for the normals n of all planes; if

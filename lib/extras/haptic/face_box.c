@@ -328,9 +328,9 @@ enum { STEPS = 24 };
 
 static const double no_contact = 2; /* every fraction of the path is at most 1 */
 
-/* Searches with Newton's method. Along a line the distance from a face, which is a convex set, is a
- * convex function. Its graph is above its tangents, so a step of Newton's method never passes the
- * point at which the ball first touches the face. */
+/* Searches with Newton's method. A face is a convex set, so the distance from a face is a convex
+ * function along a line. The graph of this function is above its tangents. So a step of Newton's
+ * method never passes the point at which the ball first touches the face. */
 double ebpo_ball_first_contact(const ebpo_ball_motion *ball, const double face[3][3],
                                double away[3])
 {

@@ -2,8 +2,8 @@
  * separate thread. A box is a set of loaded faces (face_box.h).
  *
  * A haptic step never waits for this thread. Boxes and results are passed through three or more
- * buffers whose indices are exchanged atomically: the loader writes its buffer and swaps it with
- * the waiting buffer; the step swaps the waiting buffer with its own buffer. The position of the
+ * buffers whose indices are exchanged atomically. The loader writes its buffer, and swaps it with
+ * the waiting buffer. The step swaps the waiting buffer with its own buffer. The position of the
  * device is predicted from its speed. If the faces of a box do not fit in its memory, a smaller box
  * is loaded. */
 #include "core/strict_fp.h"
@@ -85,8 +85,8 @@ static void sleep_briefly(void)
     nanosleep(&half_a_millisecond, NULL);
 }
 
-/* Predicts the position of the device. Its speed is averaged over several haptic steps, because
- * between two calls of this function there is often one step or none. */
+/* Predicts the position of the device. The device's speed is averaged over several haptic steps,
+ * because between two calls of this function there is often one step or none. */
 static void predict_device(ebpo_haptic *t, double out[3])
 {
     uint64_t now = ebpo_clock();

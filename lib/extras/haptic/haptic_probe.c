@@ -78,9 +78,9 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return far == 0;
 }
 
-/* Finds the winding number at `place` by moving to it from the last position with a known winding
- * number, or, if the box does not contain that position, from the position of the newest exact
- * result. Returns false if the winding number is not found. */
+/* Finds the winding number at `place` by a move to `place` from the last position with a known
+ * winding number. If the box does not contain that position, the move begins at the position of the
+ * newest exact result. Returns false if the winding number is not found. */
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
     const ebpo_probe_query *known = &t->known[t->step_result];

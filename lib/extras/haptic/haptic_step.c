@@ -6,8 +6,8 @@
  * second pass checks by exact arithmetic that the centre has crossed no face. If very many faces
  * are around the ball, a piece is completed in later haptic steps.
  *
- * This file also takes over the boxes (sets of loaded faces, face_box.h) of the loading thread,
- * finds the nearest face, and computes the smooth normal, which changes continuously with the
+ * This file also takes over the boxes (sets of loaded faces, face_box.h) of the loading thread, and
+ * finds the nearest face. It computes the smooth normal, which changes continuously with the
  * position of the proxy. */
 #include "core/strict_fp.h"
 

@@ -1,6 +1,6 @@
 /* Computes a haptic step of a tool (a rigid set of points). The motion follows Gauss' principle for
- * a body without mass: the tool makes the motion that is nearest to the motion of the device among
- * all motions that the contacts allow (Ortega, Redon, Coquillart 2007).
+ * a body without mass: among all motions that the contacts allow, the tool makes the motion that is
+ * nearest to the device's motion (Ortega, Redon, Coquillart 2007).
  *
  * The path of a step consists of pieces. A piece is computed in two passes. The first pass follows
  * each point that may hit a face, and ends the piece where the first point comes too close to a

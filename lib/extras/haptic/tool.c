@@ -36,13 +36,13 @@ void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *move
 }
 
 /* Returns the greatest allowed force F. With an allowed force, the energy that the device has
- * received in total, p->energy, stays at most A = stiffness s^2; s is the longest motion of the
+ * received in total, p->energy, never exceeds A = stiffness s^2. s is the longest motion of the
  * device in one haptic step. Let g = -p->energy, the energy that the device has given so far. In a
  * step of length s' the device receives at most F s', and F s' - g must not exceed stiffness max(s,
  * s')^2. This holds for all s' in two cases. First, if F^2 <= 4 stiffness g. Second, if F <= 2
  * stiffness s and F s - g <= A, because for s' >= s the right side then grows faster than the left
- * side. A spring that was pressed steadily to the depth d has F = stiffness d and g of at least
- * stiffness d^2 / 2; then one of the two cases holds, and the force is not reduced. */
+ * side. For a spring that was pressed steadily to the depth d, F is stiffness d, and g is at least
+ * stiffness d^2 / 2. Then one of the two cases holds, and the force is not reduced. */
 static double max_force(const ebpo_passive *p)
 {
     double k = p->stiffness, g = -p->energy, s = p->longest_step;

@@ -93,8 +93,8 @@ typedef struct ebpo_tool_contacts {
  * the new contact is ignored if its own gap is not smaller. */
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
-/* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts. The error
- * is at most `tolerance`, unless the limit of work is reached. release: contacts with a negative
+/* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts. If the
+ * limit of work is not reached, the error is at most `tolerance`. release: contacts with a negative
  * space require a motion away from their faces; if false, a negative space counts as 0. Returns the
  * number of contacts that hold the tool. */
 int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double tolerance,

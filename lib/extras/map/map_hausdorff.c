@@ -49,9 +49,9 @@ typedef struct search {
     ebpo_map_hausdorff range; /* bounds of the result found so far */
     uint64_t allowed; /* no division begins in the current batch when range.queries has reached this
                          value */
-    triangles current, next;      /* triangles of this round and of the next round */
-    uint64_t divided;             /* number of triangles that this round divides: the first ones of
-                                   * `current` */
+    triangles current, next; /* triangles of this round and of the next round */
+    uint64_t divided; /* number of triangles that this round divides; they are the first triangles
+                         of `current` */
     double (*middle)[3][3];       /* [divided] middles of the edges from each corner to the next */
     double (*middle_distance)[3]; /* [divided] distances of the middles from the model */
     uint64_t middle_capacity, distance_capacity; /* of middle and middle_distance, in triangles */
@@ -81,8 +81,9 @@ static void set_upper_bound(const search *s, triangle *t)
     t->upper += s->slack;
 }
 
-/* Returns true if a triangle must be divided: if its upper bound is greater than the result's lower
- * bound by more than the tolerance, and greater than all bounds that are final. */
+/* Returns true if a triangle with this upper bound must be divided. The upper bound is then greater
+ * than the result's lower bound by more than the tolerance, and greater than all bounds that are
+ * final. */
 static bool needs_division(const search *s, double upper)
 {
     return upper > s->range.lo * (1 + s->options.tolerance) && upper > s->range.hi;

@@ -255,7 +255,7 @@ static ebpo_status scatter_points(drawing *d, const ebpo_distance_result *middle
     return status;
 }
 
-/* Begins a stroke unless the pen is already painting. */
+/* Begins a stroke if the pen is not painting yet. */
 static ebpo_status begin_stroke(drawing *d, const ebpo_paint_input *input, ebpo_error *error)
 {
     if (d->pen_down)

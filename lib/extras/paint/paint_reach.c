@@ -5,8 +5,8 @@
  * ball, and at common edges that intersect the ball. The set that contains the point's face is the
  * reach. So paint on one side of a thin wall does not reach the other side, although the ball does.
  *
- * Points of a stroke are evaluated in batches on all cores. Their reaches are kept until they are
- * requested. Results do not depend on the number of threads.
+ * Points of a stroke are evaluated in batches on all cores. The reaches of a batch are kept until
+ * they are requested. Results do not depend on the number of threads.
  *
  * See format-spec/paint.md, section 4. */
 #include "core/strict_fp.h"

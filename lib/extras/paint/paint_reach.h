@@ -39,9 +39,9 @@ typedef struct ebpo_reach_search {
     uint64_t position_count, position_capacity, edge_count, edge_capacity;
     uint32_t *slot; /* [slots] hash table, first of positions, then of edges; an entry is 0 (free)
                      * or an index plus 1 */
-    uint32_t *root; /* union-find sets of faces, positions and edges, in this order: each entry is
-                       the index of another member of the same set; the entry of the set's
-                       representative is its own index */
+    uint32_t *root; /* union-find sets of faces, positions and edges, in this order. An entry is the
+                       index of another member of the same set. The entry of the set's
+                       representative is its own index. */
     uint64_t slots, slot_capacity, root_capacity;
     bool short_of_memory, too_many; /* the reason why gathering faces failed */
 } ebpo_reach_search;
@@ -90,8 +90,7 @@ typedef struct ebpo_found_faces {
     uint64_t slots;
 } ebpo_found_faces;
 
-/* Sets *number to the index of a face, which is added unless it is present. Fails with
- * EBPO_E_LIMIT, EBPO_E_MEMORY. */
+/* Finds or adds a face, and sets *number to its index. Fails with EBPO_E_LIMIT, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_found_faces_add(ebpo_found_faces *found_faces,
                                                const ebpo_reach_face *face, uint32_t *number,
                                                ebpo_error *error);
@@ -135,9 +134,9 @@ typedef struct ebpo_reach_result {
 
 typedef struct ebpo_reach_pool ebpo_reach_pool;
 
-/* Makes an object that finds reaches on several threads. One thread uses `context`; for the others,
- * contexts of the same model are made. threads: 0: one for each core. There are fewer threads if
- * the model's memory budget is small. After a failure *out is NULL. */
+/* Makes an object that finds reaches on several threads. One thread uses `context`. The other
+ * threads use new contexts of the same model. threads: 0: one for each core. There are fewer
+ * threads if the model's memory budget is small. After a failure *out is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_reach_pool_new(const ebpo_paint *p, ebpo_context *context,
                                               unsigned threads, ebpo_reach_pool **out,
                                               ebpo_error *error);

@@ -1,6 +1,6 @@
-/* Searches along the routes of pairs of instances. One search finds the first time at which a pair
- * comes within its clearance, the other one finds the least distance of a pair over an interval of
- * time.
+/* Searches along the routes of pairs of instances. The first search finds the first time at which a
+ * pair comes within its clearance. The second search finds the least distance of a pair over an
+ * interval of time.
  *
  * Both searches evaluate the distance at some times, and use one bound: the distance of two
  * instances changes by at most the sum of their motions. The first search goes forward in time from
@@ -229,7 +229,8 @@ static ebpo_status least_distance_evaluate(interval_search *s, double time, doub
 }
 
 /* Adds an interval. From one end of the interval to the other, the distance changes by at most
- * p.motion in total, so between the ends it is at least (at_from + at_to - motion) / 2. */
+ * p.motion in total. So at all times between the ends, the distance is at least (at_from + at_to -
+ * motion) / 2. */
 static ebpo_status add_interval(interval_search *s, time_interval p, ebpo_error *error)
 {
     ebpo_status status =
@@ -284,9 +285,9 @@ static ebpo_status begin_intervals(interval_search *s, double from, double to, e
     return status;
 }
 
-/* Returns true if the lower bound of p, the first interval, is within the tolerance or cannot be
- * improved: omitted faces limit it, the maximum number of evaluations is reached, or p is too
- * short. */
+/* Returns true if the lower bound of p, the first interval of the heap, is within the tolerance.
+ * Also returns true if this bound cannot be improved: omitted faces limit it, the maximum number of
+ * evaluations is reached, or p is too short. */
 static bool is_done(const interval_search *s, const time_interval *p, double middle,
                     const least_search *search)
 {

@@ -1,6 +1,6 @@
 /* Computes data of a pair of instances of a scene: the box of one instance in the coordinates of
- * the other one at a given time, bounds of their relative motion and of their distance, and bounds
- * of the faces that their files omit.
+ * the other instance at a given time, and bounds of the relative motion and of the distance of the
+ * instances. Also bounds the distance of faces that the files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
  * file that is a subset has all faces of a box (the kept box); up to six boxes around the kept box
@@ -45,7 +45,7 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
     return status == EBPO_OK ? ebpo_posing_make(out, &pose, max_coordinate, error) : status;
 }
 
-/* The box of a model at a pose. Its sides need not be parallel to the axes of the world. */
+/* The box of a model at a pose. The box's sides need not be parallel to the axes of the world. */
 typedef struct posed_box {
     double middle[3];  /* centre of the box, in the world */
     double half[3][3]; /* [axis of the box] vector from the centre to the middle of a side */
@@ -239,8 +239,8 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
 
 /* Bounds the motion of a pair on one route. The pose of the route is the same for both instances,
  * to the last bit. So the distance of two points, one of each instance, is the route's scale times
- * their distance in the coordinates of the route, and changes only with the scale and by
- * rounding. */
+ * the points' distance in the coordinates of the route. This distance changes only with the scale
+ * and by rounding. */
 static double motion_on_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                                   double to)
 {

@@ -1,7 +1,7 @@
 /* Computes data of two instances of a scene at a time: the box of one instance in the coordinates
- * of the other one, their relative motion and distance, and the distance of the faces that their
- * files omit (a subset file omits a part of the model's faces). Bounds are valid for posed
- * coordinates, which are rounded. */
+ * of the other instance, and the relative motion and the distance of the instances. Also computes
+ * the distance of faces that the files omit (a subset file omits a part of the model's faces).
+ * Bounds are valid for posed coordinates, which are rounded. */
 #ifndef EBPO_SCENE_INSTANCE_PAIR_H
 #define EBPO_SCENE_INSTANCE_PAIR_H
 
@@ -32,9 +32,9 @@ EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, 
 /* Returns the distance of two boxes, rounded down. */
 double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds *b);
 
-/* Sets *distance to a lower bound of the distance, at a time, of all pairs of a face of pair->a and
- * a face of pair->b in which at least one face is omitted from its file; INFINITY if no face is
- * omitted. Sets *omitted_in to an instance whose file omits faces. */
+/* Considers all pairs of a face of pair->a and a face of pair->b in which at least one face is
+ * omitted from its file. Sets *distance to a lower bound of the distances of these pairs at a time;
+ * INFINITY if no face is omitted. Sets *omitted_in to an instance whose file omits faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                              double time, double *distance, uint64_t *omitted_in,
                                              ebpo_error *error);

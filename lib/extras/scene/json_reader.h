@@ -34,8 +34,8 @@ EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *v
                                             const char *const *known);
 
 /* Each of the next functions reads a member of an object. If the member is missing, the function
- * does not change *out, and fails with EBPO_E_FORMAT if the member is `needed`. It also fails if
- * the member has another type. ebpo_json_get_flag: the member is never needed. */
+ * does not change *out, and fails with EBPO_E_FORMAT if the member is `needed`. The function also
+ * fails if the member has another type. ebpo_json_get_flag: the member is never needed. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,

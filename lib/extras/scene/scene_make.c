@@ -7,8 +7,8 @@
  * set of all instances, to a set that has only this instance, to the set of its layer and to the
  * sets of its groups.
  *
- * A scene file is untrusted input. It may name only files in its folder or in folders below its
- * folder, unless the options allow other files. Symbolic links that lead out of the folder are
+ * A scene file is untrusted input. If the options do not allow other files, it may name only files
+ * in its folder or in folders below its folder. Symbolic links that lead out of the folder are
  * rejected. */
 #include "core/strict_fp.h"
 
@@ -88,7 +88,8 @@ static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *nam
     return EBPO_OK;
 }
 
-/* Adds a set, and sets *set to its index unless `set` is NULL. kind: "", "layer:" or "group:". */
+/* Adds a set. If `set` is not NULL, sets *set to the index of the new set. kind: "", "layer:" or
+ * "group:". */
 static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
                            ebpo_error *error)
 {
@@ -147,7 +148,7 @@ char *ebpo_scene_join_path(const char *folder, const char *path)
     return joined;
 }
 
-/* Returns true if the path is in the folder or in a folder below it. Both paths are without
+/* Returns true if the path is in the folder or in a folder below it. Neither path may contain
  * symbolic links. */
 static bool is_below(const char *folder, const char *path)
 {

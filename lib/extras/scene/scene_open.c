@@ -131,7 +131,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
 
 /* --- models --- */
 
-/* Opens a file unless it is open already, and sets *number to its index in scene->files. */
+/* Opens a file if it is not open yet, and sets *number to the file's index in scene->files. */
 static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_expansion,
                              uint64_t *number, ebpo_error *error)
 {
@@ -156,8 +156,9 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     return EBPO_OK;
 }
 
-/* Sets the model's box. On each axis, this is the range of the faces' coordinates that the file
- * states, or, if the stated range is not within the root cell, the range of the root cell. */
+/* Sets the model's box. On each axis, the box has the range of the faces' coordinates that the file
+ * states. If the stated range is not within the root cell, the box has the range of the root
+ * cell. */
 static void set_model_box(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {

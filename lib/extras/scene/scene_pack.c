@@ -3,8 +3,8 @@
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
  * scene file that differs from the original in its paths and digests. The folder is written under a
- * temporary name and renamed when it is complete, so that it is created atomically. It is removed
- * after a failure.
+ * temporary name and renamed when it is complete, so that it appears atomically. After a failure
+ * the folder is removed.
  *
  * A plan finds the same needs without writing anything. */
 #include "core/strict_fp.h"

@@ -136,8 +136,8 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
 
 /* Relative margin for sums of a few products, far greater than their rounding errors. */
 static const double slack = 0x1p-44;
-/* Greatest rotation in a step of box_between, in radians. It is exceeded only if the greatest
- * number of steps does not suffice. */
+/* Greatest rotation in a step of box_between, in radians. A step rotates further only if the
+ * greatest number of steps does not suffice. */
 static const double step_angle = 0.125;
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
