@@ -102,8 +102,8 @@ static unsigned may_not(unsigned may)
     return (may & EBPO_MAY_IN ? EBPO_MAY_OUT : 0u) | (may & EBPO_MAY_OUT ? EBPO_MAY_IN : 0u);
 }
 
-/* Returns the possible states of an intersection. It may be in if both operands may be in, and out
- * if either may be out. */
+/* Returns the possible states of an intersection of two operands. The intersection may be in if
+ * both operands may be in. It may be out if at least one operand may be out. */
 static unsigned may_in_both(unsigned a, unsigned b)
 {
     return (a & b & EBPO_MAY_IN) | ((a | b) & EBPO_MAY_OUT);

@@ -24,11 +24,12 @@ typedef struct ebpo_expression {
 } ebpo_expression;
 
 /* Returns the possible states of an expression. If bit i of `known` is set, bit i of `in` is the
- * state of operand i: 1 for in. A result of one bit is certain. EBPO_MAY_BOTH may be returned
- * although only one state is possible, if the expression uses an operand twice. */
+ * state of operand i: 1 for in. If the returned value has one bit, the state is certain. If the
+ * expression uses an operand twice, the function may return EBPO_MAY_BOTH although only one state
+ * is possible. */
 unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_t in);
 
-/* Returns the operands on which the result depends, a bit for each. */
+/* Returns a bit for each operand on which the result depends. */
 uint64_t ebpo_expression_operands(const ebpo_expression *e);
 
 /* An expression with its operands. */
@@ -68,7 +69,7 @@ EBPO_MUST_USE ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned wor
 
 /* Groups equal operands (same content, same pose) that the expression uses. If operand i is the
  * first of its group, equal[i] has a bit for each operand of the group, including i. If operand i
- * is not the first one or is not used, equal[i] is 0. */
+ * is not the first of its group or is not used, equal[i] is 0. */
 void ebpo_boolean_find_equal(const ebpo_boolean *b, uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX]);
 
 /* Fails with the status of `cause`, an error that occurred with an operand. The message begins with

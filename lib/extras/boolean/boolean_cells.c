@@ -22,7 +22,7 @@
 #include "extras/collide/collider.h"
 #include "geometry/cells.h"
 
-/* A run of in-cells, as octcodes of the finest level. */
+/* A run of in-cells: `count` consecutive octcodes of the finest level, beginning with `first`. */
 typedef struct in_run {
     ebpo_octcode first;
     uint64_t count;
@@ -38,8 +38,8 @@ struct ebpo_boolean_cells {
 };
 
 enum {
-    PARENTS = 1 << 14, /* parents whose children are classified together */
-    GRAIN = 64         /* candidates in one task */
+    PARENTS = 1 << 14, /* number of parents whose children are classified together */
+    GRAIN = 64         /* number of candidates in one task of a thread */
 };
 
 /* A cell to classify. */
@@ -75,7 +75,8 @@ static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsig
 
 static ebpo_status keep_in(ebpo_boolean_cells *cells, ebpo_cell cell, ebpo_error *error)
 {
-    int up = cells->world.level - cell.level; /* levels above the finest one */
+    int up = cells->world.level -
+             cell.level; /* number of levels between the cell's level and the finest level */
     if (!ebpo_grow(&cells->in, &cells->in_capacity, cells->in_count + 1, sizeof *cells->in))
         return ebpo_fail_memory(error, (cells->in_count + 1) * sizeof *cells->in);
     cells->in[cells->in_count++] =
@@ -209,7 +210,7 @@ void ebpo_boolean_cells_free(ebpo_boolean_cells *cells)
     free(cells);
 }
 
-/* Returns the volume of this many cells of the finest level, rounded down or up. */
+/* Returns the volume of `count` cells of the finest level, rounded up or down. */
 static double cells_volume(const ebpo_boolean_cells *c, uint64_t count, bool up)
 {
     double cells = (double)count, edge = ebpo_world_edge(&c->world, c->world.level);

@@ -8,7 +8,7 @@
  * points all have the given point's state is dropped. A mixed cell may have points of both states,
  * and is divided.
  *
- * There are two searches. The first one does not divide cells that are small compared with their
+ * There are two searches. The first search does not divide cells that are small compared with their
  * distance and the tolerance. Otherwise it could reach the maximum number of cells along a near
  * boundary before it finds an upper bound. If the bounds are too wide, the second search divides
  * down to the finest cells. Both searches stop at the maximum number of cells. */
@@ -108,7 +108,7 @@ static bool is_divided(const boundary_search *s, const ebpo_world *w, const wait
 }
 
 /* Evaluates a cell: drops it, lowers the upper bound, or divides it. *unclear: least distance of
- * mixed cells that are not divided. */
+ * all mixed cells that were not divided. */
 static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q, waiting *at,
                                double *unclear, ebpo_error *error)
 {
@@ -160,7 +160,7 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
     return status;
 }
 
-/* Makes the finest world that doubles allow. */
+/* Makes the world with the finest level for which corners of cells are exact doubles. */
 static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *error)
 {
     /* one less than the maximum, because the finest cells' centres are corners of the next level */
@@ -170,7 +170,7 @@ static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *
     return ebpo_world_make(w, b, level, error);
 }
 
-/* Does both searches. In the second one, s->grain is 0. */
+/* Does both searches. In the second search, s->grain is 0. */
 static ebpo_status search_boundary(boundary_search *s, ebpo_error *error)
 {
     ebpo_world w;

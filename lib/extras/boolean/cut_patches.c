@@ -260,9 +260,9 @@ static ebpo_status classify_some(void *context, uint64_t begin, uint64_t end, un
 
 /* --- all patches --- */
 
-/* Chooses a triangle of each patch: if possible a face without partners, at which queries are
- * fastest. Sets patch[t] to the number of the patch of triangle t. Returns the number of patches.
- */
+/* Chooses a triangle of each patch: if possible, a triangle of a face without partners, because
+ * queries are fastest there. Sets patch[t] to the number of the patch of triangle t. Returns the
+ * number of patches. */
 static uint32_t choose_triangles(const ebpo_cut_mesh *cut, uint32_t *parent, uint32_t *patch,
                                  uint32_t *chosen)
 {

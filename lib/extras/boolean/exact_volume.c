@@ -59,7 +59,7 @@ static void bound_by_box(measuring *m)
     m->out->volume = ebpo_value_bounds_of(0, most);
 }
 
-/* Sets the reason why there is no exact volume, and the operands i and k that it concerns. */
+/* Sets the reason why there is no exact volume, and the operands i and k that cause it. */
 static void note_doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
 {
     m->out->doubt = why;
@@ -102,7 +102,7 @@ static void name_faces(ebpo_exact_volume *out, const ebpo_face_pair *pair)
     out->face[1] = pair->face_b;
 }
 
-/* Notes a doubt if faces of operands i and k intersect. */
+/* Sets m->out->doubt if faces of operands i and k intersect. */
 static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *error)
 {
     ebpo_collider *collider;
@@ -140,7 +140,8 @@ typedef struct operand {
     measuring *m;
     uint32_t number; /* index in m->b->solid */
     const ebpo_posed_solid *solid;
-    uint32_t *slots; /* [face in the file] position of the face in the model in memory */
+    uint32_t
+        *slots; /* [face in the file] slot of the face in the model in memory (ebpo_face_slots) */
     uint32_t *patch; /* [face in the file] first face of its patch */
     uint32_t *head;  /* first faces of the patches */
     uint64_t heads;
@@ -173,7 +174,7 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return !o->m->out->doubt;
 }
 
-/* Notes a doubt if faces of the operand intersect each other. */
+/* Sets o->m->out->doubt if faces of the operand intersect each other. */
 static ebpo_status check_self(operand *o, ebpo_error *error)
 {
     ebpo_collider *collider;
@@ -189,7 +190,8 @@ static ebpo_status check_self(operand *o, ebpo_error *error)
 /* --- patches that bound the result --- */
 
 /* Computes the operand's winding number at the mean of the corners of a face, shifted by an
- * infinitesimal (ebpo_exact_winding). No other face contains this point. */
+ * infinitesimal (ebpo_exact_winding). No other face contains this point, because faces of the
+ * operand do not intersect. */
 static ebpo_status own_winding(const operand *o, ebpo_context *context, const double t[3][3],
                                int32_t *winding, ebpo_error *error)
 {

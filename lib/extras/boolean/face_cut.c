@@ -120,7 +120,8 @@ static bool cut_through(ebpo_face_cutter *c, const int side[3], const int other_
     ebpo_exact_plane_through(&c->plane[1], c->corner[1]);
     if (!find_ends(c, 0, side) || !find_ends(c, 1, other_side))
         return true;
-    /* the intersection of both intervals: from the later first end to the earlier last end */
+    /* the intersection of both intervals: it begins at the later of both first ends, and ends at
+     * the earlier of both last ends */
     const ebpo_exact_point *first = &c->end[ebpo_exact_order(&c->end[0][0], &c->end[1][0]) < 0][0];
     const ebpo_exact_point *last = &c->end[ebpo_exact_order(&c->end[0][1], &c->end[1][1]) > 0][1];
     if (ebpo_exact_order(first, last) > 0)
@@ -268,7 +269,7 @@ static bool triangulate_face(ebpo_face_cutter *c)
 
 /* --- covers --- */
 
-/* A box of a triangle's rounded coordinates on the two axes that are seen. */
+/* A box of a triangle's rounded coordinates on the two axes of the projection. */
 typedef struct ebpo_triangle_box {
     double low[2], high[2];
     uint32_t triangle;

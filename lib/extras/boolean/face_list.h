@@ -68,7 +68,7 @@ static inline uint32_t ebpo_face_list_component(const ebpo_face_list *faces, uin
     return component ? component[faces->file_face[face]] : EBPO_NO_COMPONENT;
 }
 
-/* Returns true if the operand is the base of the wanted changes. */
+/* Returns true if `changed_only` is set and the operand is the base. */
 static inline bool ebpo_face_list_is_base(const ebpo_face_list *faces, uint32_t operand)
 {
     return faces->changed_only && operand == 0;

@@ -29,7 +29,7 @@ typedef struct ebpo_arrangement_2d {
     ebpo_point_set set;
     ebpo_plane_segment *segment;
     uint64_t segments, segment_capacity;
-    ebpo_point_on_segment *recorded; /* points on segments that have been found */
+    ebpo_point_on_segment *recorded; /* points on segments, found so far */
     uint64_t recorded_count, recorded_capacity;
     ebpo_plane_edge *edge; /* the result; an edge of several segments is listed several times */
     uint64_t edges, edge_capacity;
@@ -43,7 +43,7 @@ void ebpo_arrangement_2d_free(ebpo_arrangement_2d *a);
 /* Removes all points and segments; keeps the memory. */
 void ebpo_arrangement_2d_begin(ebpo_arrangement_2d *a, int axis, int unit);
 
-/* Adds a segment, or with equal ends a point. Returns false without memory. */
+/* Adds a segment, or a single point if `from` and `to` are equal. Returns false without memory. */
 bool ebpo_arrangement_2d_add(ebpo_arrangement_2d *a, uint32_t from, uint32_t to);
 
 /* Computes the edges. No point of the set is in the interior of an edge, and different edges have

@@ -226,7 +226,8 @@ static bool is_better_flipped(const ebpo_triangulation *t, uint32_t triangle, in
     return sum > 0x1p-30 * size;
 }
 
-/* Maximum number of flips for each point. Because of rounding, edges could flip for ever. */
+/* Maximum number of flips for each point. Without a maximum, edges could flip for ever because of
+ * rounding. */
 enum { FLIPS_MAX = 64 };
 
 static bool improve_shape(ebpo_triangulation *t)

@@ -21,9 +21,9 @@ EBPO_MUST_USE ebpo_status ebpo_region_box(ebpo_region_model *out, const double b
  * that is near a box. The model is a tetrahedron with one face in the plane. The corners of this
  * face are rounded to doubles: two coordinates of a corner are chosen, and the third one is the
  * double nearest to the plane. For most planes with few digits, the corners are exactly in the
- * plane. A plane that is far from the box is moved towards the box, but stays outside. Fails with
- * EBPO_E_ARGUMENT if a number is not finite or the normal is 0, and with EBPO_E_LIMIT if the box is
- * too large. Must be freed, also after a failure. */
+ * plane. A plane that is far from the box is moved towards the box, but still does not intersect
+ * the box. Fails with EBPO_E_ARGUMENT if a number is not finite or the normal is 0, and with
+ * EBPO_E_LIMIT if the box is too large. Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_region_half_space(ebpo_region_model *out, const double plane[4],
                                                  const double box[6], ebpo_error *error);
 

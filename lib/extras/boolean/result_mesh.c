@@ -59,7 +59,7 @@ typedef struct operand_output {
     ebpo_mesh mesh;       /* the operand's mesh, posed */
     ebpo_maps maps;       /* source indices of the faces */
     bool repeats;         /* several vertices have one position */
-    ebpo_positions first; /* for each vertex: the first one at its position; only if `repeats` */
+    ebpo_positions first; /* for each vertex: the first vertex at its position; only if `repeats` */
     uint64_t *near;       /* a bit for each vertex that is a corner of a listed face */
     uint32_t *number;     /* [vertex] its number in the result, or NO_NUMBER */
 } operand_output;

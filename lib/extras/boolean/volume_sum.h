@@ -11,10 +11,10 @@
 
 /* Six times the sum of the volumes below faces. */
 typedef struct ebpo_volume_sum {
-    ebpo_sum by_doubles; /* sum for faces whose products are exact in doubles */
-    mpz_t by_integers;   /* sum for all other faces, in units of 2^-3378 */
-    unsigned long
-        rounded; /* terms of `by_integers` that were rounded down, each by less than a unit */
+    ebpo_sum by_doubles;   /* sum for faces whose products are exact in doubles */
+    mpz_t by_integers;     /* sum for all other faces, in units of 2^-3378 */
+    unsigned long rounded; /* number of terms of `by_integers` that were rounded down, each by less
+                              than a unit */
 } ebpo_volume_sum;
 
 void ebpo_volume_sum_begin(ebpo_volume_sum *s);
@@ -30,8 +30,8 @@ void ebpo_volume_sum_add_rational(ebpo_volume_sum *s, mpq_t (*t)[3], int sign);
 void ebpo_volume_sum_merge(ebpo_volume_sum *s, const ebpo_volume_sum *more);
 
 /* Returns the double nearest to the volume, ties to even; infinite beyond the range of doubles.
- * Sets *scaled, about 1, and *exponent. *scaled is the double nearest to the volume divided by
- * 2^*exponent. No face may have been rounded (s->rounded is 0). */
+ * Sets *scaled and *exponent. *scaled is the double nearest to the volume divided by 2^*exponent.
+ * Its absolute value is 1/12 to 1/6, or 0. No face may have been rounded (s->rounded is 0). */
 double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent);
 
 /* Returns the double nearest to the volume, or an interval if the rounding of faces leaves open

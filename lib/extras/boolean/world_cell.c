@@ -1,11 +1,11 @@
 /* Evaluates a Boolean expression in cells of an octree of the world: decides if a cell is entirely
  * inside or entirely outside the result.
  *
- * For each operand, the ball around the cell is transformed into the model's coordinates. The
- * model's box, then the white and black nodes of its tree, then the nearest face decide if the cell
- * is inside, outside, or may contain a face. A cell keeps the states of the operands, so its
- * children need not query them again. The size of the root is a power of two, so corners and
- * centres are exact. */
+ * For each operand, the ball around the cell is transformed into the model's coordinates. Three
+ * tests decide if the cell is inside, outside, or may contain a face: by the model's box, then by
+ * the white and black nodes of the model's tree, then by the nearest face. A cell keeps the states
+ * of the operands, so its children need not query them again. The size of the root is a power of
+ * two, so corners and centres are exact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,8 +17,9 @@
 
 enum {
     SEEN_FACES = 4, /* a bit beside EBPO_MAY_IN and EBPO_MAY_OUT: there may be faces */
-    NODES_MAX = 64  /* maximum number of nodes that are visited after the first node that may have
-                     * faces; then only a black and a white node can decide */
+    NODES_MAX =
+        64 /* maximum number of nodes that are visited after the first node that may have faces.
+              After this node, the search decides only if it finds both a black and a white node. */
 };
 
 /* A ball in the coordinates of a model. A black node is inside the solid, a white node outside. */
