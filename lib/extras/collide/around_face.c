@@ -1,7 +1,7 @@
 /* Finds which sides of a posed face are in the interior of each of two models. The face belongs to
  * one of these models. All faces of both models that intersect the face cut it into pieces
- * (face_pieces.h). At a point of each piece, the winding numbers of both models show which sides of
- * the piece are in which model.
+ * (face_pieces.h). The winding numbers of both models at a point of a piece show which sides of the
+ * piece are in which model.
  *
  * All decisions are exact: coordinates of points are fractions, and posed coordinates are the
  * doubles that geometry/pose.h defines. Only faces close to a point or face are read from the
@@ -246,7 +246,7 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
     return status;
 }
 
-/* The query whether model m contains a point, by the faces of model m that contain the point. */
+/* Decides if model m contains a point, from the faces of model m that contain the point. */
 typedef struct face_query {
     ebpo_two_models *two;
     int m;

@@ -3,8 +3,8 @@
  * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats, and drop pairs that are
  * certainly farther apart than the limit (ebpo_gap_search.limit). The kernels store the remaining
  * pairs of faces as waiting pairs. This file decides the waiting pairs in doubles with error bounds
- * (ebpo_triangles_distance_bounds), and exactly if the bounds of two pairs overlap. Of several
- * pairs at the same distance, the first pair in file order is returned, so the result is the same
+ * (ebpo_triangles_distance_bounds), and exactly if the bounds of two pairs overlap. If several
+ * pairs have the same distance, the first pair in file order is returned. So the result is the same
  * with every processor and number of threads.
  *
  * Partly loaded models are searched in pairs of subtrees, in the order of the gaps of their
@@ -42,7 +42,8 @@ typedef struct ebpo_face_two {
 typedef struct nearest_pair {
     /* Input: */
     double tolerance;  /* greatest allowed difference of hi and lo; 0: exact */
-    double at_least;   /* only compare the distance with this value; NAN: compute the distance */
+    double at_least;   /* the search only compares the distance with this value; NAN: the search
+                          computes the distance */
     uint64_t deadline; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= distance <= hi, equal if the result is exact. */
@@ -50,8 +51,8 @@ typedef struct nearest_pair {
     bool found;         /* `best` is set */
     bool intersects;    /* the faces of `best` intersect, but another intersecting pair may precede
                          * `best` in file order */
-    int is_at_least;    /* the distance is at least `at_least`: 1: yes, 0: no, -1: not compared, or
-                         * undecided */
+    int is_at_least;    /* 1: the distance is at least `at_least`; 0: the distance is less; -1: not
+                           compared, or undecided */
     ebpo_face_two best; /* if `found`: the nearest pair so far */
     bool ended;         /* the search ended before all pairs were visited */
     double unvisited;   /* if `ended`: lower bound of the distances of the unvisited pairs */
@@ -59,7 +60,7 @@ typedef struct nearest_pair {
     ebpo_error *error;
 } nearest_pair;
 
-/* The three corners of one face of an ebpo_face_two, in the form that functions expect. */
+/* The three corners of one face of an ebpo_face_two, in the type that functions expect. */
 typedef const double (*corners)[3];
 #define CORNERS(face, side) ((corners)(face)->corner[side])
 
@@ -117,8 +118,8 @@ static float to_unit(const ebpo_gap_search *g, double distance)
     return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
 }
 
-/* Compares the distance of two disjoint faces with n->at_least. Returns false if the distance is
- * less, which ends the search. */
+/* Compares the distance of two disjoint faces with n->at_least. Returns false, to end the search,
+ * if the distance is less. */
 static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo < n->at_least) ||
@@ -318,7 +319,7 @@ static bool nearest_pair_is_done(const nearest_pair *n)
     return n->intersects || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
 }
 
-/* Sets the walk's tolerance, and its limit from the result so far. */
+/* Sets the walk's tolerance, and computes the walk's limit from the result so far. */
 static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
 {
     g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));

@@ -30,7 +30,7 @@ typedef struct level_search {
 static const char stage[] = "pairs of nodes"; /* for the progress function */
 
 /* Width of a margin along the sides of a black cell, as a share of the cell's edge. Points in the
- * margin do not count as inside the cell, because rounding may have moved them there. */
+ * margin do not count as inside the cell. */
 static const double margin_share = 0x1p-14;
 
 /* --- nodes --- */

@@ -199,7 +199,8 @@ static bool make_parts(pair_gathering *g, ebpo_pair_walk *w)
     return ok;
 }
 
-/* Searches the parts [begin, end) in a thread. Ends if all threads have found too many pairs. */
+/* Searches the parts [begin, end) in a thread. Ends early if the threads have found too many pairs
+ * in total. */
 static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -347,9 +348,9 @@ static void pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uin
     }
 }
 
-/* Searches runs of consecutive faces of the first model. A run is halved until its pairs fit in
- * memory; after a run that fits, the next run is twice as long. The pairs of a single face are
- * stored even if they do not fit. */
+/* Searches runs of consecutive faces of the first model. If the pairs of a run do not fit in
+ * memory, the run is halved. After a run that fits, the next run is twice as long. The pairs of a
+ * single face are stored even if they do not fit. */
 static ebpo_status search_in_runs(pair_receiver *v, pair_gathering *g, ebpo_error *error)
 {
     uint32_t faces = v->pair->accel[0]->face_count, run = faces;

@@ -448,7 +448,8 @@ EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *
 {
     f8 low[3], high[3], zero = f8_all(0), lost = f8_all(4 * error);
     float b_low[3][8], b_high[3][8], b_least[8];
-    f8 a_most = zero, least = zero; /* ends of the faces along the direction */
+    f8 a_most = zero,
+       least = zero; /* along the direction: upper ends of a's faces, and lower ends of b's faces */
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
         f8 a_at = zero, b_at = zero;

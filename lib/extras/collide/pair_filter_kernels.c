@@ -177,7 +177,7 @@ EBPO_EIGHT f8 error_bound8(f8 e, f8 m, f8 n1, f8 n2)
 
 /* Returns a bound of the error of the determinants that compare corners of one face with the plane
  * of the other face. l: greatest length of an edge of the plane's face. d: greatest distance of a
- * corner of the one face from the first corner of the plane's face. */
+ * compared corner from the first corner of the plane's face. */
 EBPO_EIGHT f8 plane_bound8(f8 e, f8 l, f8 d)
 {
     return error_bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));
@@ -190,7 +190,7 @@ EBPO_EIGHT f8 edges_size8(vector8 e1, vector8 e2, f8 e)
 }
 
 /* Decides pairs by the planes and intervals of their faces. e: error of coordinates. out.apart: the
- * pairs of which it is already known that they are apart. Returns `out` with all decisions. */
+ * pairs that are already known to be apart. Returns `out` with all decisions. */
 EBPO_EIGHT ebpo_pair_masks decide_faces8(const face8 *a, const face8 *b, f8 e, ebpo_pair_masks out)
 {
     vector8 e1 = vector8_minus(a->corner[1], a->corner[0]),

@@ -301,8 +301,8 @@ EBPO_EIGHT unsigned near_children_of_side(const ebpo_pair_walk *w, int side,
     return near_children_of(&t, (int)(q_child & 7), first, key);
 }
 
-/* Pushes the pairs of the children of `node`, a node of model `side`, with the child in r of the
- * other model, which is not divided. q: the node that has this child. */
+/* Divides only one child of the pair r: pushes the pairs of the children of `node`, a node of model
+ * `side`, with the other child of r. q: the node that has this other child. */
 EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int side, uint32_t node,
                               const ebpo_turned_node *q, bool first)
 {
@@ -365,8 +365,8 @@ static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t
     return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
 }
 
-/* Computes the faces of a block relative to `origin`, as ebpo_posed_block_place does. Returns the
- * bound of their error. */
+/* Computes the faces of a block relative to `origin`, as ebpo_posed_block_place does. Returns a
+ * bound of the errors of their coordinates. */
 EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const double origin[3],
                              float out[9][8])
 {

@@ -218,9 +218,8 @@ static void add_face_at_point(side_segment *l, const double t[3][3])
     l->jump += ebpo_axis_crossing(from, nextafter(l->w[axis], INFINITY), axis, t[0], t[1], t[2]);
 }
 
-/* Updates the result by the faces close to the segment. Returns true, so that all faces are
- * visited.
- */
+/* Updates l->crossed and the result by the faces close to the segment. Returns true, so that all
+ * faces are visited. */
 static bool receive_near_triangles(void *user, const ebpo_triangles *triangles)
 {
     side_segment *l = user;
