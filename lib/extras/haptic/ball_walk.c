@@ -32,7 +32,7 @@
 typedef struct motion_search {
     const ebpo_held_planes *planes;
     const double *want; /* [3] */
-    double length;      /* of `want` */
+    double length;      /* length of `want` */
     double best;        /* squared distance of `out` from `want` */
     double slack;       /* tolerance with which `out` satisfies the planes */
     double *out;        /* [3] */

@@ -82,7 +82,7 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 
 /* A ball that moves along a straight path. */
 typedef struct ebpo_ball_motion {
-    const double *from, *motion; /* [3] first centre, and vector to the last one */
+    const double *from, *motion; /* [3] first centre, and vector to the last centre */
     double radius, band;         /* contact begins at a distance of radius + band */
     /* A face is ignored if the ball's distance from the face decreases by less than a slack over
      * the whole path. This slack is `least_slack` while the distance is at most the radius, and

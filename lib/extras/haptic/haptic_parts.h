@@ -13,7 +13,7 @@
 #include "extras/haptic/tool.h"
 
 enum {
-    /* Number of boxes: the current and the previous one of haptic steps, one that waits to be taken
+    /* Number of boxes: the current and the previous box of haptic steps, one that waits to be taken
      * by a step, and one that is being loaded. */
     EBPO_HAPTIC_BOXES = 4,
     EBPO_HAPTIC_FRESH = 8, /* flag that is added to the index of a box: no haptic step has taken the

@@ -123,7 +123,7 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     return true;
 }
 
-/* Examines the points of a cluster whose bounding box may hit faces. Returns false if the piece
+/* Examines the points of a cluster whose bounding ball may hit faces. Returns false if the piece
  * must be given up. */
 static bool inspect_points(const tool_piece *p, uint32_t number)
 {
@@ -422,7 +422,7 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
     return holding;
 }
 
-/* Reports the number of contacts, and the face and the point of the nearest one. */
+/* Reports the number of contacts, and the face and the point of the nearest contact. */
 static void report_contact(const ebpo_haptic *t, ebpo_haptic_tool_result *out)
 {
     const ebpo_tool_contacts *all = &t->tool->contacts;

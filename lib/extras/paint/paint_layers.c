@@ -170,9 +170,9 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks all texts, then copies them. known: the date that the layer has already. It is accepted
- * without a check, so that a date from another program can be kept. owner: the object that has
- * these texts, for messages, such as "a layer". */
+/* Checks all texts, then copies them. known: the date that the layer has already. That date is
+ * accepted without a check, so that a date from another program can be kept. owner: the object that
+ * has these texts, for messages, such as "a layer". */
 static ebpo_status check_texts(const char *const from[EBPO_PAINT_TEXTS],
                                const ebpo_paint_text_kind *kinds, const char *owner,
                                const char *known, char *to[EBPO_PAINT_TEXTS], ebpo_error *error)

@@ -350,7 +350,7 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *clash, eb
 }
 
 /* Checks that faces omitted from a file cannot change the result. If the relation is requested, any
- * omitted face may change it, because one instance may be inside the other one. */
+ * omitted face may change it, because one instance may be inside the other instance. */
 static ebpo_status check_omitted_faces(const clash_query *query, const ebpo_scene_pair *pair,
                                        ebpo_error *error)
 {

@@ -174,7 +174,7 @@ static double angle_between(const double a[4], const double b[4])
         term *= square * (2 * n - 1) / (2 * n);
         sum += term / (2 * n + 1);
     }
-    /* y^2 is about 1/2 at most, so the sum of the omitted terms is less than `term` */
+    /* y^2 is at most about 1/2, so the sum of the omitted terms is less than `term` */
     return 4 * (sum + term) * (1 + slack);
 }
 

@@ -1,11 +1,11 @@
 /* Makes a scene: adds and returns its members, and checks names and the paths of files.
  *
  * Models, routes and cameras each have a separate name space. A rule applies to the pairs of an
- * instance of one set and an instance of another set. It requires a clearance of these pairs, or
- * ignores them. It names each of the two sets by a selector: "*", the name of an instance, or the
- * name of a layer or a group with the prefix "layer:" or "group:". Every instance belongs to the
- * set of all instances, to a set that has only this instance, to the set of its layer and to the
- * sets of its groups.
+ * instance of one set and an instance of another set. The rule requires a clearance of these pairs,
+ * or ignores them. The rule names each of the two sets by a selector: "*", the name of an instance,
+ * or the name of a layer or a group with the prefix "layer:" or "group:". Every instance belongs to
+ * the set of all instances, to a set that has only this instance, to the set of its layer and to
+ * the sets of its groups.
  *
  * A scene file is untrusted input. If the options do not allow other files, it may name only files
  * in its folder or in folders below its folder. Symbolic links that lead out of the folder are

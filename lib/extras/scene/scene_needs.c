@@ -6,7 +6,7 @@
  * are rounded outwards, so that the subset of a file with this box returns the same results as the
  * whole file.
  *
- * A view needs the levels up to the first one whose cells have a diagonal of at most one pixel. A
+ * A view needs the levels up to the first level whose cells have a diagonal of at most one pixel. A
  * node's envelope and its content are both in its cell, so finer levels make no visible
  * difference. */
 #include "core/strict_fp.h"

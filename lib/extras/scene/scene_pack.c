@@ -374,7 +374,7 @@ static ebpo_status check_pack_options(packing *p, const ebpo_pack_options *optio
 }
 
 /* Makes the list of packed files for the caller, with an entry for each model. The list is made
- * before the folder is published, because nothing may fail after that. */
+ * before the folder is published, because nothing may fail after the publication. */
 static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
 {
     const ebpo_scene *scene = p->needs.scene;
