@@ -1,7 +1,7 @@
 /* Finds the faces of the first operand near the other operands.
  *
- * Every other face of the first operand is outside all other operands. So either all these faces
- * bound the result, or none of them does. */
+ * Every other face of the first operand is outside all other operands. So either all these other
+ * faces bound the result, or none of them does. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/base_faces.h"

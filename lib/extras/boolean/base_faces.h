@@ -6,7 +6,7 @@
 
 typedef struct ebpo_base_face {
     uint32_t file_face;  /* index in the file */
-    uint32_t source;     /* source index, which results have */
+    uint32_t source;     /* source index, which results give for the face */
     double corner[3][3]; /* posed */
 } ebpo_base_face;
 

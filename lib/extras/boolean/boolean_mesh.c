@@ -1,8 +1,8 @@
 /* Makes the mesh of the result of an expression. First lists the faces of the operands that are cut
  * (face_list.h), and cuts these faces along their intersections (cut_mesh.h). Then selects the
  * parts that bound the result, and joins them with the faces that are not cut (result_mesh.h). Only
- * the last step rounds, and it moves vertices without changing which triangles share them, so the
- * mesh is closed. Proof: docs/develop/booleans.md, "Mesh". */
+ * the last step rounds. Rounding moves vertices, but does not change which triangles share them, so
+ * the mesh is closed. Proof: docs/develop/booleans.md, "Mesh". */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

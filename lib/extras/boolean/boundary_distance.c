@@ -295,9 +295,9 @@ static ebpo_status measure_away_from_boundary(const measuring *m, const ebpo_bou
     return status;
 }
 
-/* Bounds the distance for a point that may be on the boundary, for example on an edge. The
- * nearest inner point and the nearest outer point have different states, so the boundary is not
- * farther away than the farther one of these points. */
+/* Bounds the distance for a point that may be on the boundary, for example on an edge. The nearest
+ * inner point and the nearest outer point have different states, so the boundary is not farther
+ * away than the farther of these two points. */
 static ebpo_status measure_unsure(const measuring *m, const ebpo_boundary_options *o,
                                   ebpo_error *error)
 {

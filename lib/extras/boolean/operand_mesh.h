@@ -38,7 +38,7 @@ typedef struct ebpo_whole_faces {
 
 #define EBPO_NO_COMPONENT UINT32_MAX
 
-/* Finds the components. paired: one bit for each face, set if the face intersects another one.
+/* Finds the components. paired: one bit for each face, set if the face intersects another face.
  * Fails with EBPO_E_FORMAT if the mesh is not closed: an edge of whole faces does not occur equally
  * often in both directions. Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_whole_faces_find(ebpo_whole_faces *out, const ebpo_mesh *mesh,

@@ -12,15 +12,15 @@ typedef struct ebpo_region_model {
 } ebpo_region_model;
 
 /* Makes the model of a box, given by its lower and its upper corner. Fails with EBPO_E_ARGUMENT if
- * a coordinate is not finite, or if on an axis the lower corner is not below the upper one. Must be
- * freed, also after a failure. */
+ * a coordinate is not finite, or if on an axis the lower corner is not below the upper corner. Must
+ * be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6],
                                           ebpo_error *error);
 
 /* Makes the model of the part of the half-space plane[0] x + plane[1] y + plane[2] z <= plane[3]
  * that is near a box. The model is a tetrahedron with one face in the plane. The corners of this
- * face are rounded to doubles: two coordinates of a corner are chosen, and the third one is the
- * double nearest to the plane. For most planes with few digits, the corners are exactly in the
+ * face are rounded to doubles: two coordinates of a corner are chosen, and the third coordinate is
+ * the double nearest to the plane. For most planes with few digits, the corners are exactly in the
  * plane. A plane that is far from the box is moved towards the box, but still does not intersect
  * the box. Fails with EBPO_E_ARGUMENT if a number is not finite or the normal is 0, and with
  * EBPO_E_LIMIT if the box is too large. Must be freed, also after a failure. */

@@ -112,9 +112,9 @@ static ebpo_status inspect_faces(ebpo_context *context, const double p[3], doubl
 }
 
 /* Decides if a cube of the world is inside or outside a posed solid. The cube is parallel to the
- * axes; half: half its edge. *may: EBPO_MAY_IN if the whole closed cube is inside, EBPO_MAY_OUT if
- * it is outside, EBPO_MAY_BOTH if a face may be in the ball around the cube. *stage: the test that
- * has decided (EBPO_CUBE_...). */
+ * axes; half: half of the cube's edge. *may: EBPO_MAY_IN if the whole closed cube is inside,
+ * EBPO_MAY_OUT if it is outside, EBPO_MAY_BOTH if a face may be in the ball around the cube.
+ * *stage: the test that has decided (EBPO_CUBE_...). */
 static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
                                  const double centre[3], double half, unsigned *may,
                                  unsigned *stage, ebpo_error *error)
@@ -166,8 +166,9 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
     if (box[0] > box[3])
         return EBPO_OK;
     double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
-    /* The origin is on a grid of 1/16 of the edge, so 15/16 of the edge must be at least `most`.
-     * 1.07 is a little more than 16/15. */
+    /* The origin is on a grid of 1/16 of the edge, so it may be up to 1/16 of the edge below the
+     * box. So 15/16 of the edge must be at least `most`, the longest side of the box. 1.07 is a
+     * little more than 16/15. */
     frexp(1.07 * most, &power);
     if (most == 0 || power < -MAX_POWER || power > MAX_POWER)
         return fail_range(most, error);

@@ -429,7 +429,7 @@ static ebpo_status divide_level(level_search *g, ebpo_error *error)
     return status == EBPO_OK ? offer_faces(g, error) : status;
 }
 
-/* Makes the next level the current one, and begins an empty next level. */
+/* Makes the next level the current level, and begins an empty next level. */
 static void swap_levels(level_search *g)
 {
     open_cell *open = g->open;

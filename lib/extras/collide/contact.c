@@ -119,7 +119,7 @@ static bool point_by_pairs(const piercing *p, double out[3])
 /* A piercing in integers, which count multiples of 2^unit. */
 typedef struct exact_piercing {
     ebpo_vectorz end[2];   /* ends of the edge */
-    ebpo_vectorz plane[3]; /* plane[0]: a point of the plane; plane[1], plane[2]: differences */
+    ebpo_vectorz plane[3]; /* plane[0]: a point of the plane; others: vectors from this point */
     ebpo_vectorz normal;   /* normal of the plane */
     mpz_t height[2];       /* heights of the ends over the plane, times the normal's length */
     mpz_t numerator;       /* an intermediate result */

@@ -196,8 +196,8 @@ static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if the face has an edge that separates it from t: all corners of t are on the outer
- * side or on the line of the edge. */
+/* Returns true if the face has an edge that separates the face from t: all corners of t are on the
+ * outer side or on the line of the edge. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)

@@ -71,11 +71,11 @@ typedef struct ebpo_posed_sides {
     bool flat;          /* all posed faces that contain the point are in one plane */
     double plane[3][3]; /* if `on`: corners of a face that contains the point */
     /* Winding numbers next to the point, on both sides of the plane: `above` is the winding number
-     * on the side of greater x. If the plane is parallel to the x axis, it is the side of greater
-     * y, and if the plane is also parallel to the y axis, the side of greater z. `below` is the
-     * winding number on the other side. `above` and `below` are equal if `on` is false. If `on` is
-     * true and `flat` is false, only `above` is valid: the winding number at some point next to the
-     * query point. */
+     * on the side of greater x. If the plane is parallel to the x axis, `above` is for the side of
+     * greater y; if the plane is also parallel to the y axis, for the side of greater z. `below` is
+     * the winding number on the other side. `above` and `below` are equal if `on` is false. If `on`
+     * is true and `flat` is false, only `above` is valid: the winding number at some point next to
+     * the query point. */
     int32_t above, below;
 } ebpo_posed_sides;
 

@@ -594,10 +594,11 @@ static ebpo_status find_relation(relation_search *r, ebpo_error *error)
     return r->status;
 }
 
-/* Adds the loads of this query to the collider's count, and sets the collider's count of bytes. The
- * queries that this query has made have added their bytes to the count, so the count is computed
- * from its value at the beginning. At the beginning of this query, count_before was the collider's
- * count of bytes, and read_before was the number of bytes that had been read from the files. */
+/* Adds the loads of this query to the collider's count of loads. Sets the collider's count of bytes
+ * to count_before plus the bytes that have been read since the beginning of this query. The sum
+ * replaces the count, because the queries that this query has made have already increased the
+ * count. At the beginning of this query, count_before was the collider's count of bytes, and
+ * read_before was the number of bytes that had been read from the files. */
 static void count_loads(const relation_search *r, uint64_t count_before, uint64_t read_before)
 {
     ebpo_collider *c = r->collision->collider;

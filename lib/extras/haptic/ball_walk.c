@@ -12,9 +12,9 @@
  * search. The search also ends if the contacts found so far hold the ball in its position.
  *
  * The planes of the contacts bound a cone of allowed motions. The walk needs the motion in the cone
- * that is nearest to the wanted motion. It is the wanted motion itself, its projection onto a plane
- * or onto the line of two planes, or 0. All these candidates are tried, because there are few
- * planes. */
+ * that is nearest to the wanted motion. This nearest motion is the wanted motion itself, its
+ * projection onto a plane or onto the line of two planes, or 0. All these candidates are tried,
+ * because there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -73,7 +73,8 @@ typedef enum ebpo_ball_end {
                            * ended, and the ball must not move to `to` */
 } ebpo_ball_end;
 
-/* Continues the piece, as far as the limits of the haptic step allow. Adds the work to *work. */
+/* Continues the piece, until it ends or a limit of the haptic step is reached. Adds the work to
+ * *work. */
 ebpo_ball_end ebpo_ball_continue(ebpo_ball_walk *w, ebpo_ball_work *work);
 
 #endif

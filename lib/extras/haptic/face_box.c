@@ -255,7 +255,7 @@ double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, ui
 /* The nearest point of a face's edges to a point p. */
 typedef struct nearest_edge_point {
     double square, offset[3]; /* offset: from the nearest point to p; square: offset . offset */
-    int edge;                 /* edge from corner `edge` to the next one */
+    int edge;                 /* edge from corner `edge` to the next corner */
     double fraction;          /* position on the edge: 0 at its first corner, 1 at its last */
 } nearest_edge_point;
 
@@ -279,8 +279,8 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest_
     }
 }
 
-/* Computes the result if the nearest point is in the interior of the face. Returns false if it is
- * not. */
+/* Computes the result if the nearest point is in the interior of the face. Otherwise returns
+ * false. */
 static bool nearest_in_interior(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
     double e[3], f[3], n[3], d[3], c[3];

@@ -310,7 +310,7 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
     return status;
 }
 
-/* Returns true if a box contains the proxy, and makes this box the current one. The previous box is
+/* Returns true if a box contains the proxy, and makes this box the current box. The previous box is
  * tested, too. It may be a box that ebpo_haptic_take_box rejected because of an earlier position of
  * the proxy. If such a box contains the new position, the loader makes no further box. */
 static bool has_box(ebpo_haptic *t)

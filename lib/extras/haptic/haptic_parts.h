@@ -106,8 +106,8 @@ struct ebpo_haptic {
     ebpo_error failure;
 };
 
-/* haptic_step.c: moves the ball's proxy towards the goal, as far as faces, the current box and the
- * limits of `work` allow. Returns bits of ebpo_haptic_flag. */
+/* haptic_step.c: moves the ball's proxy towards the goal, until faces, the end of the current box
+ * or a limit of `work` stop the proxy. Returns bits of ebpo_haptic_flag. */
 uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work);
 
 /* haptic_step.c: returns the fraction, 0 to 1, of the proxy's straight path `motion` for which all

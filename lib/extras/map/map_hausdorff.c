@@ -7,7 +7,7 @@
  * corner plus the length of the longer edge at this corner. This sum is the triangle's bound. Faces
  * are searched in batches, and a batch in rounds. A round divides all triangles with great bounds.
  * The choice of these triangles does not depend on the number of threads, so the result does not
- * depend on it. */
+ * depend on this number, either. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -120,7 +120,7 @@ static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
 }
 
 /* Finds the nearest point of the model within the distance `within`. is_found reports if there is
- * one. */
+ * such a point. */
 static ebpo_status find_nearest(ebpo_context *context, const double place[3], double within,
                                 ebpo_distance_result *out, ebpo_error *error)
 {

@@ -39,7 +39,7 @@ static ebpo_status next_evaluation(const approach_search *search,
                                    const ebpo_scene_approach_result *result, double max_motion,
                                    double *next, ebpo_error *error)
 {
-    /* the motion from result->time to `low` is short enough, to `high` it is too long */
+    /* the motion from result->time to `low` is short enough; the motion to `high` is too long */
     double low = result->time, high = search->to, at = high, length = 0;
     ebpo_status status = ebpo_scene_evaluations_motion(evaluations, low, at, &length, error);
     if (status != EBPO_OK || length < max_motion) {
@@ -188,9 +188,9 @@ typedef struct time_interval {
 typedef struct interval_search {
     ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
-    /* At some of the evaluated times, a face that a file omits may be the nearest one. The limit is
-     * the least lower bound of the distance at these times, and the result's lower bound is at most
-     * the limit. INFINITY: there is no such time. */
+    /* At some of the evaluated times, a face that a file omits may be the nearest face. The limit
+     * is the least lower bound of the distance at these times, and the result's lower bound is at
+     * most the limit. INFINITY: there is no such time. */
     double limit;
     EBPO_SCENE_LIST(time_interval, intervals); /* a heap; intervals[0] has the least `least` */
 } interval_search;

@@ -183,7 +183,7 @@ static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
 }
 
 /* Returns the default margin of a pair: 1/32 of the size of the smaller instance, or of the larger
- * one if the smaller one is a point. */
+ * instance if the smaller instance is a point. */
 static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     double a = size_of(needs->scene, pair->a, needs->from);

@@ -80,8 +80,8 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
     return rule ? rule->clearance : 0;
 }
 
-/* Applies the clearance of one rule to the clearance of a pair: the pair gets the greater one.
- * Returns false if the rule ignores the pair. */
+/* Applies the clearance of one rule to the clearance of a pair: the pair gets the greater
+ * clearance. Returns false if the rule ignores the pair. */
 static bool apply_rule(double rule_clearance, double *pair_clearance)
 {
     *pair_clearance = fmax(*pair_clearance, rule_clearance);
@@ -261,7 +261,7 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
 /* Extends the box min .. max so that it contains the instance between two times. No key of its
  * route may be between them.
  * The number of steps follows from the angle of rotation, which is estimated from the sag of the
- * whole arc: sag = max_distance * angle^2 / 8. */
+ * whole arc (its greatest distance from a straight line): sag = max_distance * angle^2 / 8. */
 static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                         ebpo_scene_extent extent, double from, double to, double min[3],
                         double max[3])
