@@ -1,5 +1,5 @@
-/* Computes the adjacency of faces: the faces at each vertex (stars), faces with equal corners, and
- * the faces at an edge, sorted around the edge by exact predicates. */
+/* Computes the adjacency of faces: the faces at each vertex (stars), faces that have the same three
+ * vertices, and the faces at an edge, sorted around the edge by exact predicates. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -35,7 +35,7 @@ static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vert
 }
 
 /* Counts, for faces begin .. end - 1, the faces in the star of each vertex, and checks their vertex
- * indices. A face with equal corners is counted once for a vertex. */
+ * indices. A face that repeats a vertex is counted once at this vertex. */
 static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -56,7 +56,7 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
 }
 
 /* Stores a face in the star of vertex v. first[v] is initially the end of the star in stars->face,
- * and counts down to its beginning. */
+ * and counts down to the beginning of the star. */
 static inline void put_face(ebpo_stars *stars, uint32_t v, uint64_t f)
 {
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
@@ -279,8 +279,9 @@ static int normal_sign(const edge *e, const double p[3], int *axis)
     return 0;
 }
 
-/* Compares the angles of two faces around the edge: less than 0 if a comes first, 0 if both have
- * the same angle. Within quarters 0 and 2 all faces have the same angle. */
+/* Compares the angles of two faces around the edge. Returns less than 0 if a comes first, 0 if both
+ * have the same angle. Quarter 0 is the angle zero and quarter 2 is a half turn, so two faces in
+ * quarter 0, or two faces in quarter 2, have the same angle. */
 static int compare_angles(const ebpo_edge_face *a, const ebpo_edge_face *b, const edge *e)
 {
     if (a->quarter != b->quarter)
@@ -288,7 +289,7 @@ static int compare_angles(const ebpo_edge_face *a, const ebpo_edge_face *b, cons
     return a->quarter % 2 ? -ebpo_orient3d(e->v, e->w, a->at, b->at) : 0;
 }
 
-/* Compares by angle, and coplanar faces by their source indices. */
+/* Compares two faces by angle. Compares coplanar faces by their source indices. */
 static int compare_turn(const void *x, const void *y, void *context)
 {
     const ebpo_edge_face *a = x, *b = y;
@@ -330,9 +331,10 @@ bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v,
     return true;
 }
 
-/* Returns true if the faces can alternate in direction, given that coplanar faces may be in any
- * order: every layer must have as many faces along the edge as its positions require. `first` is 1
- * if the face at the first position runs along the edge. */
+/* Returns true if the faces can alternate in direction when faces at the same angle may change
+ * places. Alternation requires a direction at each position of the list. So among the faces at one
+ * angle, the number of faces that run along the edge must equal the number that their positions
+ * require. `first` is 1 if the face at the first position must run along the edge. */
 static bool alternate_from(const ebpo_edge_faces *e, unsigned first)
 {
     int64_t surplus = 0;

@@ -103,8 +103,9 @@ typedef struct ebpo_edge_face {
     uint32_t face;
     uint8_t out; /* 1: the face runs from the edge's first vertex to the second vertex */
 
-    /* ebpo_edge_faces_turn sets `quarter` to `at`. quarter: angle from the first face around the
-     * edge: 0: zero; 1: less than a half turn; 2: a half turn; 3: more than a half turn */
+    /* ebpo_edge_faces_turn sets the fields from `quarter` to `at`. `quarter` classifies the angle
+     * around the edge from the face that was face[0] before sorting. 0: zero; 1: less than a half
+     * turn; 2: a half turn; 3: more than a half turn */
     uint8_t quarter;
     bool layered;    /* the face has the same angle as the previous face of the sorted list */
     bool reversed;   /* true: coplanar faces are sorted by descending source index */

@@ -238,7 +238,8 @@ ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *f
 typedef struct picking {
     ebpo_workspace *workspace;
     const ebpo_attribute *from; /* the old array */
-    const uint32_t *rows; /* [count] row of `from` for each row of `made`; no such row: zeros */
+    const uint32_t *rows; /* [count] row of `from` for each row of `made`, which is zero if `from`
+                             has no such row */
     uint64_t count;
     ebpo_attribute made; /* the new array */
 } picking;
@@ -481,7 +482,8 @@ static int length_before(const ebpo_attribute_name *name, const char *end)
     return name->n >= n && memcmp(name->s + name->n - n, end, n) == 0 ? (int)(name->n - n) : -1;
 }
 
-/* Returns the number of names if they have the endings `ends` after the same beginning, else 1. */
+/* Returns the number of endings if as many of the first names have these endings, in this order,
+ * after the same beginning. Returns 1 otherwise. */
 static unsigned count_matching(const char *const ends[4], const ebpo_attribute_name *names,
                                unsigned count)
 {

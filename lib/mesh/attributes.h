@@ -1,7 +1,7 @@
 /* Stores the attributes of a mesh: numeric data beyond positions and corners, such as colours,
- * normals and labels. Each array belongs to an *element* of the source file, as PLY files define
- * it: the vertices, the faces, or another list of equal items. Rows are in the order of the source.
- * Source: format-spec/attributes.md. For use by one thread. */
+ * normals and labels. Each array belongs to an *element* of the source file. As in PLY files, an
+ * element is a list of equal items: the vertices, the faces, or another list. Rows are in the order
+ * of the source. Specification: format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_ATTRIBUTES_H
 #define EBPO_MESH_ATTRIBUTES_H
 

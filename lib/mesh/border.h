@@ -25,8 +25,8 @@ EBPO_MUST_USE ebpo_status ebpo_border_find(ebpo_border *out, const ebpo_mesh *me
                                            unsigned threads, ebpo_error *error);
 void ebpo_border_free(ebpo_border *border);
 
-/* Returns the number of cap triangles of all loops (geometry/cap_triangles.h); a triangle of a loop
- * of weight w counts once. */
+/* Returns the number of triangles that close all loops (geometry/cap_triangles.h). Each triangle
+ * counts once, for a loop of any weight. */
 static inline uint64_t ebpo_border_cap_count(const ebpo_border *border)
 {
     return border->loop_count ? border->first[border->loop_count] - 2 * border->loop_count : 0;

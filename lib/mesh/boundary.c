@@ -1,8 +1,9 @@
 /* Finds the boundary edges of a mesh, which only one face uses, and the closed chains (loops) that
- * they form: the holes. Threads collect edges, which are then joined and sorted by their first
- * vertex. Where several loops pass one vertex, the fans of faces around this vertex decide which
- * departing edge continues an arriving edge. Loops begin at their least vertex and follow the
- * source's order, so the result depends neither on threads nor on the order of the faces. */
+ * these edges form: the borders of holes. Threads collect edges, which are then joined into one
+ * list and sorted by their first vertex. A fan is a set of faces at one vertex that are joined
+ * across edges. If several loops pass one vertex, the fans at this vertex decide which departing
+ * edge continues an arriving edge. Loops begin at their least vertex and follow the source's order,
+ * so the result depends neither on threads nor on the order of the faces. */
 #include "mesh/boundary.h"
 
 #include <stdlib.h>

@@ -44,10 +44,10 @@ typedef struct ebpo_loops {
     ebpo_workspace *workspace; /* workspace of the mesh; owns all arrays */
 } ebpo_loops;
 
-/* Sorts the edges, and joins them to chains. Where several boundaries pass one vertex, each
- * boundary continues around its fan of faces (faces joined across edges at the vertex), so that
- * fans stay separate. A chain that nevertheless returns to a vertex is split at this vertex. The
- * result depends only on the mesh in the source's order. `out` is cleared on failure. */
+/* Sorts the edges, and joins them to chains. If several boundaries pass one vertex, each boundary
+ * continues around its fan of faces (faces joined across edges at the vertex), so that fans stay
+ * separate. A chain that nevertheless returns to a vertex is split at this vertex. The result
+ * depends only on the mesh in the source's order. `out` is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary,
                                               const ebpo_stars *stars, const ebpo_mesh *mesh,
                                               unsigned threads, ebpo_error *error);

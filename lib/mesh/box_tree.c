@@ -1,5 +1,5 @@
-/* Builds box trees of points, and of items. Each item has one point, by which the tree divides the
- * items (for a face: its centre). */
+/* Builds box trees of points and of items, such as faces. The tree divides items by one point of
+ * each item, for example the centre of a face. */
 #include "core/strict_fp.h"
 
 #include "core/workspace.h"
@@ -48,7 +48,7 @@ static void swap_points(ebpo_tree_point *a, ebpo_tree_point *b)
 }
 
 /* Reorders the points (Hoare's selection): along the axis, no point before p[middle] has a greater
- * coordinate than p[middle], and no point after it a lesser one. */
+ * coordinate than p[middle], and no point after p[middle] has a lesser coordinate. */
 static void split_points(ebpo_tree_point *p, uint64_t count, uint64_t middle, int axis)
 {
     uint64_t low = 0, high = count - 1;
@@ -83,7 +83,7 @@ static void build_node(const ebpo_box_tree *tree, uint64_t node, ebpo_tree_point
 
 static bool build_nodes(ebpo_box_tree *tree)
 {
-    uint64_t nodes = 1; /* number of nodes if all leaves are as deep as the deepest one */
+    uint64_t nodes = 1; /* number of nodes if all leaves are as deep as the deepest leaf */
     for (uint64_t most = tree->count; most > EBPO_BOX_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)

@@ -28,12 +28,13 @@ typedef struct ebpo_number_groups {
 
 struct ebpo_components {
     const ebpo_mesh *mesh;
-    const ebpo_mesh_groups *named; /* the groups, in place of components; list, number and position
-                                      are then unused. NULL: components */
-    uint64_t count; /* number of components; after cavities are joined, without cavities */
+    const ebpo_mesh_groups *named; /* not NULL: the struct has these named groups in place of
+                                      components, and list, number and position are unused */
+    uint64_t count; /* number of components; cavities count until they are joined to their hosts */
     ebpo_found_component *list; /* all components, also cavities */
     ebpo_component *facts;      /* [count] results for ebpo_components_get */
-    /* [face_count] component of each face, borrowed; NULL: derived from its vertices */
+    /* [face_count] component of each face, borrowed; NULL: `number` gives the component of a face's
+     * vertices */
     uint32_t *of_face;
     uint32_t *number; /* [vertex_count] component of each vertex; EBPO_NO_INDEX: unused vertex */
     /* [vertex_count] position among the component's vertices; NULL: position_of in components.c
@@ -88,8 +89,8 @@ struct ebpo_mesh_groups {
 };
 
 /* Merges all runs with the same name into a group; "" and "default" are the same name. runs[0] has
- * the faces before the first name of the file; if there are none, runs[0] makes no group.
- * EBPO_E_LIMIT, EBPO_E_MEMORY. */
+ * the faces before the first name of the file. If no faces precede the first name, runs[0] makes no
+ * group. EBPO_E_LIMIT, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count,
                                                ebpo_mesh_groups **out, ebpo_error *error);
 

@@ -248,9 +248,9 @@ static uint64_t first_from_y(const placing *p, double y)
     return low;
 }
 
-/* Adds the crossings with a face of the host to `winding` of the cavities without a host. For each
- * cavity, a segment leads from its point along x to the greatest x of the host's box, where the
- * winding number is 0. */
+/* Adds the crossings with a face of the host to `winding` of the cavities without a host. The
+ * crossings are those of a segment along x from the cavity's point to the greatest x of the host's
+ * box, where the winding number is 0. */
 static void cross_face(placing *p, const ebpo_found_component *host, uint64_t face)
 {
     const ebpo_mesh *mesh = p->components->mesh;

@@ -54,7 +54,8 @@ static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_
         ebpo_set_join(parent, corner[0], corner[2]);
     }
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
-        parent[v] = parent[parent[v]]; /* lower vertices have their final root */
+        parent[v] = parent[parent[v]]; /* parent[v] <= v, and lower vertices already have their
+                                          final root */
 }
 
 static int compare_first(const void *x, const void *y)
@@ -81,8 +82,9 @@ static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, ui
     return EBPO_OK;
 }
 
-/* Returns the address of the component's index for face f: in of_shell, at the lowest face of its
- * shell, or in c->number, at the root of its vertices. */
+/* Returns the address at which the index of face f's component is stored. A shell is identified by
+ * its lowest face, so for a face of a shell this is the element of of_shell with this face's index.
+ * For another face, this is the element of c->number for the root of the face's vertices. */
 static uint32_t *component_address(const ebpo_components *c, const uint32_t *parent,
                                    uint32_t *of_shell, uint64_t f)
 {
@@ -166,7 +168,7 @@ ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, ebpo_num
 /* ---- joining cavities to hosts ---- */
 
 /* Numbers hosts by their first faces; the first face of a host may belong to one of its cavities.
- * new_index: the new index of each component, which for a cavity is the index of its host. */
+ * new_index: [count] the new index of each component. A cavity gets the new index of its host. */
 static void number_hosts(ebpo_components *c, uint32_t *new_index)
 {
     uint64_t count = 0;

@@ -1,6 +1,6 @@
-/* Fills holes: each boundary loop is triangulated (geometry/polygon.h). The triangles use each
- * boundary edge in the direction opposite to the direction in the adjacent face. The rest of the
- * mesh does not change. The repair record counts the additions. */
+/* Fills holes: triangulates each boundary loop (geometry/polygon.h). A new triangle and the
+ * adjacent face of the mesh use a boundary edge in opposite directions. The rest of the mesh does
+ * not change. The repair record counts the additions. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -16,8 +16,8 @@
 #include "mesh/adjacency.h"
 
 enum {
-    /* the faces at a vertex are not searched for existing edges if there are more faces than this;
-     * so the work is linear in the size of the mesh */
+    /* the faces at a vertex are searched for existing edges only if the vertex has at most this
+     * number of faces; so the work is linear in the size of the mesh */
     SEARCHED_DEGREE = 4096,
     /* numbers of vertices and of loops for each call of a thread's function */
     VERTEX_GRAIN = 1 << 13,
@@ -130,8 +130,8 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
     }
 }
 
-/* Fills a loop. Its triangles follow the triangles of the loops that precede it (f->before).
- * Returns false when out of memory. */
+/* Fills a loop. In the mesh, the new triangles follow the triangles of the loops that precede this
+ * loop (f->before). Returns false when out of memory. */
 static bool fill_loop(filling *f, scratch *s, uint64_t number)
 {
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
@@ -175,8 +175,8 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
 
 /* --- all loops --- */
 
-/* Reserves space after the mesh's faces, which do not change. The added faces get
- * the source indices after those of all source faces, including dropped faces. */
+/* Reserves space after the mesh's faces, which do not change. The source indices of the added faces
+ * follow the source indices of all source faces, including dropped faces. */
 static ebpo_status reserve_space(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;

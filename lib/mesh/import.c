@@ -1,6 +1,6 @@
 /* Reads meshes of all formats. The table `formats` has one row for each format. To add a format:
- * write NAME.c with its reader and its row, declare the row in import_build.h, and add a line to
- * the table `formats`. */
+ * write NAME.c with the format's reader and row, declare the row in import_build.h, and add a line
+ * to the table `formats`. */
 #include "core/strict_fp.h"
 
 #include "mesh/import.h"
@@ -51,8 +51,8 @@ static void drop_empty(ebpo_mesh *mesh)
 }
 
 /* Reads the file with float or double positions. Sets *again to true if the file must be read again
- * with doubles, because floats do not keep the text of a coordinate. On failure, only the workspace
- * of the mesh remains. */
+ * with doubles, because a float does not reproduce all digits of some coordinate in the file. On
+ * failure, only the workspace of the mesh remains. */
 static ebpo_status read_once(ebpo_mesh *mesh, const ebpo_import_format *format,
                              const ebpo_import_job *job, bool doubles, bool *again,
                              ebpo_error *error)
