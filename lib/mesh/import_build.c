@@ -1,5 +1,5 @@
-/* Builds the mesh for the readers of OBJ, OFF and STL: positions, triangulated polygons, vertices
- * from corners, and attributes from columns of values. */
+/* Builds the mesh for the readers of OBJ, OFF and STL. Stores positions, triangulates polygons,
+ * merges vertices at equal positions, and makes attributes from the values of corners. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -160,8 +160,8 @@ static void number_vertices(ebpo_import_build *b)
     }
 }
 
-/* Reserves space for the corners of `faces` faces in a table. Faces before the first row of the
- * table have no value. */
+/* Reserves space for the corners of `faces` faces in a table. The corners of faces that precede the
+ * table's first row have no value. */
 static bool reserve_space_in(ebpo_import_build *b, ebpo_import_table *t, uint64_t faces)
 {
     ebpo_workspace *workspace = b->mesh->workspace;
@@ -272,8 +272,8 @@ ebpo_status ebpo_import_polygon(ebpo_import_build *b)
 
 /* --- the end --- */
 
-/* Frees unused capacity, which exists because arrays grow by halves and vertices may have been
- * merged. */
+/* Frees unused capacity. Arrays have unused capacity because each growth adds half of the size, and
+ * because vertices may have been merged. */
 static void trim_arrays(ebpo_mesh *mesh, size_t position_size)
 {
     if (mesh->workspace)
@@ -452,8 +452,8 @@ static ebpo_status place_in_lists(const placing *p)
     return status;
 }
 
-/* Converts values to bytes in the same memory. Byte i is within values[0] to values[i], so no value
- * is overwritten before it is read. */
+/* Converts values to bytes in the same memory. Byte i is stored in values[i / 4], which has already
+ * been read. */
 static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;
@@ -519,7 +519,7 @@ static inline uint64_t weld_positions(char *xyz, size_t size, uint64_t count, ui
         const char *position = xyz + 3 * size * i;
         const uint64_t key[3] = { bits_of(position, size), bits_of(position + size, size),
                                   bits_of(position + 2 * size, size) };
-        uint64_t at; /* slot of an equal vertex, or the free slot for it */
+        uint64_t at; /* slot of a vertex at the same position, or the free slot for i */
         EBPO_HASH_FIND(at, ebpo_hash_three(key), slots - 1,
                        table[at] == EMPTY || has_key(xyz + 3 * size * table[at], size, key));
         if (table[at] == EMPTY) {

@@ -1,7 +1,8 @@
 /* Builds a mesh from a file with vertices, faces and values of corners.
  *
- * The mesh has one vertex for each position that faces use, in the order of first use: OBJ and OFF
- * files often, and STL files always, repeat the vertices of adjacent faces. */
+ * The mesh has one vertex for each position that faces use, in the order of first use. Vertices at
+ * equal positions are merged, because OBJ and OFF files often, and STL files always, repeat the
+ * vertices of adjacent faces. */
 #ifndef EBPO_MESH_IMPORT_BUILD_H
 #define EBPO_MESH_IMPORT_BUILD_H
 
@@ -13,8 +14,8 @@
 
 #include "core/text.h"
 
-#define EBPO_IMPORT_MAX  (UINT64_C(0xfffffffe))
-#define EBPO_IMPORT_NONE UINT32_MAX /* not a vertex index */
+#define EBPO_IMPORT_MAX  (UINT64_C(0xfffffffe)) /* greatest number of vertices, or of triangles */
+#define EBPO_IMPORT_NONE UINT32_MAX             /* not a vertex index */
 
 /* The sorts (kinds) of values to which corners refer; the index of a table. */
 typedef enum ebpo_import_sort {
@@ -53,7 +54,7 @@ typedef struct ebpo_import_build {
     locale_t c_locale; /* for parsing numbers with a decimal point */
 
     bool doubles;         /* positions are doubles, otherwise floats */
-    bool loses_digits;    /* floats do not keep the text of a coordinate */
+    bool loses_digits;    /* some coordinate has more digits than a float keeps */
     uint64_t rounded;     /* number of table values that floats round */
     size_t position_size; /* bytes */
     void *xyz;            /* [vertices][3] positions of the file's vertices */
@@ -73,7 +74,7 @@ typedef struct ebpo_import_build {
 EBPO_MUST_USE ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mesh, const char *name,
                                             bool attributes, bool doubles, ebpo_error *error);
 
-/* Parses s[0 .. n) as a coordinate: the nearest float or double. Returns false if it is not a
+/* Parses s[0 .. n) as a coordinate: the nearest float or double. Returns false if the text is not a
  * number. */
 bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, size_t n);
 
@@ -82,11 +83,13 @@ bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, 
 void ebpo_import_quotient(ebpo_import_build *b, double *value, const char *s, size_t n,
                           double weight);
 
-/* Parses a value of a row: the nearest float. Returns false if it is not a number. */
+/* Parses s[0 .. n) as a value of a row: the nearest float. Returns false if the text is not a
+ * number. */
 bool ebpo_import_value(ebpo_import_build *b, float *value, const char *s, size_t n);
 
 /* Adds a vertex of the file. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. EBPO_E_UNSUPPORTED, without a
- * message: floats do not keep the text (`loses_digits`); read the file again with doubles. */
+ * message: some coordinate has more digits than a float keeps (`loses_digits`), and the file must
+ * be read again with doubles. */
 EBPO_MUST_USE ebpo_status ebpo_import_position(ebpo_import_build *b, const double xyz[3]);
 
 /* Adds a vertex of a binary file, which holds floats. */
@@ -138,7 +141,8 @@ EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t cou
 
 /* Runs of faces, each with a name. */
 typedef struct ebpo_import_runs {
-    ebpo_named_run *run; /* [count] the first run precedes any name; its name is "" */
+    ebpo_named_run
+        *run; /* [count] the first run has the name "" and the faces before the first name */
     uint64_t count, capacity;
 } ebpo_import_runs;
 

@@ -1,5 +1,5 @@
-/* Handles complete meshes: the name in messages, the check of the shape, copying, freeing, and the
- * frame in which coordinates can be multiplied without overflow. */
+/* Handles complete meshes: the name in messages, the check of counts and arrays, copying, freeing,
+ * and the frame in which coordinates can be multiplied without overflow. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -126,7 +126,8 @@ int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
     return ebpo_attributes_hold(mesh->attributes);
 }
 
-/* Raises greatest[k] to the vertex's absolute coordinate along axis k, if this is greater. */
+/* Raises greatest[k] to the absolute value of the vertex's coordinate along axis k, if this value
+ * is greater. */
 static void include_vertex(double greatest[3], const ebpo_mesh *mesh, uint64_t vertex)
 {
     double p[3];

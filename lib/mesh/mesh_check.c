@@ -566,8 +566,9 @@ static void skip_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
     } while (r->at < r->end && p[0] == first[0] && p[1] == first[1] && p[2] == first[2]);
 }
 
-/* Finds repeated positions in an arranged mesh. Either all vertices form one run (`grouped`), or
- * the used vertices form a run and the unused vertices form another run. */
+/* Finds repeated positions in an arranged mesh, whose vertices are sorted along the Morton curve.
+ * Either all vertices form one run (`grouped`), or the used vertices form a run and the unused
+ * vertices form another run. */
 static void compare_along_curve(const ebpo_check *check)
 {
     const ebpo_mesh *mesh = check->mesh;

@@ -11,17 +11,17 @@
 #include "mesh/adjacency.h"
 #include "mesh/sum.h"
 
-/* The units of measurement. Along axis k, the unit of length is 2^exponent[k]. All exponents are 0
- * unless squares and cubes could leave the range of doubles. */
+/* The units of measurement. Along axis k, the unit of length is 2^exponent[k]. An exponent differs
+ * from 0 only if squares or cubes of coordinates could leave the range of doubles. */
 typedef struct ebpo_units {
     bool scaled; /* false: all exponents are 0 */
     int exponent[3];
     int length, area, volume; /* exponents of the units of lengths, areas and volumes */
 } ebpo_units;
 
-/* A location that was found during the check: a and b are indices in the current mesh. They are the
- * vertices of an edge, or a vertex, or a face. For a repeated face, `b` is the first face with the
- * same vertices. */
+/* A location that was found during the check: a and b are indices in the current mesh. For an edge,
+ * a and b are the two vertices of the edge. For a vertex or a face, a and b are equal. For a
+ * repeated face, `b` is the first face with the same vertices. */
 typedef struct ebpo_found {
     uint32_t kind;     /* ebpo_finding_kind */
     uint32_t location; /* source index, as in ebpo_finding.locations */
@@ -120,8 +120,9 @@ EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *err
 /* Computes the area and the volume (relative to the box's centre), finds faces of zero area and
  * with repeated indices, and joins components. ebpo_check_vertices must have been called. */
 EBPO_MUST_USE ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error);
-/* Finds edges, bow-ties and repeated faces; computes the mean edge and the number of components.
- * ebpo_check_faces must have been called. */
+/* Counts edges. Finds edges with findings, bow-ties (vertices whose faces form several fans) and
+ * repeated faces. Computes the mean edge and the number of components. ebpo_check_faces must have
+ * been called. */
 EBPO_MUST_USE ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error);
 /* Finds repeated positions. */
 EBPO_MUST_USE ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error);

@@ -36,7 +36,7 @@ typedef struct findings_picture {
 static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error);
 /* Shows a finding at these faces (indices in the current mesh). A face with several findings shows
- * the finding of the lowest kind. */
+ * the kind with the lowest number. */
 static void record_in_picture(findings_picture *picture, const ebpo_found *found,
                               const uint64_t *faces, uint64_t count);
 /* Writes the picture. `report` is for the legend. */
@@ -95,8 +95,8 @@ typedef struct keyed {
     ebpo_found found;
 } keyed;
 
-/* Keys shifted right by this number of bits are below EBPO_SORT_BINS, as ebpo_sort requires: a kind
- * has at most four bits. */
+/* A key has at most 36 bits: 4 for the kind and 32 for the index. Shifted right by KEY_SHIFT, a key
+ * is below EBPO_SORT_BINS, as ebpo_sort requires. */
 enum { KEY_SHIFT = 18 };
 
 typedef struct sorting {

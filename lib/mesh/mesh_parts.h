@@ -15,8 +15,8 @@
 /* The order of a mesh whose vertices and faces are sorted along a Morton curve (ebpo_mesh_arrange),
  * or whose faces were partly dropped. */
 struct ebpo_arrangement {
-    /* the box around the referenced vertices (vertices that faces use), with exact cell faces down
-     * to box.grid_level */
+    /* the box around the referenced vertices (vertices that faces use); the coordinates of cell
+     * faces are exact down to the level box.grid_level */
     ebpo_box box;
     /* number of referenced vertices, which come first, along the curve; unreferenced vertices
      * follow, also along the curve */
@@ -34,7 +34,7 @@ struct ebpo_arrangement {
     /* for a component: numbers of vertices and faces of the mesh that contains the component;
      * otherwise 0 */
     uint64_t whole_vertices, whole_faces;
-    /* faces of the source that were dropped later; their indices are unused */
+    /* number of source faces that were dropped later; no face has their source indices */
     uint64_t dropped_faces;
 };
 
@@ -55,8 +55,9 @@ static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f)
     return mesh->arrangement ? mesh->arrangement->face_source[f] : f;
 }
 
-/* Returns the number of source indices; for a component, the number of the mesh that contains it.
- */
+/* Returns the number of vertices of the mesh; for a component, of the mesh that contains the
+ * component. All source indices of vertices are below this number. ebpo_mesh_whole_faces: the same
+ * for faces. */
 static inline uint64_t ebpo_mesh_whole_vertices(const ebpo_mesh *mesh)
 {
     return mesh->arrangement && mesh->arrangement->whole_vertices
@@ -91,7 +92,8 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
 }
 
 /* Returns true if a sum of `count` rounded volume terms, the largest of which is `greatest`, may be
- * rounding noise: a closed surface whose two sides coincide has no volume. */
+ * rounding noise. For example, a closed surface whose two sides coincide has the volume 0, but the
+ * rounded sum may differ from 0. */
 static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double greatest)
 {
     return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * greatest;
@@ -105,8 +107,8 @@ static inline void ebpo_face_turn(uint32_t face[3])
     face[2] = v;
 }
 
-/* Repair steps. EARLIER: with ORIENT, orients as earlier versions of this library did: does not
- * turn components whose faces are already consistent. */
+/* Repair steps. EARLIER has an effect with ORIENT only: the faces are oriented as by earlier
+ * versions of this library, which did not turn components whose faces are already consistent. */
 enum {
     EBPO_REPAIR_WELD = 1,
     EBPO_REPAIR_ORIENT = 2,
@@ -116,9 +118,9 @@ enum {
     EBPO_REPAIR_DROP = 32
 };
 
-/* Performs the requested steps: merges vertices (within weld_distance of each other if it is above
- * 0, else at equal positions), drops faces, orients, flips, fills holes, and orients the components
- * that filling holes has closed. */
+/* Performs the requested steps: merges vertices (within weld_distance of each other, or at equal
+ * positions if weld_distance is 0), drops faces, orients, flips, fills holes, and orients the
+ * components that filling holes has closed. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                            ebpo_repair_record *record, ebpo_error *error);
 

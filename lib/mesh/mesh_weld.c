@@ -1,6 +1,6 @@
 /* Welds vertices. A group of vertices at one position, or within a distance of each other
  * (weld_within.c), becomes one vertex: the first vertex of the group in the source. The attributes
- * of this vertex stay. */
+ * of this vertex stay. An *arranged* mesh is sorted along a Morton curve (ebpo_mesh_arrange). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -39,7 +39,7 @@ static inline bool same_key(const key *a, const key *b)
 }
 
 /* Inserts vertex v. Returns true if the position was already present. After all insertions, in any
- * order, the slot of a position has its lowest vertex. */
+ * order, the slot of a position holds the lowest vertex at this position. */
 static bool insert_position(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);

@@ -24,7 +24,8 @@
 
 /* Counts of data in the file that the mesh cannot store. */
 typedef struct obj_losses {
-    /* number of vertices divided by w, and of vertices with extra values */
+    /* number of vertices whose coordinates were divided by a weight w, and number of vertices with
+     * extra values */
     uint64_t weights, surplus;
     /* numbers of curve statements and of unknown statements, and the line of the first unknown
      * statement */
@@ -45,8 +46,8 @@ typedef struct obj_reading {
     ebpo_obj_text text;
     uint64_t next_release;            /* offset at which pages are released again */
     uint64_t line;                    /* line where the statement begins */
-    uint64_t rows[EBPO_IMPORT_SORTS]; /* numbers of vertices, normals and texture coordinates: in
-                                         the file, or, in the second pass, read so far */
+    uint64_t rows[EBPO_IMPORT_SORTS]; /* numbers of vertices, normals and texture coordinates that
+                                         the current pass has read */
     ebpo_import_runs *runs;           /* NULL if not requested */
     obj_losses losses;
     ebpo_obj_names names;
@@ -185,7 +186,7 @@ static bool same_word(ebpo_obj_word a, ebpo_obj_word b)
 }
 
 /* Returns the slot of the name's index, or the free slot in which it belongs. 0 marks a free slot,
- * because index 0 has no name. */
+ * because index 0 (faces without a named material) is not in the table. */
 static uint64_t find_slot(const ebpo_obj_names *names, ebpo_obj_word word)
 {
     uint64_t at;
@@ -513,7 +514,7 @@ static void record_other(obj_reading *r, ebpo_obj_word word)
 }
 
 /* Reads a statement in the second pass. Vertices, normals and texture coordinates are only counted,
- * for negative indices. */
+ * because negative indices count back from the latest value. */
 static ebpo_status read_statement(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS],
                                   ebpo_obj_word word)
 {

@@ -34,8 +34,8 @@ static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
-/* Returns true if a comment begins. A comment may follow a word without a blank, but not in 1.#INF
- * and 1.#IND, which older programs write for non-finite values. */
+/* Returns true if a comment begins. A comment may follow a word without a blank. In 1.#INF and
+ * 1.#IND, which older programs write for non-finite values, the character # begins no comment. */
 static bool begins_comment(const char *word, const char *at, const char *end)
 {
     return *at == '#' && !(at - word >= 2 && at[-2] == '1' && at[-1] == '.' && end - at > 1 &&
@@ -94,7 +94,7 @@ static uint64_t count_lines(const off_text *t)
 }
 
 enum {
-    MAX_REST = 16,    /* number of words of the rest that are stored; more words are never valid */
+    MAX_REST = 16,    /* stored words of off_reading.rest; a valid rest is shorter */
     RELEASE = 1 << 22 /* bytes between two releases of pages */
 };
 
@@ -146,8 +146,8 @@ static ebpo_status fail_line(const off_reading *r, const char *format, ...)
 
 /* Reads the first word: the optional letters ST, C, N, 4 and n in this order, which declare the
  * vertex values, then OFF. Returns the length up to the end of OFF, or 0 if OFF is missing. (In
- * ModelNet's files, the first count follows OFF without a blank, as in OFF8.) Sets the values of r,
- * unless r is NULL, and *dimension: the letter n is present. */
+ * ModelNet's files, the first count follows OFF without a blank, as in OFF8.) If r is not NULL,
+ * records the declared values in r. *dimension: true if the letter n is present. */
 static size_t read_kind(off_word word, off_reading *r, bool *dimension)
 {
     const char *s = word.s, *end = s + word.n;
@@ -289,7 +289,8 @@ static bool next_needed(off_reading *r, bool first, off_word *word)
                                           : next_word_here(&r->text, word);
 }
 
-/* Reads the rest of the line. With several rows per line, the rest belongs to the next rows. */
+/* Reads the rest of the line. With several rows per line, the remaining words belong to the next
+ * rows, and r->rest becomes empty. */
 static void read_rest(off_reading *r)
 {
     off_word word;
@@ -403,8 +404,9 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
     return status == EBPO_OK ? keep_rest(r) : status;
 }
 
-/* Stores the colour of a face, if its rest is one. *row: its row in the table of colours, or
- * EBPO_IMPORT_NONE. A rest of a single value is an index into a colour table of another program. */
+/* Stores the colour of a face if r->rest is a colour. *row: the colour's row in the table of
+ * colours, or EBPO_IMPORT_NONE. A rest of a single value is an index into a colour table of another
+ * program. */
 static ebpo_status keep_face(off_reading *r, uint32_t *row)
 {
     ebpo_import_table *t = &r->build->table[EBPO_IMPORT_COLOURS];

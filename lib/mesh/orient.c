@@ -1,7 +1,8 @@
-/* Makes neighbouring faces consistent. Faces joined by edges with two faces form patches, whose
- * faces get one orientation. At *crowded* edges, which have more than two faces, patches are joined
- * in the order of the angles around the edge. Decisions are exact and do not depend on threads.
- * (shell_nesting.c then turns each closed patch outwards, or inwards if it bounds a cavity.)
+/* Makes neighbouring faces consistent, so that two neighbours use their common edge in opposite
+ * directions. Faces joined by edges with two faces form patches, whose faces get one orientation.
+ * At *crowded* edges, which have more than two faces, patches are joined in the order of the angles
+ * around the edge. Decisions are exact and do not depend on threads. (shell_nesting.c then turns
+ * each closed patch outwards, or inwards if it bounds a cavity.)
  *
  * A face *runs against* another face of its patch if the orientations of the two faces are not
  * consistent. The root of a patch is its lowest face. */
@@ -22,7 +23,7 @@
 enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };
 
 /* Flags of faces, collected at the root of their patch.
- * - OPEN: the patch does not use some crowded edge equally often in both directions.
+ * - OPEN: there is a crowded edge that the patch does not use equally often in both directions.
  * - INCONSISTENT: two adjacent faces have opposite orientations.
  * - TWISTED: no orientation of the faces is consistent.
  * - BOUNDARY: the patch has an edge with one face.
@@ -47,7 +48,8 @@ enum {
  * crowded edges if that closes the patch (join_crowded). */
 typedef struct patch {
     uint32_t root;
-    uint32_t seed; /* first face in the source; it decides the orientation when nothing else does */
+    uint32_t seed; /* first face in the source; keeps its orientation if neither the volume nor the
+                      number of turned faces decides */
     bool closed;   /* every edge has a face on its other side */
     bool seed_turned; /* the seed runs against the root */
     /* true: turn the seed and the faces that do not run against it; false: turn the other faces */
@@ -265,7 +267,7 @@ static void flag_unbalanced(orienting *o, ebpo_edge_faces *e, uint8_t flags)
     }
 }
 
-/* Marks the patches with the flag OPEN that are unbalanced around an edge. */
+/* Sets the flag OPEN of the patches that do not use the edge equally often in both directions. */
 static ebpo_status find_open(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                              unsigned worker, ebpo_error *error)
 {
@@ -277,7 +279,8 @@ static ebpo_status find_open(orienting *o, const ebpo_link *links, uint64_t uses
     return EBPO_OK;
 }
 
-/* Marks the patches with the flag UNBALANCED that are unbalanced around an edge. */
+/* Sets the flag UNBALANCED of the joined patches that do not use the edge equally often in both
+ * directions. */
 static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                    unsigned worker, ebpo_error *error)
 {
@@ -289,8 +292,8 @@ static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_
     return EBPO_OK;
 }
 
-/* Joins faces of patches that are OPEN, so that around the edge, regions inside and outside of a
- * solid alternate. */
+/* Joins faces of patches that are OPEN, so that the inside and the outside of a solid alternate
+ * around the edge. */
 static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                unsigned worker, ebpo_error *error)
 {
@@ -318,9 +321,10 @@ static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t us
     return EBPO_OK;
 }
 
-/* Separates patches that the joining did not close, because the orientations that their edges
- * demand contradict each other. Exception: patches whose faces already alternated around every
- * edge before the joining stay joined, whatever the order of coplanar layers. */
+/* Separates the parts of a joined patch that is not closed, or whose crowded edges demand
+ * contradictory orientations. Exception: a joined patch without the flag INCONSISTENT stays joined.
+ * Its faces were consistent and alternated in direction around every crowded edge before the
+ * joining, for some order of coplanar faces. */
 static void separate_patches(orienting *o)
 {
     const uint8_t bad = CONTRADICTED | UNBALANCED;
@@ -480,8 +484,8 @@ static ebpo_status measure_patches(void *context, uint64_t begin, uint64_t end, 
     return EBPO_OK;
 }
 
-/* Decides which faces of a patch are turned, so that its volume is positive, or, without a volume,
- * so that as few faces as possible are turned. */
+/* Decides which faces of a patch are turned, so that the patch has a positive volume. If the patch
+ * has no volume, as few faces as possible are turned. */
 static void decide_direction(patch *p)
 {
     double volume = p->closed ? ebpo_sum_value(&p->volume) : 0;

@@ -10,7 +10,7 @@ bool ebpo_ply_recognise(const uint8_t *data, uint64_t size);
 /* Parses a PLY file. `name` (a path or any other name) appears in messages and, without folders, in
  * the mesh. Sets source_size and source_format; the caller sets source_sha256. Reads ascii files,
  * and binary files of both byte orders, with elements (lists of vertices, faces or other items) in
- * any order. Skips data other than positions and faces unless `attributes` is true. Bytes after the
+ * any order. If `attributes` is false, skips data other than positions and faces. Bytes after the
  * last element are allowed. Errors: EBPO_E_FORMAT with the line (ascii) or byte offset (binary);
  * EBPO_E_LIMIT above 2^32 - 2 vertices or faces. Safe for untrusted bytes; the memory is at most a
  * small multiple of `size`. On failure `out` is cleared. `workspace` (NULL: none) holds the arrays.

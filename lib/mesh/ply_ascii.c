@@ -1,6 +1,6 @@
 /* Reads the body of an ascii PLY file. White space separates values, so a long list may span
- * several lines. A row ends with its line. Extra values on a line, such as MeshLab has written, are
- * counted and skipped; otherwise all following rows would be read wrongly. */
+ * several lines. A row ends with its line. Extra values at the end of a line, such as MeshLab has
+ * written, are counted and skipped. Without skipping, all following rows would be read wrongly. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

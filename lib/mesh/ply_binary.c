@@ -284,8 +284,8 @@ static ebpo_status read_vertices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* Lowers t->deviates to `row`, if it is greater. Returns an error, which ends the calling thread's
- * range. */
+/* Lowers t->deviates to `row` if t->deviates is greater. Returns an error, which ends the calling
+ * thread's range. */
 static ebpo_status record_deviation(plain *t, uint64_t row)
 {
     uint64_t lowest = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
@@ -369,9 +369,10 @@ static ebpo_status run_on_rows(plain *t, ebpo_task_fn task)
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-/* These two functions read rows of equal size from p->at on, and set *done to the number of rows:
- * all vertices or none; the faces before the first face that is not a triangle or has an invalid
- * vertex index. The row-by-row reader reads the other rows and reports their errors. */
+/* read_plain_vertices and read_plain_faces read rows of equal size from p->at on, and set *done to
+ * the number of rows that were read. read_plain_vertices reads all rows or none. read_plain_faces
+ * reads the rows before the first face that is not a triangle or has an invalid vertex index. The
+ * row-by-row reader reads the other rows and reports their errors. */
 static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
                                        bool swap, uint64_t *done)
 {

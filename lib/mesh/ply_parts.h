@@ -129,8 +129,8 @@ typedef struct ebpo_ply_parser {
     ebpo_error *error;
 } ebpo_ply_parser;
 
-/* Returns EBPO_E_FORMAT with "name: line 17: ..." or "name: byte 1234: ...", from the parser's
- * position. */
+/* Returns EBPO_E_FORMAT with a message that begins with the parser's position: "name: line 17: ..."
+ * or "name: byte 1234: ...". */
 ebpo_status ebpo_ply_fail(const ebpo_ply_parser *p, const char *format, ...) EBPO_PRINTF(2, 3);
 /* Reports that the file ends within row `row` of `element`. */
 ebpo_status ebpo_ply_fail_end(const ebpo_ply_parser *p, const ebpo_ply_element *element,
@@ -150,8 +150,8 @@ ebpo_status ebpo_ply_fail_stopped(const ebpo_ply_parser *p);
 /* Creates arrays for the header's properties, with space for the declared rows. The functions of
  * this section do nothing if attributes are not read (ebpo_ply_parser.lost is NULL). */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_plan(ebpo_ply_parser *p);
-/* Call this function after the last row: it moves the values into the mesh. Keeps the header if it
- * has information that the mesh lacks. */
+/* Completes the attributes after the last row. Removes arrays with values that do not fit their
+ * type, and keeps the header if it has information that the mesh lacks. */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p);
 
 /* Reserves space for a total of `faces` faces. */
@@ -207,7 +207,7 @@ ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *
 /* Separates two strips in the corners of one row. No vertex has this index. */
 #define EBPO_PLY_RESTART UINT32_MAX
 
-/* Clears the corners and makes space for `count` new ones. */
+/* Clears the corners and makes space for `count` new corners. */
 ebpo_status ebpo_ply_reserve_corners(ebpo_ply_parser *p, uint64_t count);
 /* Reports a vertex index that does not exist. `row` is the index of the face. */
 ebpo_status ebpo_ply_fail_index(const ebpo_ply_parser *p, const ebpo_ply_element *element,
