@@ -149,7 +149,8 @@ static void add_position(making *m, ebpo_ply_role role, ebpo_ply_type wanted, eb
 }
 
 /* Adds the property of the corners, a list. count: type of the list length. wanted: type of the
- * vertex indices, if it holds all of them. line: as for add_position. */
+ * vertex indices if this type holds all of them. line: the line of the source header, or an empty
+ * line. */
 static void add_corners(making *m, ebpo_ply_type count, ebpo_ply_type wanted, ebpo_ply_word name,
                         ebpo_ply_word line)
 {

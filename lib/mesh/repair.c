@@ -1,6 +1,6 @@
 /* Repairs a mesh: performs the requested repairs in a fixed order. Separate functions remove
- * repeated faces, and count the faces whose corners have the same positions as the corners of
- * another face. */
+ * repeated faces (faces with the same three vertices as another face), and count the faces whose
+ * corners have the same positions as the corners of another face. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -107,7 +107,7 @@ static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
 }
 
 /* Removes the marked faces in place. Sorted faces stay sorted. Every vertex that had a face still
- * has one, because the first of the repeated faces stays. */
+ * has a face, because the first of the repeated faces stays. */
 static void remove_marked(const dropping *d)
 {
     ebpo_mesh *mesh = d->mesh;

@@ -1,10 +1,10 @@
 /* Computes the nesting of closed shells and turns each shell outwards, or inwards if it bounds a
- * cavity. Six sample points represent a shell (shell_nesting.h). A host is a shell that may contain
- * other shells; its probes are the samples of the shells whose boxes are within its box. For most
- * hosts, each face is tested against the probes near the face. A host with many probes for its
- * number of faces is crowded. For all crowded hosts together, rays from the samples of all shells
- * are tested against a tree of the hosts' faces. Decisions are exact (geometry/predicates.h), so
- * the result does not depend on threads. */
+ * cavity. Six vertices, the samples, represent a shell (shell_nesting.h). A host is a shell that
+ * may contain other shells; its probes are the samples of the shells whose boxes are within the
+ * host's box. For most hosts, each face is tested against the probes near the face. A host with
+ * many probes for its number of faces is crowded. For all crowded hosts together, rays from the
+ * samples of all shells are tested against a tree of the hosts' faces. Decisions are exact
+ * (geometry/predicates.h), so the result does not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -151,7 +151,8 @@ static int by_number(const void *x, const void *y)
     return (a->number > b->number) - (a->number < b->number);
 }
 
-/* Counts the host in the depth of each shell whose samples are all within the host. */
+/* Adds 1 to the depth of each shell whose samples are all within the host, and adds the host's
+ * winding number at a sample to shell.around. */
 static void count_inner(const seeker *w)
 {
     const ebpo_tree_point *p = w->probes.point;
@@ -284,8 +285,8 @@ static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
-/* Counts the hosts that contain all samples so far. *around: the sum of their crossings at the
- * first sample. */
+/* Counts the hosts that contain all samples so far. *around: the sum of the crossings with these
+ * hosts by the ray from the first sample. */
 static uint32_t count_hosts(const caster *w, int32_t *around)
 {
     uint32_t count = 0;
@@ -416,8 +417,9 @@ enum {
 
 /* ---- extreme points of each shell ---- */
 
-/* Returns true if a comes before b along direction d: by the coordinate along d, then by all
- * coordinates, so that only equal positions are equal. */
+/* Returns true if a comes before b in direction d, which is ascending (even d) or descending (odd
+ * d) along the axis d / 2. If the coordinates along this axis are equal, compares all coordinates,
+ * so that only equal positions are equal. */
 static bool comes_before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;

@@ -199,9 +199,8 @@ static ebpo_status fail_head(const ebpo_import_build *b, const uint8_t *data, ui
                           word);
 }
 
-/* Reads the facets as vertices, three for each, and records unread bytes. If the file has one
- * model, whose facets may have attribute bytes, sets *plain to the size of this model, otherwise to
- * 0. */
+/* Reads the facets as vertices, three for each, and records unread bytes. If the file has one model
+ * and no bytes between facets, sets *plain to the size of this model, otherwise to 0. */
 static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64_t size,
                                uint64_t *plain)
 {
@@ -324,12 +323,12 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
     return status;
 }
 
-/* Adds the face attributes `attribute` (the attribute words, unless all are 0) and `red green blue`
- * (unless no face has a colour). A word has five bits for each channel. In files with COLOR= in the
- * first 80 bytes (Magics), the lowest five bits are red, and the word is a colour if bit 15 is 0;
- * other faces have the colour after COLOR=. In other files (VisCAM), the lowest five bits are blue,
- * and the word is a colour if bit 15 is 1; other faces are white. The mesh must have the faces of
- * the file. EBPO_E_MEMORY, EBPO_E_IO. */
+/* Adds the face attribute `attribute` (the attribute words) if some word is not 0, and the face
+ * attribute `red green blue` if some face has a colour. A word has five bits for each channel. In
+ * files with COLOR= in the first 80 bytes (Magics), the lowest five bits are red, and the word is a
+ * colour if bit 15 is 0; other faces have the colour after COLOR=. In other files (VisCAM), the
+ * lowest five bits are blue, and the word is a colour if bit 15 is 1; other faces are white. The
+ * mesh must have the faces of the file. EBPO_E_MEMORY, EBPO_E_IO. */
 static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
                                     ebpo_error *error)
 {
@@ -361,8 +360,8 @@ static bool begins_solid(const uint8_t *data, uint64_t size)
            (size == 5 || is_blank((char)data[5]));
 }
 
-/* Returns true for the bytes of an STL file: binary if the declared faces fill the file, regardless
- * of its first bytes; otherwise text that begins with the word solid. */
+/* Returns true for the bytes of an STL file. A file is STL if it begins with the word solid, or if
+ * it consists of binary models, regardless of its first bytes. */
 static bool has_stl_signature(const uint8_t *data, uint64_t size)
 {
     return begins_solid(data, size) || fits_binary(data, size);
@@ -490,8 +489,8 @@ static ebpo_status read_loop(stl_text *t)
     return status;
 }
 
-/* Returns true if the words of a facet after `facet`, up to its first coordinate, begin at t->at.
- * Such words cannot be part of a name. */
+/* Returns true if the text at t->at, after the word `facet`, continues like a facet up to its first
+ * coordinate. Such text cannot be part of a name. */
 static bool holds_facet(const stl_text *t)
 {
     stl_text ahead = *t;
@@ -591,8 +590,8 @@ static bool is_text(const uint8_t *data, uint64_t size)
     return memchr(data, 0, checked) == NULL;
 }
 
-/* Builds the mesh. A file named .stl is text if it begins with the word solid and contains the word
- * facet. Normals are not read, because they follow from the corners. */
+/* Builds the mesh. The function is_text decides if the file is text or binary. Normals are not
+ * read, because they follow from the corners. */
 static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 {
     const uint8_t *data = job->data;

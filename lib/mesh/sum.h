@@ -1,6 +1,6 @@
-/* Sums doubles exactly: a sum of millions of terms, rounded once, independent of their order. Uses
- * a fixed-point number wide enough for all doubles, in limbs of 32 bits with delayed carries
- * (Kulisch's long accumulator). */
+/* Sums millions of doubles exactly and rounds only the result, so the result does not depend on the
+ * order of the terms. Uses a fixed-point number wide enough for all doubles, in limbs of 32 bits
+ * with delayed carries (Kulisch's long accumulator). */
 #ifndef EBPO_MESH_SUM_H
 #define EBPO_MESH_SUM_H
 
@@ -11,8 +11,8 @@
 
 #include "core/wide.h"
 
-/* LIMBS: size of the number, which has the bits from 2^-1074 to 2^1024, and space for 2^62 terms.
- * CARRY: number of additions after which carries are propagated. */
+/* LIMBS: number of limbs, which hold the bits from 2^-1074 to 2^1024 and leave space for sums of
+ * 2^62 terms. CARRY: number of additions after which carries are propagated. */
 enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };
 
 typedef struct ebpo_sum {

@@ -1,5 +1,5 @@
 /* Stores the image files that a source (mesh file) names. Each image is a row of the element
- * `ebpo:texture` of the attributes (mesh/attributes.h), with lists of bytes. Source:
+ * `ebpo:texture` of the attributes (mesh/attributes.h), with lists of bytes. Specification:
  * format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_TEXTURES_H
 #define EBPO_MESH_TEXTURES_H
@@ -49,9 +49,9 @@ EBPO_MUST_USE ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
 bool ebpo_textures_good(const ebpo_attributes *all);
 
 /* Keeps all rows with names, uses and digests, but only the bytes of images that these faces
- * (source indices) use: by the name of the attribute `material`, or by the attribute `texnumber`,
- * which is an index into the TextureFile comments of a PLY file. Images that cannot be assigned to
- * faces keep their bytes. EBPO_E_MEMORY, EBPO_E_IO. */
+ * (source indices) use. A face refers to its image by the attribute `material`, whose material uses
+ * the image, or by the attribute `texnumber`, an index into the TextureFile comments of a PLY file.
+ * Images that cannot be assigned to faces keep their bytes. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
                                                    uint64_t count, ebpo_error *error);
 

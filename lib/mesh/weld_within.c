@@ -22,7 +22,7 @@ enum {
 
 /* The edge of a grid cell is twice the distance. Indices of cells are below 2^49, so that rounding
  * moves a vertex by at most an eighth of a cell. Hence vertices within the distance of each other
- * are within REACH cells of each other along each axis. */
+ * are within REACH = 0.5 + 2 / 8 cells of each other along each axis. */
 static const double REACH = 0.75, MAX_CELLS = 0x1p49, LEAST_DISTANCE = 0x1p-1000;
 
 /* Two squared distances are compared by rounded arithmetic if their relative difference exceeds
@@ -36,7 +36,8 @@ typedef struct grouping {
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
     uint32_t *map;   /* [vertex_count] vertex that replaces each vertex */
-    uint32_t *slots; /* [mask + 1] last remaining vertex of the cells with each hash */
+    uint32_t *
+        slots; /* [mask + 1] for each hash, the last remaining vertex in the cells with this hash */
     uint32_t *chain; /* [vertex_count] previous remaining vertex in the same slot */
     uint64_t mask;
     /* [threads] largest squared distance of a vertex from the vertex that replaces it */
