@@ -141,13 +141,15 @@ EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t cou
 
 /* Runs of faces, each with a name. */
 typedef struct ebpo_import_runs {
-    /* [count] the first run has the name "" and the faces before the first name */ ebpo_named_run *
-        *run;
+    /* [count] the first run has the name "" and the faces before the first name */
+    ebpo_named_run *run;
     uint64_t count, capacity;
 } ebpo_import_runs;
-**void ebpo_import_runs_free(ebpo_import_runs *runs);
-** /* A file in memory and the options for reading it. */
- typedef struct ebpo_import_job {
+
+void ebpo_import_runs_free(ebpo_import_runs *runs);
+
+/* A file in memory and the options for reading it. */
+typedef struct ebpo_import_job {
     const uint8_t *data;
     uint64_t size;
     const char *name;              /* a path or any other name; messages omit its folders */

@@ -36,8 +36,8 @@ typedef struct grouping {
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
     uint32_t *map;   /* [vertex_count] vertex that replaces each vertex */
-    uint32_t *
-        slots; /* [mask + 1] for each hash, the last remaining vertex in the cells with this hash */
+    /* [mask + 1] for each hash, the last remaining vertex in the cells with this hash */
+    uint32_t *slots;
     uint32_t *chain; /* [vertex_count] previous remaining vertex in the same slot */
     uint64_t mask;
     /* [threads] largest squared distance of a vertex from the vertex that replaces it */

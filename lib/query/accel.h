@@ -1,13 +1,13 @@
 /* Acceleration structures ("accels"). An accel is a subtree of the octree (or the whole tree),
  * decoded for queries. It has child tables, leaves that list faces, the faces in blocks, and a
- * bounding hierarchy over the blocks. After it is made, only the kinds of its leaves change: they
- * are found at the first queries. Any thread may use it.
+ * bounding hierarchy over the blocks. After an accel is made, only the kinds of its leaves change;
+ * the first queries find these kinds. Any thread may use an accel.
  *
  * Terms: the "shared" faces of a subtree are listed by its leaves, but also by an earlier leaf of
  * the file outside the subtree; all its other faces are "owned". The "local index" of a face is its
  * position among all faces of the accel, shared faces first. A "slot" is the position of a face in
- * the blocks. The "frame" of a subtree is the coordinates (x - centre) * scale, in which its cell
- * has a size of 1 to 2. */
+ * the blocks. The "frame" of a subtree is the coordinates (x - centre) * scale, in which the
+ * subtree's cell has a size of 1 to 2. */
 #ifndef EBPO_QUERY_ACCEL_H
 #define EBPO_QUERY_ACCEL_H
 
@@ -32,17 +32,20 @@ typedef enum ebpo_leaf_kind {
     EBPO_LEAF_CONCAVE = 4,
     /* The kind is not known yet; the leaf is treated as a general leaf. A free cell face is a cell
      * face of the leaf that no face intersects. */
-    EBPO_LEAF_UNKNOWN = 5, /* free cell face and boxes of the list are not known either */
+    /* a free cell face and the boxes of the leaf's list are not known either */
+    EBPO_LEAF_UNKNOWN = 5,
     EBPO_LEAF_CLAIMED = 6, /* a thread is finding the free cell face and the boxes */
     EBPO_LEAF_BOUNDED = 7, /* the free cell face and the boxes are known */
     EBPO_LEAF_SORTED = 8   /* as EBPO_LEAF_BOUNDED, and a thread is finding the kind */
 } ebpo_leaf_kind;
 /* Finding a free cell face takes as long as one query, and finding the kind as long as dozens of
- * queries. So the cell face is found at the leaf's first query, the kind at the 128th query. */
+ * queries. So a leaf's first query finds the cell face, and the leaf's 128th query finds the kind.
+ */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
 /* Values of `cell_face` for a leaf without a free cell face. EBPO_NEAR_BORDER: the leaf of a
  * surface is near the border (the edges of holes), so each query computes the generalized winding
- * number of its point (holes.h), and `rows` is the leaf's mark, made by ebpo_marked_entry. */
+ * number of its point (holes.h), and `rows` holds the leaf's mark (ebpo_marked_entry in holes.h) in
+ * place of a row number. */
 enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7 };
 /* A leaf with more planes is of the general kind. */
 enum { EBPO_KIND_PLANES_MAX = 16 };
@@ -57,7 +60,8 @@ typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
 #define EBPO_LISTED_LAST (UINT64_C(1) << 29)
 
-/* These two functions load and store an entry; the next two return its block and its lanes. */
+/* ebpo_listed and ebpo_list load and store an entry. ebpo_listed_number and ebpo_listed_lanes
+ * return the block's number and the lanes of an entry. */
 static inline uint64_t ebpo_listed(const ebpo_listed_block *b)
 {
     return atomic_load_explicit(b, memory_order_relaxed);
@@ -73,9 +77,10 @@ static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_L
  * `cell_face` and `cell_face_step` are valid if ebpo_leaf_is_bounded, `rows` if
  * ebpo_leaf_has_planes (or see EBPO_NEAR_BORDER). Valid values do not change. */
 typedef struct ebpo_accel_leaf {
-    uint32_t list;   /* index in ebpo_accel.list of the leaf's first entry */
-    int32_t winding; /* winding number at the lowest corner, shifted (format-spec, section
-                      * 10) */
+    uint32_t list; /* index in ebpo_accel.list of the leaf's first entry */
+    /* winding number at the lowest corner, shifted by an infinitely small vector (format-spec,
+     * section 10) */
+    int32_t winding;
     /* if ebpo_leaf_has_planes: number of the first row of the leaf's planes (EBPO_KIND_ROW); see
      * also EBPO_NEAR_BORDER */
     uint32_t rows;
@@ -85,7 +90,8 @@ typedef struct ebpo_accel_leaf {
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE or
      * EBPO_NEAR_BORDER */
     uint8_t cell_face;
-    int8_t cell_face_step; /* winding number on `cell_face` minus the one at the lowest corner */
+    /* winding number on `cell_face` minus the winding number at the lowest corner */
+    int8_t cell_face_step;
 } ebpo_accel_leaf;
 
 /* Returns true if `cell_face`, `cell_face_step` and the boxes of the leaf's list may be read. */
@@ -105,7 +111,8 @@ typedef union ebpo_kind_row {
         /* inner: winding number where the values of all planes are negative; outer: winding number
          * elsewhere in the cell */
         int32_t inner, outer;
-        uint32_t fours; /* number of groups of four planes; the last one is filled with plane 0 */
+        /* number of groups of four planes; the last group is filled up with plane 0 */
+        uint32_t fours;
     } head;
 } ebpo_kind_row;
 #define EBPO_PLANE_ERROR 0x1p-19f
@@ -119,18 +126,19 @@ typedef struct ebpo_leaf_kinds {
                            * is known, no lock is needed */
     ebpo_kind_row *page[EBPO_KIND_PAGES];
     uint32_t pages;
-    uint64_t used, space;           /* used rows and capacity of the last page */
-    _Atomic uint64_t rows;          /* capacity of all pages, in rows */
-    uint64_t rows_max;              /* maximum of `rows`; leaves beyond this limit stay general */
-    _Atomic uint64_t of_kind[5];    /* for each kind, the number of leaves known to be of it */
+    uint64_t used, space;  /* used rows and capacity of the last page */
+    _Atomic uint64_t rows; /* capacity of all pages, in rows */
+    uint64_t rows_max;     /* maximum of `rows`; leaves beyond this limit stay general */
+    /* for each kind, the number of leaves that are known to have this kind */
+    _Atomic uint64_t of_kind[5];
     _Atomic uint64_t one_cell_face; /* number of leaves of the general kind with a free cell face */
 } ebpo_leaf_kinds;
 #define EBPO_KIND_ROW(kinds, number)                  \
     ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
      ((number) & ((1u << EBPO_KIND_PAGE_BITS) - 1)))
 
-/* Returns the kind of a leaf. What the thread that set the kind had written before is visible to
- * the caller. */
+/* Returns the kind of a leaf. Everything that the thread that set the kind wrote before is visible
+ * to the caller. */
 static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
 {
     return (ebpo_leaf_kind)atomic_load_explicit(&leaf->kind, memory_order_acquire);
@@ -305,16 +313,16 @@ static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
  * bytes that exist while the subtree is made, including its slice (*peak). */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
-/* Compute closer bounds than ebpo_accel_estimate. These bounds are valid for ordinary models only
- * (accel_make.c); ebpo_slice_read_within and ebpo_accel_make_within refuse models that exceed them.
- * The first function is for a whole model. The second function is for a subtree, with planes of
- * gray nodes if slice_size->planes is not 0. */
+/* ebpo_accel_estimate_whole (for a whole model) and ebpo_accel_estimate_subtree (for a subtree,
+ * with planes of gray nodes if slice_size->planes is not 0) compute closer bounds than
+ * ebpo_accel_estimate. These closer bounds are valid for ordinary models only (accel_make.c).
+ * ebpo_slice_read_within and ebpo_accel_make_within refuse models that exceed these bounds. */
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
 void ebpo_accel_estimate_subtree(const ebpo_slice_size *slice_size, const ebpo_info *info,
                                  uint64_t *keep, uint64_t *peak);
-/* Returns the average bytes that ordinary subtrees keep, from their number and the counts `all` of
- * all subtrees together. The result is only slightly too high, and lower than the bounds of
- * ebpo_accel_estimate_subtree. */
+/* Returns the average bytes that an ordinary subtree keeps, computed from the number of subtrees
+ * and the counts `all` of all subtrees together. The result is only slightly too high, and lower
+ * than the bounds of ebpo_accel_estimate_subtree. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
                                uint64_t subtrees);
 
@@ -373,7 +381,7 @@ static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
     return local < s->shared_count ? s->shared[local] : s->first_face + (local - s->shared_count);
 }
 
-/* Prefetches into the processor's cache what ebpo_accel_source_face will read. */
+/* Prefetches into the processor's cache the value that ebpo_accel_source_face will read. */
 static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
 {
     if (s->face_source)

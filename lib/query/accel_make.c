@@ -199,12 +199,12 @@ static uint64_t kept_bytes(const sizes *size, const block_sizes *count)
  * (ebpo_layout), whose arrays may have more space than they use, because they grow by half of their
  * size.
  *
- * If a model is refused after its layout was made, this layout fits into the returned maximum, too.
- * It takes 12 bytes for each block and 60 for each bound (node of the hierarchy). There are at most
- * as many blocks as faces, and 7 bounds for 13 blocks, because join_parts (blocks.c) wraps at least
- * five members first, then four, three, two, two ... With the 8 bytes for each face in
- * renumber_blocks, this is less than the 56 bytes a face that ordinary records, bounds and layouts
- * take. */
+ * If a model is refused after its layout was made, this layout also fits into the returned maximum,
+ * as follows. The layout takes 12 bytes for each block and 60 bytes for each bound (node of the
+ * hierarchy). There are at most as many blocks as faces, and 7 bounds for 13 blocks, because
+ * join_parts (blocks.c) wraps at least five members first, then four, three, two, two ... With the
+ * 8 bytes for each face in renumber_blocks, this is less than the 56 bytes a face that ordinary
+ * records, bounds and layouts take. */
 static uint64_t peak_bytes(const sizes *size, const block_sizes *count)
 {
     enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, CORNERS = 25, EXTENT = 72 }; /* bytes of each */
@@ -240,8 +240,8 @@ void ebpo_accel_estimate_subtree(const ebpo_slice_size *slice_size, const ebpo_i
     *peak = peak_bytes(&size, &count);
 }
 
-/* Uses measured averages: blocks and nodes of the hierarchy are fuller than the proven minimum, and
- * an entry of a leaf's list has several faces. */
+/* Uses measured averages. On average, blocks and nodes of the hierarchy are fuller than the proven
+ * minimum, and an entry of a leaf's list has several faces. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info, uint64_t subtrees)
 {
     uint64_t n = subtrees ? subtrees : 1;
@@ -258,10 +258,11 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
     return kept_bytes(&size, &count);
 }
 
-/* Blocks are at least half full, with one exception: a leaf with few faces has a block of its own
- * if its neighbours fill their blocks. The 64 bytes for each leaf cover the additional size of such
- * blocks, and the planes of leaves in a subtree (ebpo_leaf_kinds). Lists have at most one entry for
- * each listed face. A record has at most three vertices a face, or four if it has 24 vertices. */
+/* The bounds follow from these facts. Blocks are at least half full, with one exception: a leaf
+ * with few faces has a separate block if neighbouring leaves fill their blocks. The 64 bytes for
+ * each leaf cover the additional size of such blocks, and the planes of leaves in a subtree
+ * (ebpo_leaf_kinds). Lists have at most one entry for each listed face. A record has at most three
+ * vertices a face, or four if it has 24 vertices. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
@@ -352,8 +353,8 @@ static inline void list_face(const walk *w, uint64_t face, listing *l)
     ebpo_list(&l->list[l->count - 1], l->last);
 }
 
-/* Fills in leaf `index` of the accel. `rank`: of the leaf in its level. The leaf's list has first
- * the references, then the new faces, whose indices are greater. */
+/* Fills in leaf `index` of the accel. `rank`: position of the leaf among the leaves of its level.
+ * The leaf's list has first the references, then the new faces, whose indices are greater. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t index)
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[index];
@@ -504,8 +505,8 @@ static double turn_error_constant(const ebpo_box *box)
     return 0x1p-43 * coordinate * size;
 }
 
-/* Sets the frame (accel.h): the cell's centre, and a power of two that scales the cell's longest
- * side to 1 .. 2. */
+/* Sets the frame, the coordinates of the subtree (accel.h): the centre of the subtree's cell, and a
+ * power of two that scales the cell's longest side to 1 .. 2. */
 static void make_frame(ebpo_accel *s)
 {
     double longest = 0, low[3], high[3];

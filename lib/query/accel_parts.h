@@ -18,9 +18,10 @@ typedef struct ebpo_layout {
      * (EBPO_MESHLET_UNIT); set by ebpo_accel_number_blocks */
     uint32_t *block_number;
     struct ebpo_block_corners *corners; /* [block_count] valid until the blocks are filled */
-    uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound, but blocks by index in the layout */
-    /* [bound_count] the blocks below a node are contiguous: the first one, and one past the last
-     * one */
+    /* [bound_count] as in ebpo_bound, but a block is given by its index in the layout */
+    uint32_t (*child)[8];
+    /* [bound_count] the blocks below a node are contiguous: the first block, and one past the last
+     * block */
     uint32_t *first_block;
     uint32_t *last_block;
     uint64_t bound_count;
@@ -35,7 +36,7 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
                                            uint64_t blocks_max, ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
-/* What an accel is made from. */
+/* The inputs from which an accel is made. */
 typedef struct ebpo_accel_plan {
     const ebpo_info *info;
     const ebpo_slice *slice;

@@ -289,7 +289,7 @@ static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
 
 /* Sets from, to and radius2 of a cylinder around all vertices of the blocks begin .. end - 1 of the
  * layout. The interval from .. to need not contain 0: if the faces are tilted against the axes of
- * coordinates, the middle of their box may be on one side of all of them. */
+ * coordinates, the middle of the faces' box may be on one side of all faces. */
 static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     cylinder_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
@@ -421,8 +421,8 @@ static void set_cylinders(ebpo_bound_cylinder *b, int count, double size, const 
 
 /* --- all nodes --- */
 
-/* Converts a child as in the layout to a child as in ebpo_bound, which names a block by its number.
- */
+/* Converts a child of the layout, where a block is given by its index, to a child of ebpo_bound,
+ * where a block is given by its number. */
 static uint32_t child_number(const job *j, uint32_t child)
 {
     return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)

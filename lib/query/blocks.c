@@ -4,9 +4,10 @@
  * First, the layout decides which faces are in one block, and builds the hierarchy; it uses no
  * coordinates. The new faces of a node (faces that no leaf before the node lists) have consecutive
  * local indices. So neighbouring children with few new faces can share a block. The hierarchy
- * follows the octree: the blocks below an octree node are passed up to the node's parent. Where
- * more than eight meet, some of them are joined in nodes of the hierarchy. Then the blocks are
- * measured, numbered and filled in parallel; block_bounds.c computes their bounds. */
+ * follows the octree: the blocks below an octree node are passed up to the node's parent. If a
+ * parent receives more than eight blocks or nodes of the hierarchy, some of these are joined in new
+ * nodes of the hierarchy. Then the blocks are measured, numbered and filled in parallel;
+ * block_bounds.c computes their bounds. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -53,7 +54,8 @@ static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
 }
 
 /* Adds a node of the hierarchy with the members of a bundle. Returns the node as a member. Until
- * renumber_blocks, its first_block and last_block are the range of its faces. */
+ * renumber_blocks is called, the node's first_block and last_block are the range of the node's
+ * faces. */
 static uint32_t add_bound(walk *w, const bundle *b)
 {
     ebpo_layout *o = w->out;
@@ -85,8 +87,8 @@ typedef struct run {
     int begin, end, members;
 } run;
 
-/* Chooses the bundles that join_parts wraps in a node next: consecutive bundles, none of them
- * wrapped yet, with as many members as possible, but at most eight. With emptier nodes, the
+/* Chooses the bundles that join_parts wraps in a node next: consecutive bundles that are not
+ * wrapped yet and have as many members as possible, but at most eight. With emptier nodes, the
  * hierarchy would become deeper. */
 static run choose_run(const bundle *part, int parts, const bool wrapped[8])
 {
@@ -113,8 +115,8 @@ static bundle gather_parts(const bundle *part, int parts)
     return out;
 }
 
-/* Joins consecutive bundles to one bundle of at most eight members. If they have more members,
- * wraps some of the bundles in nodes of the hierarchy. Changes `part`. */
+/* Joins consecutive bundles to one bundle of at most eight members. If the bundles together have
+ * more members, wraps some of the bundles in nodes of the hierarchy. Changes `part`. */
 static bundle join_parts(walk *w, bundle *part, int parts)
 {
     bool wrapped[8] = { false };

@@ -1,6 +1,6 @@
 /* Divides the memory budget of a model.
  *
- * A model is held completely in memory if the budget allows that ("whole model"). If not, the
+ * A model is held completely in memory ("whole model") if the budget allows that. If not, the
  * budget is divided between the top of the tree (levels 0 to the cut level, query_top.c), a cache
  * of decoded chunks, skeletons (upper nodes of subtrees' hierarchies over faces, skeleton.c) and a
  * cache of subtrees, whose roots are at the cut level. The cut level is chosen so that subtrees are
@@ -22,7 +22,8 @@
 #include "query/accel.h"
 #include "query/model_parts.h"
 
-/* Maximum bytes of the cache of decoded chunks, which gets an eighth of the budget. */
+/* Maximum bytes of the cache of decoded chunks, which gets an eighth of the budget up to this
+ * maximum. */
 enum { CHUNKS_MAX = 128 << 20 };
 
 uint64_t ebpo_chunk_budget(uint64_t budget)
@@ -178,9 +179,9 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
     return size;
 }
 
-/* Returns true if the budget is sufficient for the top of the tree, which takes `top` bytes. Of
- * these, the levels may take a quarter of the budget, and the data about a surface's holes
- * (holes.h) half of the budget. */
+/* Returns true if the budget is sufficient for the top of the tree, which takes `top` bytes. The
+ * levels of the top may take a quarter of the budget, and the top's data about a surface's holes
+ * (holes.h) may take half of the budget. */
 static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                      uint64_t top)
 {
@@ -248,9 +249,9 @@ bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
     return is_default;
 }
 
-/* Returns the better cut level: `cut`, or the level of the roots of the subtrees into which the
- * file is divided. The latter is better if it is deeper and the budget allows it, because the file
- * stores each of its subtrees together. */
+/* Returns the better cut level: `cut`, or the level at which the file is divided into subtrees. The
+ * file's level is better if it is deeper and the budget allows it, because the file stores the data
+ * of each subtree together. */
 static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;

@@ -1,8 +1,8 @@
 /* Computes the distance to the surface, the nearest point and the normal (EBP 2017, 4.4).
  *
- * nearest_subtrees.c finds the exact minimum. The result of the three modes of the thesis is not
- * always the minimum: they search only the leaf that contains the point, all leaves below the
- * deepest gray node that contains it, or the envelope of a node. With a level, a query returns an
+ * nearest_subtrees.c finds the exact minimum. Three other modes, from the thesis, do not always
+ * find the minimum. They search only the leaf that contains the point, all leaves below the deepest
+ * gray node that contains the point, or the envelope of a node. With a level, a query returns an
  * interval for the distance, from the envelopes of that level's nodes. If a deadline passes, the
  * query returns an interval from the nodes that were searched until then. In a subset, a query
  * fails with EBPO_E_ABSENT if an omitted face might be nearer than the found face. */
@@ -194,8 +194,8 @@ static int cut_envelope(ebpo_context *c, const node_chain *chain)
     return at - 1;
 }
 
-/* Computes the distance to the polygons of one envelope: that of the deepest gray node that
- * contains p, on levels 0 to o->level (-1: on all levels). */
+/* Computes the distance to the polygons of the envelope of the deepest gray node that contains p,
+ * on levels 0 to o->level (-1: on all levels). */
 static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
                                         const ebpo_distance_options *o, ebpo_distance_result *out,
                                         ebpo_error *error)
@@ -220,7 +220,7 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
     return EBPO_OK;
 }
 
-/* --- subsets: an omitted face may be nearer than the found one --- */
+/* --- subsets: an omitted face may be nearer than the found face --- */
 
 /* Visits the nodes at or below `node` whose lower bound of the distance is within the search's
  * limit. Before the deadline, fails with EBPO_E_ABSENT at the first pruned node. After the
@@ -324,7 +324,8 @@ typedef struct interval {
     ebpo_ranking ranking; /* computes bounds of nodes */
     ebpo_far far;         /* the point, if it is far from the model (point_bounds.h) */
     uint64_t deadline;    /* a time of ebpo_clock; 0: none */
-    double lo, hi;        /* bounds so far: distances, or keys if the point is far */
+    /* bounds so far: distances, or keys (point_bounds.h) if the point is far */
+    double lo, hi;
 } interval;
 
 /* Improves the interval by the envelopes at or below `node`. `lower`: lower bound of the distance

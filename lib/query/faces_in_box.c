@@ -204,9 +204,9 @@ static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const do
 
 /* Finds, depth first below `node`, the first accel whose cell intersects both the query's box and
  * the triangle. Returns false if there is none. *entry: entry of the accel's root (ebpo_node).
- * Several accels can list one face: all whose cells intersect the face, and some whose cells are
- * only near the face (format-spec, section 7). The query takes a face from this first accel only,
- * so it needs no list of the faces that it has already found. */
+ * Several accels can list one face: all accels whose cells intersect the face, and some accels
+ * whose cells are only near the face (format-spec, section 7). The query takes a face from this
+ * first accel only, so it needs no list of the faces that it has already found. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
@@ -230,8 +230,8 @@ static bool box_walk_is_first(const box_walk *w, bool owned, const double triang
     uint32_t entry = 0;
     if (m->whole)
         return true;
-    /* No earlier accel lists an owned face. So the current accel is the first one that intersects
-     * the face, unless the face is only near its cell. */
+    /* No earlier accel lists an owned face. So the current accel is the first one if its cell
+     * intersects the face. Otherwise, the face is only near the cell. */
     if (owned)
         return intersects_cell(&box, &w->subtree_root, triangle);
     return find_first(w, &box, ebpo_model_root(m), triangle, &entry) &&
