@@ -1,18 +1,18 @@
 /* Decides if points are inside a surface with holes, by the caps of its border: faces that close
  * the loops of border edges.
  *
- * The octree of a surface has the winding numbers k of the closed mesh of surface and caps, which
- * are integers. The winding number of the surface alone is w_S = k + w_D, where w_D is the winding
- * number of the discs D: the caps, turned the other way (geometry/cap_tree.h). A point is inside if
- * w_S satisfies the rule with the threshold t.
+ * The octree of a surface stores integers k, the winding numbers of the closed mesh that consists
+ * of the surface and its caps. The winding number of the surface alone is w_S = k + w_D, where w_D
+ * is the winding number of the discs D, which are the caps with reversed orientation
+ * (geometry/cap_tree.h). A point is inside if w_S satisfies the rule with the threshold t.
  *
- * Bounds of w_D for all points of a cell often decide for the whole cell. The size of their error
- * also shows that no cap touches the cell, so k changes in the cell at faces only. If |w_D| is
- * below t and below 1 - t, the rule for w_S gives the same result as the rule for k, in this cell
- * and in all cells below it. Another white node has one result if the bounds of k + w_D are on one
- * side of the rule's boundary. Near a cap, the value of w_S at the cell's centre and a bound of its
- * variation in the cell decide. Points of the remaining cells are decided one by one
- * (cap_winding.c).
+ * Bounds of w_D that are valid for all points of a cell often decide for the whole cell. If the
+ * error of these bounds is small, no cap touches the cell, so k changes in the cell at faces only.
+ * If |w_D| is also below t and below 1 - t, the rule for w_S gives the same result as the rule for
+ * k, in this cell and in all cells below it. A white node in which |w_D| may be greater has one
+ * result if the bounds of k + w_D are on one side of the rule's boundary. Near a cap, the value of
+ * w_S at the cell's centre and a bound of its variation in the cell decide. Points of the remaining
+ * cells are decided one by one (cap_winding.c).
  *
  * Discs that are far from a cell are bounded once for all cells below it. Each cell has a list of
  * the other (near) discs, which is made from the list of its parent (cap_bounds.c). */
@@ -154,9 +154,9 @@ static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, 
     return small == 1;
 }
 
-/* Begins to bound w_D at the centre of a cell. *variation: bound of the difference between the
- * centre and any other point of the cell: of 2 pi w_S if no face touches the cell, and of 2 pi w_D
- * if no cap touches the cell. Returns false if there is no such bound. */
+/* Begins to bound w_D at the centre of a cell. *variation bounds a difference between the centre
+ * and any other point of the cell: the difference of 2 pi w_S if no face touches the cell, and the
+ * difference of 2 pi w_D if no cap touches the cell. Returns false if there is no such bound. */
 static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variation)
 {
     const ebpo_cap_box centre = ebpo_cap_point(box->centre);
@@ -233,7 +233,7 @@ static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_di
     return near;
 }
 
-/* Takes bytes of the quota for the table. Returns false if the quota has too few. */
+/* Takes bytes of the quota for the table. Returns false if the quota has too few bytes. */
 static bool use_bytes(marking *w, uint64_t bytes)
 {
     bool fits = bytes <= w->bytes;
@@ -266,7 +266,7 @@ static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, in
 static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                          const near_discs *parent);
 
-/* Splits a cell into eight parts and marks them. Returns the index of the parts in the table's
+/* Splits a cell into eight parts and marks the parts. Returns the index of the parts in the table's
  * `split`, or -1 if the cell cannot be split. */
 static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                           const near_discs *near)
@@ -303,8 +303,8 @@ static int32_t mark_undecided(marking *w, ebpo_cell cell, int32_t winding, bool 
 }
 
 /* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf (`leaf`).
- * `winding`: for a cell without faces, k at its lowest corner; for a leaf, the value that its
- * ebpo_near_cell gets (see mark_leaf). */
+ * `winding`: for a cell without faces, k at the cell's lowest corner; for a leaf, the index of an
+ * ebpo_near_cell with the caps that may touch the leaf, or -1 (see mark_leaf). */
 static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                          const near_discs *parent)
 {
@@ -324,8 +324,9 @@ static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
     return marked;
 }
 
-/* Marks a leaf, if the rule for k does not decide in it. If caps may touch the leaf, `caps` is the
- * index of an ebpo_near_cell with these caps, whose crossings queries must count. */
+/* Marks a leaf, if the rule for k does not decide in it. If caps may touch the leaf, stores these
+ * caps in an ebpo_near_cell (index `caps`), because queries must count the crossings with these
+ * caps. */
 static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const near_discs *parent)
 {
     const ebpo_accel *s = w->m->accel;

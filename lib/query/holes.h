@@ -11,7 +11,7 @@
 #include "geometry/cells.h"
 #include "query/accel.h"
 
-/* The caps of a surface, and the rule. Any thread may use it. */
+/* The caps of a surface, and the rule. Any thread may use the struct. */
 typedef struct ebpo_holes {
     ebpo_cap_tree caps;
     ebpo_cap_rule rule;
@@ -24,8 +24,8 @@ EBPO_MUST_USE ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *fil
                                           ebpo_error *error);
 void ebpo_holes_free(ebpo_holes *holes); /* accepts NULL */
 uint64_t ebpo_holes_bytes(const ebpo_holes *holes);
-/* Returns an upper bound of the bytes of a border in memory. While the border is read, it takes at
- * most twice as many bytes. */
+/* Returns an upper bound of the bytes of a border in memory. Reading the border takes at most twice
+ * as many bytes. */
 static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 {
     return info->parts & EBPO_PART_BORDER ? 4096 + EBPO_CAPS_BYTES * info->border_points : 0;
@@ -38,12 +38,13 @@ static inline uint64_t ebpo_holes_marks_max(const ebpo_info *info)
 }
 
 /* Finds the nodes of a table in which all points have the same result, and marks all nodes of the
- * table. Uniform entries (white nodes) get a number of ebpo_marked_entry in place of the winding
- * number at their lowest corner. A leaf in which points must be decided one by one gets the
- * cell_face EBPO_NEAR_BORDER; in other leaves the rule for the integer winding number decides, as
- * in a solid. A uniform node whose points may have different results is split into eight cells
- * again and again, down to level `deepest`, and these cells are marked. The data that are added to
- * the table take at most `bytes`. Returns EBPO_E_LIMIT for winding numbers beyond 2^25. */
+ * table. A uniform entry (white node) gets a marked entry (ebpo_marked_entry) in place of the
+ * winding number at the node's lowest corner. A leaf in which points must be decided one by one
+ * gets the cell_face EBPO_NEAR_BORDER; in other leaves the rule for the integer winding number
+ * decides, as in a solid. A uniform node whose points may have different results is split into
+ * eight cells again and again, down to level `deepest`, and these cells are marked. The data that
+ * are added to the table take at most `bytes`. Returns EBPO_E_LIMIT for winding numbers beyond
+ * 2^25. */
 typedef struct ebpo_marked_table {
     const ebpo_box *box; /* root cell of the model */
     ebpo_cell root;      /* cell of the table's root */
@@ -67,7 +68,8 @@ typedef enum ebpo_uniform_mark {
     EBPO_MARK_SPLIT = 4   /* the cell has eight parts; value: index in ebpo_node_table.split */
 } ebpo_uniform_mark;
 
-/* The first function makes a marked entry; the other two return its mark and its value. */
+/* ebpo_marked_entry makes a marked entry. ebpo_entry_mark and ebpo_marked_value return the mark and
+ * the value of a marked entry. */
 static inline int32_t ebpo_marked_entry(int32_t value, ebpo_uniform_mark mark)
 {
     return value * 8 + (int32_t)mark;
@@ -90,16 +92,18 @@ static inline int32_t ebpo_marked_part(const ebpo_node_table *table, int32_t mar
 }
 
 /* Returns the sum of the crossings with caps on the way from the lowest corner of a cell (`low`) to
- * a point in it, along x, then y, then z. Both points are shifted as in format-spec, section 10. */
+ * a point p of the cell, along x, then y, then z. Both points are shifted as in format-spec,
+ * section 10. */
 int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const double p[3]);
 
-/* Returns the same sum, but counts only the caps that may touch `cell`. */
+/* Returns the same sum as ebpo_holes_crossings, but counts only the caps that may touch `cell`. */
 int32_t ebpo_holes_list_crossings(const ebpo_holes *holes, const ebpo_node_table *table,
                                   const ebpo_near_cell *cell, const double low[3],
                                   const double p[3]);
 
-/* Classify a point that is on no face; `winding` is the winding number, at the point, of the closed
- * mesh of surface and caps. The second function is faster; the point must be in `cell`. */
+/* ebpo_holes_where and ebpo_holes_where_in classify a point that is on no face. `winding` is the
+ * winding number, at the point, of the closed mesh of surface and caps. ebpo_holes_where_in is
+ * faster, but the point must be in `cell`. */
 ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding);
 ebpo_where ebpo_holes_where_in(ebpo_holes *holes, const ebpo_node_table *table,
                                const ebpo_near_cell *cell, const double p[3], int32_t winding);

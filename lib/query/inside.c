@@ -38,14 +38,14 @@
 #include "query/query_node.h"
 
 /* Decides a point in a pruned node by the envelopes of the nodes above it. (Declared here, because
- * it and the functions that it calls are recursive.) */
+ * inside_pruned and functions below call each other.) */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error);
 
 /* --- one leaf --- */
 
 /* Decides the open faces, and adds their crossings to *sum. Returns true if `point` (NULL: no test)
- * is on one of them. */
+ * is on one of these faces. */
 static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t count,
                         const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
@@ -79,7 +79,7 @@ typedef struct leaf_point {
                          * lower sides in ebpo_listed_block */
 } leaf_point;
 
-/* Finds the position of a point in the cell of its leaf. `level`: of the leaf. */
+/* Finds the position of a point in the cell of its leaf. `level`: level of the leaf. */
 static inline void find_leaf_point(int deepest, int level, const ebpo_position *position,
                                    leaf_point *out)
 {
@@ -217,8 +217,8 @@ static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_acc
     return kind <= EBPO_LEAF_CONCAVE ? kind : query_kind(context, s, leaf, at);
 }
 
-/* Sets the result for a winding number. For a surface, the result's winding number is 0 or 1,
- * unless the context wants undecided results (ebpo_context.undecided). */
+/* Sets the result for a winding number. For a surface, the result's winding number is 0 or 1. If
+ * ebpo_context.undecided is true, the result has the given winding number also for a surface. */
 static inline void give_winding(const ebpo_context *context, int32_t winding,
                                 ebpo_inside_result *out)
 {
@@ -253,8 +253,8 @@ static inline void inside_beyond_root(const ebpo_context *context, const double 
         give_out(out);
 }
 
-/* Decides a point of a cell near the border. `cell`: the record of the cell, which makes this
- * faster, or NULL. `winding`: winding number of surface and caps at the point. */
+/* Decides a point of a cell near the border. `cell`: the record of the cell, which makes the
+ * decision faster, or NULL. `winding`: winding number of surface and caps at the point. */
 static void decide_near(const ebpo_context *context, const ebpo_node_table *table,
                         const ebpo_near_cell *cell, int32_t winding, const double p[3],
                         ebpo_inside_result *out)
@@ -720,8 +720,7 @@ static ebpo_status uniform_from_file(inside_query *query, const ebpo_node *node,
 }
 
 /* Handles a gray node on the way: sets the result and *done, or moves the cursor to the child that
- * contains the point. Whether a node is pruned is known only after its children have been
- * requested. */
+ * contains the point. A node is known to be pruned only after its children have been requested. */
 static ebpo_status pass_gray(inside_query *query, ebpo_cursor *c, bool *done,
                              ebpo_inside_result *out, ebpo_error *error)
 {
@@ -815,7 +814,7 @@ static const ebpo_accel *find_held(const inside_query *query, uint32_t *entry, i
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* Decides p without envelopes, if the context has all data for it in memory. (Envelopes save time
+/* Decides p without envelopes, if the context has all data for p in memory. (Envelopes save time
  * only by avoiding loads, and here nothing is loaded.) Returns false if some data is missing. */
 static bool result_in_memory(inside_query *query, ebpo_inside_result *out, ebpo_status *status,
                              ebpo_error *error)

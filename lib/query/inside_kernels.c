@@ -62,8 +62,8 @@ EBPO_EIGHT void load_relative(const ebpo_face_block *b, int axis, double from, f
         out[i] = f8_sub(f8_sub(out[i], f8_all(high)), f8_all(low));
 }
 
-/* Computes the turns of a block's faces in single precision. u, v: the two axes that are not the
- * segment's. error_constant: the part of the error bound that does not depend on the face. */
+/* Computes the turns of a block's faces in single precision. u, v: the two axes across the segment.
+ * error_constant: the part of the error bound that does not depend on the face. */
 EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u, int v,
                                  const ebpo_axis_segment *g, float error_constant)
 {
@@ -132,9 +132,9 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
 
 /* Let x be the coordinate, on the segment's axis, of the point where the segment's line intersects
  * a face's plane. Returns 1 if x is greater than `at`, -1 if x is less, 0 if this is not certain.
- * weight[i], size[i]: the cross product of the corners of edge i, and its *size. k: the corners'
- * coordinates on the axis. `turn`: 1 if the face turns left around the line, -1 if it turns right.
- */
+ * weight[i]: cross_product of the two corners of edge i; size[i]: the *size that cross_product
+ * sets. k: the corners' coordinates on the axis. `turn`: 1 if the face turns left around the line,
+ * -1 if it turns right. */
 static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {
@@ -365,7 +365,7 @@ static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const fa
 }
 
 /* Prefetches the first eight blocks of the list (or all, if the list is shorter) into the
- * processor's cache. They arrive while the cell's bounds are computed. */
+ * processor's cache. The blocks arrive while the cell's bounds are computed. */
 static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 {
     for (int i = 0; i < 8; i++) {

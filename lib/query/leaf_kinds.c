@@ -1,9 +1,9 @@
 /* Finds and stores the kind of a leaf during queries.
  *
- * The first query finds a free cell face (that no face intersects) and the boxes of the leaf's
- * list. After many queries the leaf is classified: one plane, two planes, convex or concave (then
- * the signs of planes decide), or general (accel.h). While one thread classifies the leaf, the
- * other threads treat it as general. Kinds never change results.
+ * The first query finds a free cell face (a cell face that no face intersects) and the boxes of the
+ * leaf's list. After many queries the leaf is classified: one plane, two planes, convex or concave
+ * (then the signs of planes decide), or general (accel.h). While one thread classifies the leaf,
+ * the other threads treat it as general. Kinds never change results.
  *
  * Proof that the planes of some leaves decide: a point is below a plane if n . xi < d (leaf_plane).
  * Let P be the set of points of the cell below all planes of the leaf's faces. Suppose that every
@@ -49,7 +49,7 @@ enum { FACES_MAX = 64 };
 typedef struct leaf_faces {
     int count;
     double p[FACES_MAX][3][3]; /* corners in the coordinates of the cell (0 .. 1), rounded */
-    uint32_t slot[FACES_MAX];  /* where the accel has the face */
+    uint32_t slot[FACES_MAX];  /* slot of the face: its position in the blocks of the accel */
     double low[3], size[3], inverse[3]; /* lowest corner and size of the cell; 1 / size */
 } leaf_faces;
 
@@ -104,9 +104,9 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
 }
 
 /* Returns the sum of the signed crossings of the leaf's faces with a segment along an axis. Skips
- * blocks whose list entry has any bit of `excluded`. These are bits of the lower sides of boxes, on
- * the axes on which the segment is at the lower side of the cell: a box with such a bit begins
- * above the segment. */
+ * blocks whose list entry has any bit of `excluded`. `excluded` has the bits of the lower sides of
+ * boxes on the axes on which the segment is at the lower side of the cell. A box with such a bit
+ * begins above the segment. */
 static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                               const double from[3], double to, int axis, uint64_t excluded)
 {
@@ -405,8 +405,8 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
 /* --- a leaf --- */
 
 /* Returns a free cell face (2 * axis + side), or EBPO_NO_CELL_FACE. `cell_faces` has a bit for each
- * cell face that is not free. Prefers a lower cell face (bits 0, 2, 4), because it has the lowest
- * corner, so its winding number is known. */
+ * cell face that is not free. Prefers a lower cell face (bits 0, 2, 4), because the leaf's lowest
+ * corner is on it, so the winding number on this cell face is known. */
 static uint8_t choose_cell_face(unsigned cell_faces)
 {
     unsigned is_free = ~cell_faces & 63;
@@ -448,13 +448,14 @@ static bool begin_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind from, ebpo_leaf_kin
     return atomic_compare_exchange_strong(&leaf->kind, &expected, (uint8_t)to);
 }
 
-/* Sets the kind, and makes what this thread wrote before visible to threads that read the kind. */
+/* Sets the kind. Everything that this thread wrote before becomes visible to threads that read the
+ * kind. */
 static void end_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
 {
     atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
 }
 
-/* Finds the free cell face and the boxes, unless a thread has done it or is doing it. */
+/* Finds the free cell face and the boxes, if no thread has found them or is finding them. */
 static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                            ebpo_cell_faces_fn *cell_faces)
 {

@@ -1,8 +1,8 @@
 /* Loads subtrees before queries need them, and sends prefetch hints for remote files.
  *
- * After a query, the context prefetches the subtrees that queries near it may need, in the order of
- * their distance from the query's point. (EBP 2017, 4.2.3, loads the 26 neighbours of the subtree
- * that contains the point instead.)
+ * After a query at a point, the context prefetches the subtrees that queries near this point may
+ * need, the nearest subtree first. (EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that
+ * contains the point instead.)
  *
  * A batch evaluates many points in the order of the Morton curve, so that each subtree is loaded
  * few times. For a remote file, the batch sends prefetch hints for some thousand points at a time,
@@ -24,8 +24,9 @@
 
 /* A subtree that a query may need. */
 typedef struct wanted {
-    uint64_t below; /* index in top->below */
-    double lower;   /* lower bound of the distance */
+    /* index in ebpo_top.below, the list of the subtrees that are loaded on demand */ uint64_t
+        *below;
+    double lower; /* lower bound of the distance */
 } wanted;
 
 /* A search for the nearest subtrees within a distance of a point. */
@@ -315,7 +316,7 @@ static void hint_collected(ebpo_batch *b)
     b->below_count = 0;
 }
 
-/* Returns the point with turn i. */
+/* Returns the point with turn i, the i-th point in the order of evaluation. */
 static const double *ordered_point(const ebpo_batch *b, uint64_t i)
 {
     return b->points + 3 * (b->order ? b->order[i] : i);

@@ -61,8 +61,8 @@ typedef struct ebpo_batch {
  * points, so `count` may decrease. If there is no memory to sort, points are evaluated in the given
  * order. */
 void ebpo_batch_begin(ebpo_batch *batch);
-/* Ends a batch. Returns `status`; but EBPO_E_PENDING if `status` is EBPO_OK and bytes for some
- * points are not available yet. */
+/* Ends a batch. Returns EBPO_E_PENDING if `status` is EBPO_OK and bytes for some points are not
+ * available yet, otherwise `status`. */
 EBPO_MUST_USE ebpo_status ebpo_batch_end(ebpo_batch *batch, ebpo_status status, ebpo_error *error);
 
 /* Returns the indices of the points, [count], in the order of the Morton curve. (A point outside
@@ -71,7 +71,7 @@ EBPO_MUST_USE ebpo_status ebpo_batch_end(ebpo_batch *batch, ebpo_status status, 
  */
 uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t count);
 
-/* Returns the index of the i-th point to evaluate. Call it with i = 0, 1, 2, ... */
+/* Returns the index of the i-th point to evaluate. Call this function with i = 0, 1, 2, ... */
 uint64_t ebpo_batch_next(ebpo_batch *batch, uint64_t i);
 
 /* Records the status of the point with turn i and index `point`. Returns EBPO_OK if the caller must

@@ -6,12 +6,12 @@
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * where s' is the transpose of s. All values are in double-double arithmetic, on coordinates scaled
  * by a power of two to about 1. They are summed in blocks of BLOCK_FACES faces, so that sums do not
- * depend on the number of threads. For volume and moments, the terms of a face are multiplied by
- * 1, -1 or 0: the face's component bounds the solid, bounds it with the opposite orientation, or
- * does not bound it (ebpo_component_times). If this is not known, the factor is 1. For a surface
- * with its border (the edges of its holes), the caps that close the holes are faces, too
- * (measure_caps.h). Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D
- * tetrahedron inertia tensor in terms of its vertex coordinates". */
+ * depend on the number of threads. For volume and moments, the terms of a face have a factor: 1 if
+ * the face's component bounds the solid, -1 if the component bounds the solid with the opposite
+ * orientation, 0 if the component does not bound the solid (ebpo_component_times). If this is not
+ * known, the factor is 1. For a surface with its border (the edges of its holes), the caps that
+ * close the holes are faces, too (measure_caps.h). Source of the moments: Tonon 2004, "Explicit
+ * exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -191,7 +191,7 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
     add_tetrahedron(m, corner, middle, n, terms, 1, times);
 }
 
-/* Returns the number of times that the face counts. */
+/* Returns the factor of the face's terms: 1, -1 or 0. */
 static int times_of(const measuring *p, uint64_t face)
 {
     return p->component ? p->times[p->component[face]] : 1;
@@ -221,7 +221,9 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
 
 /* Sums over the loops of a border, for bounds of how much results depend on the choice of caps. */
 typedef struct cap_sums {
-    double volume; /* sum of the loop's weight times a bound of the volume of its convex hull */
+    /* sum over all loops of the loop's weight times a bound of the volume of the loop's convex hull
+     */
+    double volume;
     double moment; /* sum of the same products, each times a bound of the distance of the hull's
                     * farthest point from the centroid */
 } cap_sums;
@@ -304,15 +306,15 @@ static double integral_error(const moments *m, uint64_t triangles)
  * error of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and an
  * error f of M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
  *
- * Other caps: let k(x) be the winding number of a point x with our caps C, and k'(x) the one with
- * other caps C'. We assume two properties of the cap C'_i of each loop. First, C'_i together with
- * our cap C_i, reversed, is a closed surface with no other winding numbers than -w_i, 0 and w_i,
- * where w_i is the loop's weight. Second, C'_i is in the convex hull H_i of the loop (as C_i is).
- * Then |k'(x) - k(x)| is at most the sum of w_i over the hulls H_i that contain x, so the integral
- * changes by at most h = sum of w_i |H_i|, where |H_i| is the volume of the hull. With the centroid
- * c as the origin, the first moment of k is 0, and the first moment of k' is at most the sum of w_i
- * |H_i| r_i, where r_i is the distance of the farthest point of H_i. So the centroid moves by at
- * most this sum divided by |V| - h. */
+ * Other caps: let k(x) be the winding number of a point x with our caps C, and k'(x) the winding
+ * number with other caps C'. We assume two properties of the cap C'_i of each loop. First, C'_i
+ * together with our cap C_i, reversed, is a closed surface with no other winding numbers than -w_i,
+ * 0 and w_i, where w_i is the loop's weight. Second, C'_i is in the convex hull H_i of the loop (as
+ * C_i is). Then |k'(x) - k(x)| is at most the sum of w_i over the hulls H_i that contain x, so the
+ * integral changes by at most h = sum of w_i |H_i|, where |H_i| is the volume of the hull. With the
+ * centroid c as the origin, the first moment of k is 0, and the first moment of k' is at most the
+ * sum of w_i |H_i| r_i, where r_i is the distance of the farthest point of H_i. So the centroid
+ * moves by at most this sum divided by |V| - h. */
 static void set_border(ebpo_mass *out, const moments *m, const frame *f,
                        const ebpo_border_loops *loops, uint64_t triangles)
 {
@@ -397,7 +399,7 @@ static bool is_one_sheet(const ebpo_info *info)
 }
 
 /* Computes an interval of the volume from the file header and, if there are several components,
- * from their nesting. If the volume is known, sets how often faces count. */
+ * from their nesting. If the volume is known, sets the factors of faces. */
 static ebpo_status decide_volume(measuring *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {

@@ -3,9 +3,9 @@
  * nearly flat.
  *
  * Rounding. Points relative to the first point are at most `span` long. Their products with axes,
- * which are unit vectors up to an error of 2^-50, have an error below 2^-49 span, which is added on
- * both sides. Three axes that are orthogonal up to an error of 2^-45 span the volume of an exact
- * box up to a relative error of 2^-40. */
+ * which are unit vectors up to an error of 2^-50, have an error below 2^-49 span, so boxes are
+ * enlarged by this error on both sides. Three axes that are orthogonal up to an error of 2^-45 span
+ * the volume of an exact box up to a relative error of 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -49,9 +49,10 @@ static bool scale_to_unit(double v[3])
     return length > 0x1p-400;
 }
 
-/* Sets the axes: first the vector area; then the perpendicular direction to the point that is
- * farthest from the first axis; then the cross product of both. Returns false if rounding makes
- * them too inexact. */
+/* Sets three axes. The first axis has the direction of the loop's vector area. The second axis is
+ * perpendicular to the first axis, towards the point that is farthest from the first axis. The
+ * third axis is the cross product of the first two axes. Returns false if rounding makes the axes
+ * too inexact. */
 static bool find_axes(const double *point, uint64_t count, const double factor[2],
                       double axis[3][3])
 {

@@ -11,8 +11,8 @@
 #include "query/accel.h"
 #include "query/point_bounds.h"
 
-/* --- the top: levels 0 to the cut level, without faces. It does not change after it is made; any
- * thread may use it --- */
+/* --- the top: levels 0 to the cut level, without faces. The top does not change after it is made;
+ * any thread may use it --- */
 
 /* A range of ebpo_top.planes. */
 typedef struct ebpo_top_planes {
@@ -47,8 +47,9 @@ EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_fil
                                                   ebpo_error *error);
 void ebpo_top_free(ebpo_top *top);
 
-/* Return upper bounds, from the counts in the file header, of the bytes that ebpo_top_read and
- * ebpo_top_read_envelopes will take. */
+/* ebpo_top_estimate and ebpo_top_envelopes_estimate return upper bounds of the bytes that
+ * ebpo_top_read and ebpo_top_read_envelopes will take. The bounds follow from the counts in the
+ * file header. */
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
@@ -111,7 +112,7 @@ unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double 
                                     ebpo_shared_box out[EBPO_SHARED_BOXES]);
 
 /* The skeletons of a model's subtrees. `number`: index of a subtree in top->below. Any thread may
- * use them. */
+ * use the skeletons. */
 typedef struct ebpo_skeletons ebpo_skeletons;
 
 /* Makes an empty table for `count` subtrees. `space`: quota in bytes for all skeletons
@@ -122,8 +123,9 @@ ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *
 void ebpo_skeletons_free(ebpo_skeletons *all);
 /* Returns how many bytes of `space` the skeletons of `count` subtrees can use at most. */
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space);
-/* Reserve bytes of the quota for other data about subtrees (deep bounds, nearest.h), and give them
- * back. The first function returns false if the quota is too small. Any thread may call them. */
+/* ebpo_skeletons_take reserves bytes of the quota for other data about subtrees (deep bounds,
+ * nearest.h), and returns false if the quota is too small. ebpo_skeletons_give_back gives such
+ * bytes back. Any thread may call these functions. */
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes);
 void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
 /* Returns the bytes of memory that are used now. */
@@ -180,14 +182,15 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
 
-/* The first function reserves bytes for a model that is held completely in memory. It returns false
- * if the bytes exceed the quota of whole models or the free part of the budget. The second function
- * gives bytes back: unused bytes, or, when the model is closed, all bytes. */
+/* ebpo_budget_take_whole reserves bytes for a model that is held completely in memory. It returns
+ * false if the bytes exceed the quota of whole models or the free part of the budget.
+ * ebpo_budget_give_back_whole gives bytes back: unused bytes, or, when the model is closed, all
+ * bytes. */
 bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
 void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
 
-/* The first function reserves at most `wanted` bytes of the quota of skeletons, and returns their
- * number. The second function gives bytes back. */
+/* ebpo_budget_take_skeletons reserves at most `wanted` bytes of the quota of skeletons, and returns
+ * the number of reserved bytes. ebpo_budget_give_back_skeletons gives bytes back. */
 uint64_t ebpo_budget_take_skeletons(ebpo_budget *budget, uint64_t wanted);
 void ebpo_budget_give_back_skeletons(ebpo_budget *budget, uint64_t bytes);
 

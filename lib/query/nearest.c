@@ -5,12 +5,12 @@
  * drops nodes that are certainly farther than the best face. Bounds of nodes and faces are in
  * single precision with bounded errors (nearest_kernels.c). The remaining faces are compared by
  * guaranteed bounds in double precision. If the bounds of two faces overlap, exact arithmetic
- * compares the faces. Of equally near faces, the result is the face with the lowest index in the
- * file. If the point is so far from the subtree that single precision does not suffice, the search
- * uses boxes in double precision. If the point is so far from the model that its distances are
- * nearly equal as doubles (a far point), the search compares keys in place of distances: the
- * smaller the distance, the smaller the key (point_bounds.h). One search (ebpo_nearest) may visit
- * several accels one after the other. */
+ * compares the faces. If several faces are equally near, the result is the face with the lowest
+ * index in the file. If the point is so far from the subtree that single precision does not
+ * suffice, the search uses boxes in double precision. If the point is so far from the model that
+ * its distances are nearly equal as doubles (a far point), the search compares keys in place of
+ * distances: the smaller the distance, the smaller the key (point_bounds.h). One search
+ * (ebpo_nearest) may visit several accels one after the other. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -64,7 +64,7 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 /* --- the search --- */
 
 /* If a coordinate of a point in the subtree's frame (in which the subtree is about -1 .. 1) is at
- * least this, single precision does not distinguish the distances of the subtree's faces. */
+ * least this value, single precision does not distinguish the distances of the subtree's faces. */
 #define FAR_COORDINATE 32.0
 
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
@@ -166,7 +166,7 @@ void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_le
 
 /* --- near: single precision --- */
 
-/* Converts the point for kernels. Returns false if it is too far for single precision. */
+/* Converts the point for kernels. Returns false if the point is too far for single precision. */
 static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
 {
     double greatest = 1;
@@ -182,9 +182,9 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    /* On each axis, the rounding error of `local` is at most 2^-24 times `greatest`; over three
-     * axes it is at most 1.74 times as much. The factor is 2^-22 to include the rounding of
-     * limits: docs/develop/bounds.md, "Limits of points". */
+    /* On each axis, the rounding error of `local` is at most 2^-24 times `greatest`. The error of
+     * the position in space is at most 1.74 times as much. The factor is 2^-22 to include the
+     * rounding of limits: docs/develop/bounds.md, "Limits of points". */
     out->error = (float)greatest * 0x1p-22f;
     return true;
 }
@@ -197,7 +197,7 @@ static float frame_limit(const ebpo_near_search *g)
     return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
 }
 
-/* Tests all waiting candidates, beginning with the one with the least lower bound. */
+/* Tests all waiting candidates, beginning with the candidate that has the least lower bound. */
 static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;

@@ -7,8 +7,8 @@
 #include "geometry/distance.h"
 #include "query/query_node.h"
 
-/* Returns the exact sign of distance(p, a) - distance(p, b). It is fast if the bounds of both
- * distances do not overlap. */
+/* Returns the exact sign of distance(p, a) - distance(p, b). The function is fast if the bounds of
+ * the two distances do not overlap. */
 int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distance_bounds *a_bounds,
                       const double b[3][3], const ebpo_distance_bounds *b_bounds);
 
@@ -40,13 +40,14 @@ typedef struct ebpo_nearest {
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
                         double max_distance);
 
-/* Returns the limit for lower bounds of nodes: of keys for a far point, otherwise of distances. */
+/* Returns the limit for lower bounds of nodes: a limit of keys for a far point, otherwise a limit
+ * of distances. */
 static inline double ebpo_nearest_limit(const ebpo_nearest *n)
 {
     return n->far.far ? n->key_limit : n->limit;
 }
-/* Records that a part is not visited because of the deadline. `lower`: its lower bound (a distance,
- * or a key for a far point). */
+/* Records that a part of the model is not visited because of the deadline. `lower`: lower bound of
+ * the part (a distance, or a key for a far point). */
 static inline void ebpo_nearest_pass_over(ebpo_nearest *n, double lower)
 {
     double distance = n->far.far ? ebpo_far_lower(&n->far, lower) : lower;
@@ -94,12 +95,13 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  *
  * Deep bounds are nodes of the first levels below the cut level (at which the roots of subtrees
  * are), with their envelopes but without faces: a few bytes for each node. For a subtree that was
- * never loaded, they give a better bound than the envelope of the subtree's root. (For a subtree
- * that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep bounds
- * are read together, after queries have spent about as much time on loading subtrees without need
- * as reading deep bounds takes. So they delay neither opening a model nor queries along a path.
- * They are used for local files only, because for remote files the additional request would cost as
- * much as it saves. Their memory counts towards the quota of skeletons. */
+ * never loaded, deep bounds give a better bound than the envelope of the subtree's root. (For a
+ * subtree that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep
+ * bounds are read together. They are read when queries have loaded so many subtrees without need
+ * that reading the deep bounds takes no longer than these loads took. So deep bounds delay neither
+ * opening a model nor queries along a path. Deep bounds are used for local files only, because for
+ * remote files the additional request would cost as much as it saves. Their memory counts towards
+ * the quota of skeletons. */
 
 /* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
  * levels below the cut level. Reports no error: if the file cannot be read, later queries fail. */

@@ -168,10 +168,11 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
 /* Computes bounds of the distances of eight faces: the computed distance minus and plus a margin.
  * The margin is 2^-16 r, where r is the sum of the absolute coordinates of a corner and two edges,
  * plus EBPO_NEAR_UNDERFLOW for the underflow of squares. For a "sturdy" face, whose height is at
- * least an eighth of its longest edge, the computed distance is that to its plane if the point
- * projects into the face, otherwise that to its edges. For other faces it is always that to the
- * edges; no point of a face is farther from the edges than the face's height, so the height is
- * subtracted from the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces". */
+ * least an eighth of its longest edge, the computed distance is the distance to the face's plane if
+ * the point projects into the face, otherwise the distance to the face's edges. For other faces,
+ * the computed distance is always the distance to the edges. No point of a face is farther from the
+ * edges than the face's height, so for these faces the height is subtracted from the lower bound.
+ * Proof: docs/develop/bounds.md, "Points against eight faces". */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;
@@ -208,7 +209,7 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 /* --- the walk --- */
 
 /* Visits a block, whose parent is `node`. First lowers the limit to the least upper bound of the
- * eight faces, so that most of them are known to be farther. Adds the remaining faces to the
+ * eight faces, so that most of the faces are known to be farther. Adds the remaining faces to the
  * candidates. */
 EBPO_EIGHT void near_block_in(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
@@ -309,9 +310,9 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
 }
 
 /* Visits the first block (g->first_block), if there is one. Returns the node where the walk begins.
- * Without a first block, this is the root. With one, this is the first node, on the way from the
- * block up to the root, compared with which the search is small (NEAR_SMALL); above this node, the
- * search hardly ever needs another child. */
+ * Without a first block, the walk begins at the root. With a first block, the walk begins at the
+ * lowest node above this block compared with which the search is small (NEAR_SMALL). Above this
+ * node, the search hardly ever needs another child. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
 {
     const ebpo_bound *bound = g->s->bound;

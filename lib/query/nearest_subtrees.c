@@ -5,9 +5,10 @@
  * lower bounds of their distance. The search ends when the next bound is beyond the best face. So a
  * subtree is loaded only if its bound is at most the result; this does not depend on what is in
  * memory. If a subtree was loaded before, its bound comes from its skeleton (upper nodes of its
- * hierarchy over faces, skeleton.c). If it never was, its bound comes from the envelopes of the
- * first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are read after queries
- * have loaded many subtrees that they would not have needed with better bounds. */
+ * hierarchy over faces, skeleton.c). If a subtree was never loaded, its bound comes from the
+ * envelopes of the first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are
+ * read after queries have loaded many subtrees that they would not have needed with better bounds.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -57,10 +58,10 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
 /* Number of levels of deep bounds. Each level takes four times the memory of the level above it; a
  * third level would save only a tenth of the remaining loads (docs/develop/design.md). */
 enum { DEEP_LEVELS = 2 };
-/* A *new* subtree has no skeleton, because it was never loaded. A query near the last one loads at
- * most a few new subtrees. If a query loads more than NEW_NEEDED new subtrees, the excess counts as
- * loaded without need. Deep bounds are read after LOADS_TO_READ loads without need, which take
- * about as long as reading two levels. */
+/* A *new* subtree has no skeleton, because it was never loaded. A query near the previous query
+ * loads at most a few new subtrees. If a query loads more than NEW_NEEDED new subtrees, the excess
+ * counts as loaded without need. Deep bounds are read after LOADS_TO_READ loads without need, which
+ * take about as long as reading two levels. */
 enum { NEW_NEEDED = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
@@ -158,8 +159,8 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
 }
 
 /* Returns a guaranteed lower bound of the distance to the faces in the cell of a node of the cut
- * level, from deep bounds. `lower`: a known lower bound; the result is at least this. A bound
- * beyond `limit` need not be the best one. Any thread. */
+ * level, from deep bounds. `lower`: a known lower bound; the result is at least this bound. Once a
+ * bound is beyond `limit`, no better bound is searched for. Any thread. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit)
 {
@@ -249,13 +250,13 @@ static bool is_in_memory(const ebpo_context *c, uint32_t below)
            ebpo_cache_has(c->model->cache, ebpo_context_key(c, below));
 }
 
-/* Before a subtree of a remote file is entered, sends prefetch hints for it and for other new
- * subtrees that the search probably needs, so that one round trip fetches all of them. The result
- * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
- * first 3/16 of this interval are requested. For 60 points anywhere in the box of a model of 4.3
- * million faces, a query takes 11.5 round trips and 999 kB without these hints, 6.9 and 1,040 kB
- * with 3/16, 6.0 and 1,103 kB with 1/2. For far points, whose bounds are keys (point_bounds.h), no
- * hints are sent. */
+/* Before a subtree of a remote file is entered, sends prefetch hints for this subtree and for other
+ * new subtrees that the search probably needs, so that one round trip fetches all of them. The
+ * result of the search is between the bound of this subtree and the limit; the subtrees with bounds
+ * in the first 3/16 of this interval are requested. For 60 points anywhere in the box of a model of
+ * 4.3 million faces, a query takes 11.5 round trips and 999 kB without these hints, 6.9 and 1,040
+ * kB with 3/16, 6.0 and 1,103 kB with 1/2. For far points, whose bounds are keys (point_bounds.h),
+ * no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
@@ -274,7 +275,7 @@ static void hint_subtrees(searching *g, uint32_t below, double lower)
     ebpo_context_hint(c, hinted, count);
 }
 
-/* Searches all faces of a subtree, unless this query has done that. */
+/* Searches all faces of a subtree, unless this query has already searched the subtree. */
 static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_node node = r->node;
@@ -449,7 +450,7 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
 }
 
 /* Handles a subtree without skeleton that leaves the queue for the first time. If deep bounds
- * increase its bound, it goes back to the queue; otherwise it is searched. */
+ * increase the subtree's bound, the subtree goes back to the queue. Otherwise it is searched. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };

@@ -3,8 +3,8 @@
  *
  * If the point is at least 16 sizes of the model's box away (a far point), doubles hardly
  * distinguish distances. Then the bounds are bounds of keys, which have the same order as distances
- * (point_bounds.h). Variables are named as there: y, h (half), u (toward).
- * Rounding: docs/develop/bounds.md, "Points far away". */
+ * (point_bounds.h). Variables are named as in point_bounds.h: y, h (half), u (toward). Rounding:
+ * docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -165,8 +165,8 @@ static double distance_of(const ebpo_far *f, double key, double share)
     return square > 0 ? f->distance * sqrt(square) * (1 + share) : 0;
 }
 
-/* Bounds are enlarged by this, because the relative rounding error of denormal numbers is larger.
- */
+/* Bounds are enlarged by this value, because the relative rounding error of denormal numbers is
+ * larger. */
 static const double denormal_error = 0x1p-1070;
 
 double ebpo_far_lower(const ebpo_far *f, double key)
@@ -321,7 +321,7 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
     }
 }
 
-/* Let m be the middle of the child's box, a the axis of the cylinder, and
+/* Let x be a point of the child, m the middle of the child's box, a the axis of the cylinder, and
  * N(v) = sqrt(v . v - (v . a)^2). Then |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) and, by Cauchy
  * and Schwarz, (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m). See
  * docs/develop/bounds.md. */

@@ -1,5 +1,5 @@
 /* Computes guaranteed bounds of the distances from a point to cells and envelopes. For a far point
- * (see below), also to the boxes, bounding cylinders and faces of subtrees. */
+ * (see below), also computes bounds for the boxes, bounding cylinders and faces of subtrees. */
 #ifndef EBPO_QUERY_POINT_BOUNDS_H
 #define EBPO_QUERY_POINT_BOUNDS_H
 
@@ -16,7 +16,7 @@ bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *co
                          const double p[3]);
 
 /* Returns a guaranteed lower bound of the distance of p to the part of the cell in all half-spaces
- * (`count` plane codes). A bound beyond `enough` need not be the best one. */
+ * (`count` plane codes). Once a bound is beyond `enough`, no better bound is searched for. */
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
                               uint32_t count, const double p[3], double enough);
 /* Returns an upper bound of the distance of p to the farthest point of the cell, and to any face
@@ -27,8 +27,8 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3]);
 /* --- far points ---
  *
  * If a point p is very far from a model, its distances to different parts of the model are nearly
- * or exactly equal as doubles. Keys replace these distances: numbers in the same order. Let c be
- * the middle of the model's box. The key of a point x is
+ * or exactly equal as doubles. Keys replace these distances. Keys are numbers that have the same
+ * order as the distances. Let c be the middle of the model's box. The key of a point x is
  *     key(x) = (|p - x|^2 - |p - c|^2) / (2 |p - c|).
  * Its absolute value is at most about the model's size. Let y be the position of x relative to c,
  * in a unit of about the model's size, u the direction from c to p, and h = 1 / (2 |p - c|) in that
@@ -66,8 +66,8 @@ typedef struct ebpo_far_frame {
     double offset[3], ratio;
     double margin; /* bound of the error of keys in this accel */
 } ebpo_far_frame;
-/* Makes this conversion. `centre`, `scale`: of the accel's frame; `largest`: bound of the absolute
- * coordinates in the frame. */
+/* Makes this conversion. `centre`, `scale`: centre and scale of the accel's frame. `largest`: bound
+ * of the absolute coordinates in the frame. */
 ebpo_far_frame ebpo_far_frame_of(const ebpo_far *far, const double centre[3], double scale,
                                  double largest);
 /* Compute lower bounds of the keys of a node's children: of all children from their boxes, and of

@@ -116,8 +116,8 @@ struct ebpo_near_search {
     uint32_t from[EBPO_VISITS_MAX]; /* parents of the stack's visits */
 };
 
-/* Added to errors of distances. The error from underflow of squares is far less: about
- * sqrt(2^-149). */
+/* This value is added to errors of distances. The error from underflow of squares is far less:
+ * about sqrt(2^-149). */
 #define EBPO_NEAR_UNDERFLOW 0x1p-56f
 
 /* Lowers `best` and the limit for squared bounds, which includes rounding errors. */
@@ -144,7 +144,7 @@ typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL }
 
 typedef struct ebpo_ray_search ebpo_ray_search;
 
-/* A face that the ray may hit, at a t of at least `low` (in the frame). `facing`: as in
+/* A face that the ray may hit, at a parameter t of at least `low` (in the frame). `facing`: as in
  * ebpo_ray_intersection if the line certainly goes through the face's interior, otherwise 0. */
 typedef struct ebpo_ray_candidate {
     float low;
@@ -157,7 +157,7 @@ struct ebpo_ray_search {
     /* Set by the caller. */
     const ebpo_segment *ray;
     ebpo_ray_wants wants;
-    int facing;   /* 1, -1: only front faces, back faces; 0: all */
+    int facing;   /* 1: only front faces; -1: only back faces; 0: all faces */
     double limit; /* hits with a greater t are not needed; decreases during the search */
     /* Tests a face exactly (`facing`: as in a candidate), keeps it if it is a wanted hit, and
      * updates search->limit and search->done. */
@@ -175,12 +175,13 @@ struct ebpo_ray_search {
     double direction[3], origin[3], error;
     /* Set by the kernels. Each of the next three arrays has one float for each axis and an unused
      * fourth float. near_from, far_from: the origin for the nearer and for the farther sides of
-     * boxes, moved by the error so that no box is missed. inverse: of the direction. */
+     * boxes, moved by the error so that no box is missed. inverse: reciprocals of the direction's
+     * coordinates. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
     double inverse_double[4]; /* inverse of the direction; small coordinates were replaced */
     /* byte offsets in ebpo_bound: of the nearer sides of boxes on each axis, and of the farther
-     * ones */
+     * sides */
     const uint8_t (*side_at)[3];
     int axis[3]; /* the axes x, y, z of tests of faces; z has the direction's longest coordinate */
     float shear[3]; /* how x, y and t change for a step of 1 along z */
@@ -228,7 +229,7 @@ typedef struct ebpo_inside_kernels {
     /* Returns the sum of the certain crossings (ebpo_axis_crossing) of the segment with a leaf's
      * listed faces. The segment must be in the leaf's cell. Appends the slots of faces that are not
      * certain to `open` (capacity: 8 for each block), and adds their number to *open_count. Every
-     * face that contains an end of the segment is one of these. */
+     * face that contains an end of the segment is among the appended faces. */
     int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     ebpo_cell_faces_fn *cell_faces;

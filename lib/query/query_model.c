@@ -4,7 +4,7 @@
  * A model is completely in memory if its budget allows that. If not, it has the top of the tree
  * (levels 0 to the cut level) and a cache of the subtrees below; budget.c makes this plan. Any
  * thread may use a model. A context has the buffers of queries and a pinned subtree, which stays in
- * memory; it is used by one thread at a time. */
+ * memory. A context is used by one thread at a time. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -230,8 +230,8 @@ static uint64_t space_for_marks(const ebpo_model *m, const ebpo_accel *s, uint64
     return unused < marks ? unused : marks;
 }
 
-/* Loads a subtree for the cache, within `quota` bytes. *bytes: bytes that it keeps or, after
- * EBPO_E_LIMIT, bytes that it needs. */
+/* Loads a subtree for the cache, within `quota` bytes. *bytes: bytes that the subtree keeps or,
+ * after EBPO_E_LIMIT, bytes that it needs. */
 static ebpo_status load_subtree(void *user, uint64_t key, uint64_t quota, void **item,
                                 uint64_t *bytes, ebpo_error *error)
 {

@@ -109,7 +109,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t cou
                                               ebpo_error *error);
 
 /* Returns EBPO_E_LIMIT if the budget is too small for this leaf in addition to the top and the
- * chunks. For EBPO_LOAD_NODES, which loads one leaf at a time, without the cache. */
+ * chunks. Used for EBPO_LOAD_NODES, which loads one leaf at a time, without the cache. */
 EBPO_MUST_USE ebpo_status ebpo_model_has_capacity(const ebpo_model *model, const ebpo_node *leaf,
                                                   ebpo_error *error);
 
@@ -140,8 +140,8 @@ static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
                                                               : ebpo_subtree_key(below, false);
 }
 
-/* Gets the subtree top->below[below], and pins it: it stays in memory until the context requests
- * another one or releases it. */
+/* Gets the subtree top->below[below], and pins it: the subtree stays in memory until the context
+ * requests another subtree or releases this one. */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,
                                                ebpo_accel **out, ebpo_error *error);
 /* Releases the pinned subtree, so that other contexts may use its memory; NULL is allowed. */

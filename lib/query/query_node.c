@@ -118,7 +118,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    /* That the node is pruned may be known only now, from the subtree's table. */
+    /* For some pruned nodes, only the subtree's table shows that the node is pruned. */
     if (ebpo_node_is_subtree_root(node))
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
@@ -150,7 +150,8 @@ double ebpo_rank_cell_end(const ebpo_ranking *r, ebpo_cell cell)
     return r->far ? ebpo_far_cell_end(r->far, &r->box, cell) : ebpo_cell_far(&r->box, cell, r->p);
 }
 
-/* Does the same as ebpo_rank_node, but a bound beyond `enough` need not be the best one. */
+/* Does the same as ebpo_rank_node, but once a bound is beyond `enough`, no better bound is searched
+ * for. */
 static double bound_until(const ebpo_ranking *r, const ebpo_node *node, double parent,
                           double enough)
 {

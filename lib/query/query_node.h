@@ -16,9 +16,9 @@ static inline bool ebpo_node_is_subtree_root(const ebpo_node *node)
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_SUBTREE_ROOT;
 }
 
-/* Enters a subtree. On entry, `node` is of the kind SUBTREE_ROOT; on return, it is the root node in
- * the subtree's table. The subtree is loaded if needed, and stays in memory until the context
- * enters another one. Returns EBPO_E_ABSENT for a pruned node. */
+/* Enters a subtree. On entry, `node` is of the kind SUBTREE_ROOT; on return, `node` is the root
+ * node in the subtree's table. The subtree is loaded if needed, and stays in memory until the
+ * context enters another subtree. Returns EBPO_E_ABSENT for a pruned node. */
 EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node,
                                            ebpo_error *error);
 
@@ -30,7 +30,7 @@ ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsig
  * nodes of the cursor are used, the context may not be used for queries. */
 extern const ebpo_node_source ebpo_context_source;
 
-/* Returns the plane codes of the node itself, without those of its ancestors. */
+/* Returns the plane codes of the node itself, without the codes of the node's ancestors. */
 const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node, uint32_t *count);
 
 /* A point p. Nodes are ranked by lower bounds of the distance of p to the faces in them. */
@@ -48,13 +48,13 @@ static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double
     return (ebpo_ranking){ model, ebpo_model_box(model), p, far && far->far ? far : NULL };
 }
 
-/* Returns the lower bound of a node: the greater one of `parent` (its parent's bound) and the bound
- * from its cell and planes. */
+/* Returns the lower bound of a node: the greater of `parent` (the bound of the node's parent) and
+ * the bound from the node's cell and planes. */
 double ebpo_rank_node(const ebpo_ranking *ranking, const ebpo_node *node, double parent);
 /* Returns the lower bound of the root. */
 double ebpo_rank_root(const ebpo_ranking *ranking);
-/* Returns the lower bound of a cell with these planes. A bound beyond `enough` need not be the best
- * one. */
+/* Returns the lower bound of a cell with these planes. Once a bound is beyond `enough`, no better
+ * bound is searched for. */
 double ebpo_rank_cell(const ebpo_ranking *ranking, ebpo_cell cell, const uint32_t *codes,
                       uint32_t count, double enough);
 /* Returns an upper bound of the distance (ebpo_cell_far) or key of a cell's farthest point. */
