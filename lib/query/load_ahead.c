@@ -24,9 +24,8 @@
 
 /* A subtree that a query may need. */
 typedef struct wanted {
-    /* index in ebpo_top.below, the list of the subtrees that are loaded on demand */ uint64_t
-        *below;
-    double lower; /* lower bound of the distance */
+    uint64_t below; /* index in ebpo_top.below, the list of subtrees that are loaded on demand */
+    double lower;   /* lower bound of the distance */
 } wanted;
 
 /* A search for the nearest subtrees within a distance of a point. */

@@ -36,8 +36,8 @@ static ebpo_status no_memory(const reading *r)
     return ebpo_fail_memory(r->error, ebpo_top_estimate(r->info, r->top->cut_level));
 }
 
-/* Adds the planes of a node: the next `count` planes of the level. *plane_at: index of the first
- * one; on return, of the next node's first plane. */
+/* Adds the planes of a node: the next `count` planes of the level. *plane_at: index of the node's
+ * first plane; on return, index of the next node's first plane. */
 static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
                               uint64_t *plane_at, ebpo_top_planes *out)
 {
@@ -118,8 +118,8 @@ static bool is_pruned(const reading *r, int number, uint64_t rank)
            (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
 }
 
-/* Adds a pruned node as a root of a subtree. If it is above the cut level, the file has an empty
- * group for it in the next level, so it also gets a group, like a gray node. */
+/* Adds a pruned node as a root of a subtree. If the node is above the cut level, the file has an
+ * empty group for it in the next level. So the node also gets a group, like a gray node. */
 static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_node *node,
                               uint64_t *plane_at, uint32_t *entry)
 {

@@ -1,12 +1,12 @@
 /* Returns the faces within a distance of a point, one after the other, the nearest first. The order
  * is exact: by distance, then by index in the file.
  *
- * Faces are found in bands. A band is the next faces in this order, after the last face of the
- * previous band; their number is limited. So a stream of any length needs little memory. The first
- * band is small, for callers that need few faces. The search for a band is depth first, the nearest
- * child first. It skips nodes and faces that are certainly beyond the band's limit, or certainly in
- * an earlier band. Subtrees that are not in memory are loaded in the order of guaranteed lower
- * bounds of their distance, until the next bound is beyond the band. */
+ * Faces are found in bands. A band has a limited number of faces: the next faces in this order,
+ * after the last face of the previous band. So a stream of any length needs little memory. The
+ * first band is small, for callers that need few faces. The search for a band is depth first, the
+ * nearest child first. It skips nodes and faces that are certainly beyond the band's limit, or
+ * certainly in an earlier band. Subtrees that are not in memory are loaded in the order of
+ * guaranteed lower bounds of their distance, until the next bound is beyond the band. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -41,7 +41,7 @@ typedef struct near_band {
     near_face after;
     near_face *near; /* [count] candidates; after near_band_settle, the band's faces in order */
     uint64_t count, capacity;
-    bool cut; /* there may be faces within the radius after the band's last one */
+    bool cut; /* there may be faces within the radius after the band's last face */
     bool no_memory;
 } near_band;
 
@@ -74,7 +74,7 @@ static int compare_faces(const void *x, const void *y)
 }
 
 /* Sorts the candidates, removes duplicates, and keeps the nearest band->faces_max candidates. If
- * there are that many, lowers the limit to the distance of the last one. */
+ * there are band->faces_max candidates, lowers the limit to the distance of the last candidate. */
 static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
@@ -219,7 +219,7 @@ typedef struct within {
     uint64_t given;    /* number of faces passed to the caller */
     bool ahead;        /* all subtrees are listed before the first is entered (lists_ahead) */
     uint64_t hinted;   /* number of subtrees with a prefetch hint that have not been entered */
-    ebpo_near_fn take; /* of the caller, called with `user` and each face */
+    ebpo_near_fn take; /* the caller's function, called with `user` and each face */
     void *user;
 } within;
 

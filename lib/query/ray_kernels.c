@@ -78,10 +78,10 @@ EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned offset, f8 step, f8 from)
     return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + offset), step), from);
 }
 
-/* Returns a bit for each child whose box the ray may intersect between t = 0 and the limit; *enter:
- * the t at which it enters each box. The three axes are prepared together: the origin's coordinates
- * are in lanes 0 to 2, the step's in lanes 1 to 3. (Origin and step are adjacent in memory, so each
- * load of four floats also reads one number of the other array.) */
+/* Returns a bit for each child whose box the ray may intersect between t = 0 and the limit. *enter:
+ * the t at which the ray enters each box. The three axes are prepared together: the origin's
+ * coordinates are in lanes 0 to 2, the step's coordinates in lanes 1 to 3. (Origin and step are
+ * adjacent in memory, so each load of four floats also reads one number of the other array.) */
 EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, f8 *enter)
 {
     f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
@@ -173,8 +173,9 @@ EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
 /* Results for the faces of a block; masks have a bit for each lane. */
 typedef struct ray_lanes {
     float low[8], high[8]; /* bounds of t of possible hits */
-    unsigned alive, sure;  /* alive: faces that may be hit at a t of 0 to the limit; sure: faces
-                            * that certainly are */
+    /* alive: faces that may be hit at a t of 0 to the limit; sure: faces that are certainly hit at
+     * such a t */
+    unsigned alive, sure;
     /* faces through whose interior the ray's line certainly goes, from the front or from the back
      */
     unsigned front, back;

@@ -130,10 +130,11 @@ static double to_frame(ebpo_ray_search *r)
     return greatest;
 }
 
-/* Sets *t to a value shortly before the ray reaches the first faces: where it enters the cube from
- * -2 * `largest` to 2 * `largest`. `largest`: upper bound of the faces' coordinates. Returns false
- * if the ray misses the cube. The rounding error of *t is far smaller than the margin between faces
- * and cube. (An origin that is too far away for this is not moved: see ray_search_accel.) */
+/* Sets *t to a value shortly before the ray reaches the first faces: the t at which the ray enters
+ * the cube from -2 * `largest` to 2 * `largest`. `largest`: upper bound of the faces' coordinates.
+ * Returns false if the ray misses the cube. The rounding error of *t is far smaller than the margin
+ * between faces and cube. (An origin that is too far away for this computation is not moved: see
+ * ray_search_accel.) */
 static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
 {
     double from = 0, to = INFINITY;
@@ -151,8 +152,9 @@ static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
     return from <= to;
 }
 
-/* Moves the origin along the ray towards the faces, in double-double arithmetic, so that its
- * original distance hardly adds to the error. Returns false if the ray misses all faces. */
+/* Moves the origin along the ray towards the faces, in double-double arithmetic, so that the
+ * original distance of the origin hardly adds to the error. Returns false if the ray misses all
+ * faces. */
 static bool move_origin(ebpo_ray_search *r, double *greatest)
 {
     const ebpo_accel *s = r->s;
@@ -257,7 +259,7 @@ static int compare_found(const void *a, const void *b, void *ray)
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-/* Keeps a hit if it is the first one so far, and lowers the limit. */
+/* Keeps a hit if it is the first hit so far, and lowers the limit. */
 static void keep_first(casting *c, const ebpo_ray_found *m)
 {
     if (c->count && compare_found(m, &c->first, &c->ray) >= 0)
@@ -285,8 +287,8 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     }
 }
 
-/* Sorts hits. If there are few, sorts by insertion, which is fast because they are nearly in order:
- * the nearest boxes are visited first. */
+/* Sorts hits. If there are few, sorts by insertion, which is fast because the hits are nearly in
+ * order: the nearest boxes are visited first. */
 static void sort_found(ebpo_ray_found *found, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
@@ -317,7 +319,7 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     return EBPO_OK;
 }
 
-/* Returns the fault of a ray as ray_fault does; slower. */
+/* Returns the same as ray_fault, more slowly. */
 static const char *ray_fault_of(const ebpo_segment *ray)
 {
     double not_finite = 0, longest = 0; /* not_finite: 0, or NaN if a coordinate is not finite */
@@ -397,7 +399,8 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     }
 }
 
-/* Returns true if the ray may enter the node's cell before its limit (conservative). */
+/* Returns false only if the ray certainly does not enter the node's cell at a t of 0 to the limit.
+ */
 static bool intersects_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
 {
     double low[3], high[3], slack = 0, enter;
@@ -529,7 +532,7 @@ typedef struct batch {
     ebpo_ray_options options;
     ebpo_ray_wants wants;
     unsigned threads;
-    ebpo_context **context; /* [threads] the first one is the caller's context */
+    ebpo_context **context; /* [threads] the first context is the caller's */
     uint64_t *hit_count;    /* [threads] EBPO_WANTS_ALL: number of hits in each context */
     double *entry;          /* [work][3] points where rays enter the model's box, in the order of
                              * work */

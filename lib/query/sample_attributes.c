@@ -24,7 +24,8 @@ typedef struct sampled {
     const ebpo_attribute *head; /* attribute of the file */
     unsigned array, column;     /* index of the attribute in the file; index of its column */
     bool of_vertices;           /* the attribute belongs to vertices; false: to faces */
-    bool owner;                 /* this item must free `values`; later items may refer to them */
+    /* this item must free `values`; later items may use the same values */
+    bool owner;
     ebpo_attribute_values values;
 } sampled;
 
@@ -233,8 +234,8 @@ static void scale_by_power(double *v, int count, int by)
         v[i] = scalbn(v[i], by);
 }
 
-/* Computes e[0] = b - a, e[1] = c - a and e[2] = p - a for the corners a, b, c. They are scaled by
- * a power of two so that the largest coordinate of e[0] and e[1] is 1 to 2. */
+/* Computes e[0] = b - a, e[1] = c - a and e[2] = p - a for the corners a, b, c. The three vectors
+ * are scaled by a power of two so that the largest coordinate of e[0] and e[1] is 1 to 2. */
 static void edges_of(const double corner[3][3], const double p[3], double e[3][3])
 {
     double at[4][3];
@@ -247,7 +248,7 @@ static void edges_of(const double corner[3][3], const double p[3], double e[3][3
     scale_by_power(e[0], 9, -greatest_exponent(e[0], 6));
 }
 
-/* Computes weights for a face without area, by the position along the longest edge. e: as from
+/* Computes weights for a face without area, by the position along the longest edge. e: result of
  * edges_of. */
 static void weigh_edge(const double e[3][3], double weight[3])
 {

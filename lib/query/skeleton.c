@@ -66,7 +66,8 @@ static const double scale_max = 0x1p500, coordinate_max = 0x1p200;
 static uint64_t part_bytes(unsigned nodes) { return nodes * (uint64_t)sizeof(kept_node); }
 uint64_t ebpo_skeleton_bytes(unsigned nodes) { return sizeof(ebpo_skeleton) + part_bytes(nodes); }
 
-/* Adds the node of a child to the skeleton. `entry`: the child in bound.child of its parent. */
+/* Adds the node of a child to the skeleton. `entry`: address of the child in bound.child of the
+ * child's parent. */
 static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *entry)
 {
     uint32_t index = k->count++;
@@ -117,8 +118,8 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
 }
 
 /* Finds the largest child that has owned faces and whose node is not in the skeleton, and adds its
- * node, which improves the bounds most. Returns false if there is none.
- * `shared_end`: index of the first node after the nodes of shared faces. */
+ * node, which improves the bounds most. Returns false if there is no such child. `shared_end`:
+ * index of the first node after the nodes of shared faces. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t shared_end)
 {
     double largest = -1;
@@ -179,8 +180,8 @@ void ebpo_skeleton_free(ebpo_skeleton *k)
  */
 static const double certainly = 1 - 0x1p-40;
 
-/* Returns a squared lower bound of the distance to a cylinder, as in nearest_kernels.c. `to` is the
- * position of p relative to the middle of the box. */
+/* Returns a squared lower bound of the distance to a cylinder, as in nearest_kernels.c. `to`:
+ * position of the query point relative to the middle of the child's box. */
 static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3])
 {
     double along = 0, square = 0;
@@ -232,9 +233,9 @@ typedef struct nearest_child {
 } nearest_child;
 
 /* Searches, at or below the children `lanes` of a node, for a child whose node is not in the
- * skeleton and which is nearer than *best. Visits the nearest child first; tests its bounding
- * cylinder only if its box is near enough. `index`: of the node in the skeleton. `parent`: squared
- * bound of the node. */
+ * skeleton and which is nearer than *best. Visits the nearest child first, and tests the bounding
+ * cylinder of a child only if the child's box is near enough. `index`: index of the node in the
+ * skeleton. `parent`: squared bound of the node. */
 static void search_below(const ebpo_skeleton *k, uint32_t index, unsigned lanes, const double p[3],
                          double parent, nearest_child *best)
 {
@@ -264,7 +265,7 @@ static void search_below(const ebpo_skeleton *k, uint32_t index, unsigned lanes,
     }
 }
 
-/* Transforms a point to the frame. If it is too far, sets p to 0 and returns false. */
+/* Transforms a point to the frame. If the point is too far, sets p to 0 and returns false. */
 static bool to_frame(const ebpo_skeleton *k, const double point[3], double p[3])
 {
     bool near = true;

@@ -32,8 +32,8 @@ struct ebpo_subtree {
     ebpo_box box; /* the model's root cell */
     bool solid;
     ebpo_rule rule;
-    ebpo_node root; /* of the subtree */
-    /* The names of arrays are those of ebpo_subtree_nodes and ebpo_subtree_faces. */
+    ebpo_node root; /* root of the subtree */
+    /* The arrays have the same names as in ebpo_subtree_nodes and ebpo_subtree_faces. */
     int level_count;
     uint64_t level_first[EBPO_LEVELS_MAX + 1];
     uint64_t node_count;
@@ -171,7 +171,7 @@ static void add_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type ty
 }
 
 /* Copies the nodes of a level below the root: the children of the previous level's gray nodes.
- * Links them to their parents. */
+ * Links these nodes to their parents. */
 static void copy_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
 {
     const ebpo_level *level = &slice->level[i];
@@ -542,7 +542,7 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
 {
     const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
     ebpo_octcode found = ebpo_cursor_octcode(c);
-    /* A request for its children shows if the node is pruned. */
+    /* A request for the node's children shows if the node is pruned. */
     ebpo_status status = ebpo_cursor_children(c, &child, error);
     if (status != EBPO_OK)
         return status;
@@ -563,7 +563,7 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
 }
 
 /* Moves the cursor to the node with an octcode or, with or_leaf_above, to the leaf that contains
- * its cell. */
+ * the octcode's cell. */
 static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf_above,
                              ebpo_cursor *c, ebpo_error *error)
 {

@@ -21,7 +21,8 @@ ebpo_status ebpo_winding(ebpo_context *context, const double *points, uint64_t c
         ebpo_bounded w = { 0, 0 };
         bool apart = true; /* the point is on no face */
         ebpo_inside_result r;
-        /* For a surface, r.winding becomes the winding number of surface and caps. */
+        /* For a surface, r.winding becomes the winding number of the closed mesh of surface and
+         * caps. */
         context->undecided = m->holes != NULL;
         status = ebpo_inside(context, points + 3 * i, NULL, &r, error);
         context->undecided = false;
