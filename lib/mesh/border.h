@@ -6,9 +6,9 @@
 #include <ebpo/mesh.h>
 
 /* Simple closed loops (no repeated vertex, at least three edges). Loop i consists of
- * vertex[first[i] .. first[i + 1]). For each directed edge, the sum of the weights of the loops
- * that contain it is the number of its uses by faces in this direction, minus the number of uses in
- * the opposite direction. */
+ * vertex[first[i] .. first[i + 1]). For each directed edge, let n be the number of its uses by
+ * faces in this direction, and m the number of its uses in the opposite direction. The weights of
+ * the loops that contain the edge have the sum n - m. */
 typedef struct ebpo_border {
     uint64_t loop_count;
     uint64_t edge_count; /* number of unbalanced edges of the mesh */

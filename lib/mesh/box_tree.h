@@ -23,8 +23,8 @@ typedef struct ebpo_box_tree {
     ebpo_workspace *workspace;
     ebpo_tree_point *point; /* added in any order; sorted by the build */
     uint64_t count, capacity;
-    /* for each node, the box of its points; nodes 2 i + 1 and 2 i + 2 are the halves of node i; of
-     * n points of a node, the first half has n / 2 (rounded down) */
+    /* for each node, the box of its points. Nodes 2 i + 1 and 2 i + 2 are the halves of node i. If
+     * node i has n points, node 2 i + 1 has n / 2 (rounded down) of them */
     ebpo_point_box *node;
     uint64_t node_capacity;
     /* for each node, the box that contains the boxes of its items; NULL: a tree of points */

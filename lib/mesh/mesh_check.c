@@ -87,9 +87,9 @@ static void join_trees(uint32_t *parents, uint32_t a, uint32_t b)
     }
 }
 
-/* Returns true if ad - bc is certainly nonzero: its rounded value exceeds 1e-15 times |ad| + |bc|,
- * which is more than the error bound (3.33e-16 times that sum, Shewchuk 1997), and nothing
- * underflows or overflows. */
+/* Returns true if ad - bc is certainly nonzero. This is certain if the rounded value exceeds 1e-15
+ * times |ad| + |bc|, and nothing underflows or overflows. (The error bound is 3.33e-16 times this
+ * sum: Shewchuk 1997.) */
 static bool surely_nonzero(double a, double b, double c, double d)
 {
     double permanent = fabs(a * d) + fabs(b * c);

@@ -22,8 +22,9 @@
 
 /* State of one thread. */
 typedef struct seeker {
-    /* probes of the current host; the value of a probe is the sum of the crossings from the probe
-     * to a point outside, which is minus the host's winding number at the probe */
+    /* probes of the current host. The value of a probe is the sum of the crossings with the host on
+     * a segment from the probe to a point outside. This sum is minus the host's winding number at
+     * the probe */
     ebpo_box_tree probes;
     struct probing *all;
     const ebpo_shell *host;  /* current host */

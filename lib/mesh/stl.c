@@ -324,11 +324,11 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
 }
 
 /* Adds the face attribute `attribute` (the attribute words) if some word is not 0, and the face
- * attribute `red green blue` if some face has a colour. A word has five bits for each channel. In
- * files with COLOR= in the first 80 bytes (Magics), the lowest five bits are red, and the word is a
- * colour if bit 15 is 0; other faces have the colour after COLOR=. In other files (VisCAM), the
- * lowest five bits are blue, and the word is a colour if bit 15 is 1; other faces are white. The
- * mesh must have the faces of the file. EBPO_E_MEMORY, EBPO_E_IO. */
+ * attribute `red green blue` if some face has a colour. A word has five bits for each channel. Two
+ * kinds of files differ. If the first 80 bytes contain COLOR= (Magics), the lowest five bits are
+ * red, and the word is a colour if bit 15 is 0. Other faces have the colour after COLOR=. Without
+ * COLOR= (VisCAM), the lowest five bits are blue, and the word is a colour if bit 15 is 1. Other
+ * faces are white. The mesh must have the faces of the file. EBPO_E_MEMORY, EBPO_E_IO. */
 static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
                                     ebpo_error *error)
 {

@@ -43,7 +43,7 @@ typedef enum ebpo_leaf_kind {
  */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
 /* Values of `cell_face` for a leaf without a free cell face. EBPO_NEAR_BORDER: the leaf of a
- * surface is near the border (the edges of holes), so each query computes the generalized winding
+ * surface is near the border (the edges of holes). Then each query computes the generalized winding
  * number of its point (holes.h), and `rows` holds the leaf's mark (ebpo_marked_entry in holes.h) in
  * place of a row number. */
 enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7 };
@@ -53,8 +53,8 @@ enum { EBPO_KIND_PLANES_MAX = 16 };
 /* An entry of a leaf's list: a block. Bits 0 to 28 are the block's number. Bit 29 is set in the
  * last entry of the leaf. Bits 32 to 39 are the block's lanes whose faces the leaf lists (the block
  * may have faces that the leaf does not list). Bits 40 to 63 are a box around the listed faces
- * within the cell: for each axis four bits for the lower side and four bits for 15 minus the upper
- * side, in sixteenths of the cell (EBPO_LISTED_CELLS), rounded outward. Bits 40 to 63 are 0 (the
+ * within the cell, in sixteenths of the cell (EBPO_LISTED_CELLS), rounded outward. For each axis,
+ * four bits are the lower side and four bits are 15 minus the upper side. Bits 40 to 63 are 0 (the
  * whole cell) until ebpo_leaf_is_bounded. */
 typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };

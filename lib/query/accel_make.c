@@ -28,8 +28,8 @@
 /* --- memory --- */
 
 /* Returns the maximum number of entries of all leaves' lists. Each reference (a listed face that an
- * earlier leaf lists, too) takes at most one entry. The new faces of a leaf (all other listed
- * faces) are in one block if they are at most 8; if they are n > 8, in at most 2 n / 9 blocks. */
+ * earlier leaf lists, too) takes at most one entry. The n new faces of a leaf (all other listed
+ * faces) are in one block if n <= 8, otherwise in at most 2 n / 9 blocks. */
 static inline uint64_t list_max(uint64_t refs, uint64_t leaves, uint64_t faces)
 {
     return refs + leaves + faces / 9 * 2 + 2;

@@ -2,9 +2,9 @@
  * box and a bounding cylinder around all blocks below the child.
  *
  * Bounds are computed in doubles, in the subtree's frame (coordinates in which the subtree's cell
- * has a size of 1 to 2), and then rounded outward: boxes to 8 bits, cylinders to 16 bits. Blocks of
- * floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md proves that the
- * bounds are still valid when kernels read them in single precision. */
+ * has a size of 1 to 2). Then they are rounded outward: boxes to 8 bits, cylinders to 16 bits.
+ * Blocks of floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md proves
+ * that the bounds are still valid when kernels read them in single precision. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -288,8 +288,8 @@ static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
 }
 
 /* Sets from, to and radius2 of a cylinder around all vertices of the blocks begin .. end - 1 of the
- * layout. The interval from .. to need not contain 0: if the faces are tilted against the axes of
- * coordinates, the middle of the faces' box may be on one side of all faces. */
+ * layout. The interval from .. to need not contain 0. For example, if the faces are tilted against
+ * the axes of coordinates, the middle of the faces' box may be on one side of all faces. */
 static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     cylinder_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };

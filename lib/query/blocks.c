@@ -20,8 +20,9 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* The result of the walk below a node of the octree: either at most eight faces that have no block
- * yet, or at most eight members (blocks or nodes of the hierarchy), which contain its faces. */
+/* The result of the walk below a node of the octree. It has either at most eight faces that have no
+ * block yet, or at most eight members: blocks or nodes of the hierarchy that contain the octree
+ * node's faces. */
 typedef struct bundle {
     uint32_t begin, end; /* range of faces, as local indices */
     int members;         /* number of members; 0: the faces have no block yet */
@@ -196,9 +197,9 @@ static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Sorts blocks in the order of their faces (until now they are in the order in which the walk made
- * them), so that the blocks below a node of the hierarchy are one range. Returns false when out of
- * memory. */
+/* Sorts blocks in the order of their faces, so that the blocks below a node of the hierarchy are
+ * one range. Before the call, the blocks are in the order in which the walk made them. Returns
+ * false when out of memory. */
 static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
 {
     uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face), /* block that begins at this face */

@@ -154,9 +154,9 @@ static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, 
     return small == 1;
 }
 
-/* Begins to bound w_D at the centre of a cell. *variation bounds a difference between the centre
- * and any other point of the cell: the difference of 2 pi w_S if no face touches the cell, and the
- * difference of 2 pi w_D if no cap touches the cell. Returns false if there is no such bound. */
+/* Begins to bound w_D at the centre of a cell. *variation bounds the difference between the values
+ * at the centre and at any other point of the cell. The values are 2 pi w_S if no face touches the
+ * cell, and 2 pi w_D if no cap touches the cell. Returns false if there is no such bound. */
 static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variation)
 {
     const ebpo_cap_box centre = ebpo_cap_point(box->centre);

@@ -2,18 +2,18 @@
  *
  * In leaves of some kinds, the signs of the planes of the leaf's faces at the point decide
  * (leaf_kinds.c). In other leaves, the winding number at the point is the winding number at a known
- * position of the cell, plus the crossings of faces with axis-parallel segments from this position
- * to the point: one segment from a free cell face (a cell face that no face intersects), or three
- * segments from the cell's lowest corner. A filter in single precision counts the crossings first
- * (inside_kernels.c). A face that the filter cannot decide is *open*; exact predicates decide it.
- * In a model that is completely in memory, a batch goes down the tree with several points at a
- * time.
+ * position of the cell, plus the crossings of faces on the way from this position to the point. The
+ * way is one axis-parallel segment from a free cell face (a cell face that no face intersects), or
+ * three such segments from the cell's lowest corner. A filter in single precision counts the
+ * crossings first (inside_kernels.c). A face that the filter cannot decide is *open*; exact
+ * predicates decide it. In a model that is completely in memory, a batch goes down the tree with
+ * several points at a time.
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
- * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. If the point
- * is in a pruned node (whose children are not in the file), an envelope decides, or the query fails
- * with EBPO_E_ABSENT. For surfaces, envelopes do not decide, because the inside of a surface may be
- * outside its envelopes.
+ * loads subtrees on the way. With EBPO_LOAD_NODES, such a query reads only the nodes on the way. If
+ * the point is in a pruned node (whose children are not in the file), an envelope decides, or the
+ * query fails with EBPO_E_ABSENT. For surfaces, envelopes do not decide, because the inside of a
+ * surface may be outside its envelopes.
  *
  * In a surface with its border (the edges of its holes), leaves and white nodes near the border are
  * marked, and points in them are decided by holes.c.

@@ -4,10 +4,10 @@
  * single precision, or double precision in accels (acceleration structures of subtrees) of doubles.
  * Faces that are not certain in this precision ("open" faces) are decided exactly by inside.c.
  *
- * find_reached_cell_faces finds the cell faces that the leaf's faces reach: a face reaches a cell
- * face if its extent on the axis goes up to the cell face or beyond. It also computes the box of
- * each block in the leaf's list. It is called once for each leaf, during one of the first queries
- * in this leaf. Its comparisons are exact.
+ * find_reached_cell_faces finds the cell faces that the leaf's faces reach. A face reaches a cell
+ * face if the extent of the face on the cell face's axis goes up to the cell face or beyond. It
+ * also computes the box of each block in the leaf's list. It is called once for each leaf, during
+ * one of the first queries in this leaf. Its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */

@@ -95,11 +95,11 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     c->prefetched_distance = fabs(search_distance);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
     /* Until the next prefetch, p moves by about side / 4. By this motion, envelopes come nearer by
-     * at most side / 4, and the search distance grows by at most side / 4. So queries need
-     * subtrees whose envelopes are within search_distance + side / 2. Under rules other than
-     * nonzero, envelopes do not decide if a point is inside: such a query needs the subtree whose
-     * cell contains the point, and the envelope of this subtree may be a cell's diagonal, 1.73
-     * sides, away. The sum of 0.5 and 1.73 is rounded up to 2.25. */
+     * at most side / 4, and the search distance grows by at most side / 4. So queries need subtrees
+     * whose envelopes are within search_distance + side / 2. Under rules other than nonzero,
+     * envelopes do not decide if a point is inside. Then a query needs the subtree whose cell
+     * contains the point. The envelope of this subtree may be a cell's diagonal, 1.73 sides, away.
+     * The sum of 0.5 and 1.73 is rounded up to 2.25. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(search_distance) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)

@@ -6,12 +6,12 @@
 
 #include "query/query_model.h"
 
-/* Requests the subtrees whose envelopes are within |search_distance| + 2.25 s of p, the nearest
- * first. s is the longest side of a cell of the cut level (at which the roots of subtrees are).
- * Does nothing if, since the last prefetch, p has moved by less than s / 4 and |search_distance|
- * has grown by at most s / 4. `search_distance`: the distance that the query at p returned, or its
- * limit if no face was found; 0 after ebpo_inside. Only for models that load subtrees into a cache.
- */
+/* Let s be the longest side of a cell of the cut level, at which the roots of subtrees are.
+ * Requests the subtrees whose envelopes are within |search_distance| + 2.25 s of p, the nearest
+ * first. Does nothing if, since the last prefetch, p has moved by less than s / 4 and
+ * |search_distance| has grown by at most s / 4. `search_distance`: the distance that the query at p
+ * returned, or its limit if no face was found; 0 after ebpo_inside. Only for models that load
+ * subtrees into a cache. */
 void ebpo_context_prefetch(ebpo_context *context, const double p[3], double search_distance);
 
 /* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first, but at most

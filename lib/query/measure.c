@@ -302,18 +302,18 @@ static double integral_error(const moments *m, uint64_t triangles)
 /* Sets the members that depend on the border.
  *
  * Rounding: the corners of a triangle are at most 2 from the middle on each axis, so the absolute
- * value of a coordinate of their sum is at most 6, and the error of first24 is at most 12 times the
- * error of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and an
- * error f of M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
+ * value of a coordinate of their sum is at most 6. Hence the error of first24 is at most 12 times
+ * the error of the integral. Let V = integral6, M = first24 and c = M / (4 V). An error e of V and
+ * an error f of M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
  *
  * Other caps: let k(x) be the winding number of a point x with our caps C, and k'(x) the winding
  * number with other caps C'. We assume two properties of the cap C'_i of each loop. First, C'_i
  * together with our cap C_i, reversed, is a closed surface with no other winding numbers than -w_i,
  * 0 and w_i, where w_i is the loop's weight. Second, C'_i is in the convex hull H_i of the loop (as
- * C_i is). Then |k'(x) - k(x)| is at most the sum of w_i over the hulls H_i that contain x, so the
+ * C_i is). Then |k'(x) - k(x)| is at most the sum of w_i over the hulls H_i that contain x. So the
  * integral changes by at most h = sum of w_i |H_i|, where |H_i| is the volume of the hull. With the
- * centroid c as the origin, the first moment of k is 0, and the first moment of k' is at most the
- * sum of w_i |H_i| r_i, where r_i is the distance of the farthest point of H_i. So the centroid
+ * centroid c as the origin, the first moment of k is 0. The first moment of k' is at most the sum
+ * of w_i |H_i| r_i, where r_i is the distance of the farthest point of H_i from c. So the centroid
  * moves by at most this sum divided by |V| - h. */
 static void set_border(ebpo_mass *out, const moments *m, const frame *f,
                        const ebpo_border_loops *loops, uint64_t triangles)

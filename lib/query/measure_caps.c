@@ -1,6 +1,6 @@
-/* Bounds the volume of the convex hull of a loop (of border edges) by the volumes of two boxes: one
- * along the axes of coordinates, and one along the loop's vector area, which is thin if the loop is
- * nearly flat.
+/* Bounds the volume of the convex hull of a loop (of border edges) by the volumes of two boxes. One
+ * box is along the axes of coordinates. The other box is along the loop's vector area, and is thin
+ * if the loop is nearly flat.
  *
  * Rounding. Points relative to the first point are at most `span` long. Their products with axes,
  * which are unit vectors up to an error of 2^-50, have an error below 2^-49 span, so boxes are

@@ -23,9 +23,9 @@ typedef struct ebpo_top_planes {
 typedef struct ebpo_top {
     int cut_level;
     /* The kinds of entries are UNIFORM (white and black nodes), GRAY (gray nodes above the cut
-     * level) and SUBTREE_ROOT (the roots of subtrees: gray nodes of the cut level, leaves down to
-     * the cut level, and pruned nodes, whose children are not in the file). The value of an entry
-     * SUBTREE_ROOT is an index in `below`. */
+     * level) and SUBTREE_ROOT. The roots of subtrees (SUBTREE_ROOT) are gray nodes of the cut
+     * level, leaves down to the cut level, and pruned nodes, whose children are not in the file.
+     * The value of an entry SUBTREE_ROOT is an index in `below`. */
     ebpo_node_table nodes;
     uint32_t *planes;      /* codes of all planes */
     ebpo_top_planes *gray; /* [group] planes of the gray node whose children are this group */
@@ -56,16 +56,16 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 /* --- skeletons ---
  *
  * A skeleton has the upper nodes of a subtree's hierarchy over faces (query/accel.h): eight nodes
- * at first, which take 2 KB, whereas the subtree takes hundreds of KB. The lower bound of the
- * distance to a subtree's faces is much better from its skeleton than from its cell and envelope,
- * so searches rarely reload a subtree without a near face. A skeleton is made when the subtree is
+ * at first, which take 2 KB, whereas the subtree takes hundreds of KB. A skeleton gives a much
+ * better lower bound of the distance to a subtree's faces than the subtree's cell and envelope. So
+ * searches rarely reload a subtree without a near face. A skeleton is made when the subtree is
  * loaded, without reading more of the file, and is kept when the cache drops the subtree. If a
  * search loads a subtree and finds no near face in it, nodes near the query point are added to the
- * subtree's skeleton, so memory is used where bounds are not good enough.
+ * subtree's skeleton. So skeletons grow at the places for which bounds are not good enough.
  *
- * Skeletons give lower bounds only. Upper bounds would not help, because subtrees are searched in
- * the order of lower bounds until the next bound is beyond the found distance (nearest_subtrees.c),
- * and every subtree whose lower bound is at most the result must be searched. */
+ * Skeletons give lower bounds only. Upper bounds would not help, because every subtree whose lower
+ * bound is at most the result must be searched. Subtrees are searched in the order of lower bounds
+ * until the next bound is beyond the found distance (nearest_subtrees.c). */
 
 /* Any thread may read a skeleton, also while one other thread changes it. */
 typedef struct ebpo_skeleton ebpo_skeleton;

@@ -7,8 +7,8 @@
  * guaranteed bounds in double precision. If the bounds of two faces overlap, exact arithmetic
  * compares the faces. If several faces are equally near, the result is the face with the lowest
  * index in the file. If the point is so far from the subtree that single precision does not
- * suffice, the search uses boxes in double precision. If the point is so far from the model that
- * its distances are nearly equal as doubles (a far point), the search compares keys in place of
+ * suffice, the search uses boxes in double precision. A far point is so far from the model that its
+ * distances are nearly equal as doubles. For a far point, the search compares keys in place of
  * distances: the smaller the distance, the smaller the key (point_bounds.h). One search
  * (ebpo_nearest) may visit several accels one after the other. */
 #include "core/strict_fp.h"

@@ -114,10 +114,10 @@ void ebpo_deep_bounds_report(ebpo_model *model, unsigned loaded);
 /* --- a model --- */
 
 /* Finds the nearest face of a model. If the model is not completely in memory, visits nodes of the
- * top and subtrees in the order of guaranteed lower bounds of their distance, until the next bound
- * is beyond the found distance. So a subtree is searched, and loaded if needed, only if its bound
- * is at most the result; this does not depend on what is in memory. After a deadline, the least
- * bound that was not visited is in search->passed_over. */
+ * top and subtrees in the order of guaranteed lower bounds of their distance. The search ends when
+ * the next bound is beyond the found distance. So a subtree is searched, and loaded if needed, only
+ * if its bound is at most the result; this does not depend on what is in memory. After a deadline,
+ * the least bound that was not visited is in search->passed_over. */
 EBPO_MUST_USE ebpo_status ebpo_nearest_first(ebpo_context *context, ebpo_nearest *search,
                                              ebpo_error *error);
 

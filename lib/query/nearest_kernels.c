@@ -167,12 +167,12 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
 
 /* Computes bounds of the distances of eight faces: the computed distance minus and plus a margin.
  * The margin is 2^-16 r, where r is the sum of the absolute coordinates of a corner and two edges,
- * plus EBPO_NEAR_UNDERFLOW for the underflow of squares. For a "sturdy" face, whose height is at
- * least an eighth of its longest edge, the computed distance is the distance to the face's plane if
- * the point projects into the face, otherwise the distance to the face's edges. For other faces,
- * the computed distance is always the distance to the edges. No point of a face is farther from the
- * edges than the face's height, so for these faces the height is subtracted from the lower bound.
- * Proof: docs/develop/bounds.md, "Points against eight faces". */
+ * plus EBPO_NEAR_UNDERFLOW for the underflow of squares. The height of a "sturdy" face is at least
+ * an eighth of the face's longest edge. For a sturdy face, the computed distance is the distance to
+ * the face's plane if the point projects into the face, otherwise the distance to the face's edges.
+ * For other faces, the computed distance is always the distance to the edges. No point of a face is
+ * farther from the edges than the face's height, so for these faces the height is subtracted from
+ * the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces". */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;

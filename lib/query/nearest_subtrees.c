@@ -254,9 +254,9 @@ static bool is_in_memory(const ebpo_context *c, uint32_t below)
  * new subtrees that the search probably needs, so that one round trip fetches all of them. The
  * result of the search is between the bound of this subtree and the limit; the subtrees with bounds
  * in the first 3/16 of this interval are requested. For 60 points anywhere in the box of a model of
- * 4.3 million faces, a query takes 11.5 round trips and 999 kB without these hints, 6.9 and 1,040
- * kB with 3/16, 6.0 and 1,103 kB with 1/2. For far points, whose bounds are keys (point_bounds.h),
- * no hints are sent. */
+ * 4.3 million faces, a query takes 11.5 round trips and 999 kB without these hints. With 3/16 of
+ * the interval it takes 6.9 round trips and 1,040 kB, with 1/2 it takes 6.0 round trips and 1,103
+ * kB. For far points, whose bounds are keys (point_bounds.h), no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
@@ -308,9 +308,9 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
  * A face is listed by every subtree whose cell it intersects, and owned by one of them. A face that
  * several subtrees list is searched in its owner only, so it is searched once. In the queue, a
  * subtree S first has the bound of its cell, which is a bound for the parts of its faces within the
- * cell. When the queue returns S, the owned faces of S get a second entry in the queue. For the
- * shared faces of S that may be within the limit, the subtrees that may own these faces get
- * entries, whose bounds are valid for all faces of the owner, also outside its cell. If one of
+ * cell. When the queue returns S, the owned faces of S get a second entry in the queue. If shared
+ * faces of S may be within the limit, the subtrees that may own these faces get entries. The bound
+ * of such an entry is valid for all faces of the owner, also outside the owner's cell. If one of
  * these owners has no skeleton, S itself is searched.
  *
  * So the nearest face is found: its nearest point is in the cell of some S, and S or the face's

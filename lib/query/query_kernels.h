@@ -174,9 +174,9 @@ struct ebpo_ray_search {
      * bound of the origin's error. */
     double direction[3], origin[3], error;
     /* Set by the kernels. Each of the next three arrays has one float for each axis and an unused
-     * fourth float. near_from, far_from: the origin for the nearer and for the farther sides of
-     * boxes, moved by the error so that no box is missed. inverse: reciprocals of the direction's
-     * coordinates. */
+     * fourth float. near_from and far_from: the origin, moved by its error so that no box is
+     * missed; for the nearer and for the farther sides of boxes. inverse: reciprocals of the
+     * direction's coordinates. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
     double inverse_double[4]; /* inverse of the direction; small coordinates were replaced */
@@ -204,9 +204,9 @@ typedef struct ebpo_axis_segment {
     double to;
     int axis;
     /* Extent of the segment in the cell, in sixteenths of the cell, encoded almost as the box of an
-     * ebpo_listed_block: for each axis, the upper side is stored in place of the lower side, and 15
-     * minus the lower side in place of 15 minus the upper side. EBPO_REACH_ALL: the segment may
-     * intersect all boxes. */
+     * ebpo_listed_block. For each axis, the segment's upper side is stored in place of the box's
+     * lower side, and 15 minus the segment's lower side in place of 15 minus the box's upper side.
+     * EBPO_REACH_ALL: the segment may intersect all boxes. */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)

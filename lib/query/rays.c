@@ -174,8 +174,8 @@ static bool move_origin(ebpo_ray_search *r, double *greatest)
     return true;
 }
 
-/* Sets a bound of the error of the origin in the frame. Several steps add an error: the origin is
- * moved, transformed to the frame and back to the model's unit, and split into floats; and small
+/* Sets a bound of the error of the origin in the frame. Several steps add an error. The origin is
+ * moved, transformed to the frame and back to the model's unit, and split into floats. Small
  * coordinates of the direction are replaced (docs/develop/bounds.md, "A ray against boxes").
  * `greatest`: the largest absolute coordinate of the origin. */
 static void set_error(ebpo_ray_search *r, double greatest)

@@ -197,7 +197,7 @@ static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3
 }
 
 /* Computes squared lower bounds of the distances to the children from their boxes, in the frame
- * (coordinates in which the subtree's cell has a size of 1 to 2); the factor `certainly` is applied
+ * (coordinates in which the subtree's cell has a size of 1 to 2). The factor `certainly` is applied
  * later. */
 static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
 {
