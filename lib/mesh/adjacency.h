@@ -13,8 +13,8 @@ typedef struct ebpo_stars {
     ebpo_workspace *workspace; /* workspace of the mesh; owns both arrays */
 } ebpo_stars;
 
-/* Builds the stars. Checks every index first; the message of EBPO_E_FORMAT names the lowest bad
- * face. `out` is cleared on failure. */
+/* Builds the stars. Checks every vertex index first; the message of EBPO_E_FORMAT names the lowest
+ * face with an invalid index. `out` is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned threads,
                                            const ebpo_progress *progress, ebpo_error *error);
 void ebpo_stars_free(ebpo_stars *stars);

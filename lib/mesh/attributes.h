@@ -31,7 +31,8 @@ typedef struct ebpo_attribute {
     bool borrowed; /* values and ends belong to another mesh, which frees them */
 } ebpo_attribute;
 
-/* The workspace owns the struct and its arrays. */
+/* Free the struct with ebpo_attributes_free. The workspace owns the values and the ends of the
+ * arrays. */
 typedef struct ebpo_attributes {
     ebpo_workspace *workspace;
     ebpo_attribute *array;

@@ -236,7 +236,8 @@ static bool walk_from(tracing *t, uint64_t vertex)
                t->edge[*next].weight == 0)
             ++*next;
         if (*next == t->count || t->edge[*next].from != t->edge[at].from)
-            return true; /* only possible at the walk's first vertex: the others are balanced */
+            /* only possible at the walk's first vertex, because all other vertices are balanced */
+            return true;
         if (++t->steps % EBPO_ITEMS_SCATTERED == 0)
             ebpo_release_pages(t->mesh->workspace);
         t->path[t->length++] = *next;

@@ -172,7 +172,8 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
 
 /* --- chaining of edges --- */
 
-/* Releases pages. Call it often: each step may access distant parts of ten arrays. */
+/* Releases pages. Call this function often, because each step may access distant parts of ten
+ * arrays. */
 static void release_pages(const chaining *c, uint64_t steps)
 {
     enum { OFTEN = 32 };
@@ -302,8 +303,8 @@ static void emit_loop(chaining *c, uint64_t position)
     c->path_length = position;
 }
 
-/* Adds a vertex to the path. If the path has this vertex already, the path from there on is a loop;
- * this loop is first removed from the path. */
+/* Adds a vertex to the path. If the vertex is already in the path, the part of the path from this
+ * vertex on is a loop, which is removed first. */
 static void visit_vertex(chaining *c, uint32_t vertex)
 {
     if (c->path_position[vertex] != EBPO_NO_INDEX)
@@ -376,10 +377,11 @@ static ebpo_status chain_edges(chaining *c, ebpo_error *error)
 {
     ebpo_workspace *w = c->mesh->workspace;
     if (!allocate_arrays(c))
-        return ebpo_workspace_fail(w,
-                                   c->count * 56 /* about: arrays with a row for each edge */ +
-                                       c->mesh->vertex_count * sizeof *c->path_position,
-                                   error);
+        return ebpo_workspace_fail(
+            w,
+            c->count * 56 /* approximate bytes of the arrays for each edge */ +
+                c->mesh->vertex_count * sizeof *c->path_position,
+            error);
     ebpo_status status = sort_all(c, error);
     if (status != EBPO_OK)
         return status;

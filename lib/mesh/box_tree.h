@@ -44,8 +44,8 @@ typedef void (*ebpo_box_of_fn)(const void *user, const ebpo_tree_point *p, ebpo_
 bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user);
 void ebpo_box_tree_free(ebpo_box_tree *tree);
 
-/* A node of `count` items, with the box of their points and the box that contains their boxes. In a
- * tree of points, `points` and `filled` are equal. */
+/* A node of `count` items, with the box of the items' points and the box that contains the items'
+ * boxes. In a tree of points, `points` and `filled` are equal. */
 typedef struct ebpo_box_node {
     const ebpo_point_box *points, *filled;
     uint64_t count;

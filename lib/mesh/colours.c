@@ -1,6 +1,6 @@
-/* Reads colours of vertices, corners or faces from a mesh's attributes: finds colour properties by
- * the names that PLY files use, and converts values to RGBA bytes. Used for exports, images and
- * mean colours of gray nodes. */
+/* Reads colours of vertices or faces from a mesh's attributes: finds colour properties by the names
+ * that PLY files use, and converts values to RGBA bytes. Used for exports, images and mean colours
+ * of gray nodes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

@@ -13,8 +13,8 @@ typedef struct ebpo_found_component {
     uint64_t first; /* least source index of the component's faces */
     uint32_t face;  /* index in the current mesh of the face with this source index */
     bool open;      /* true: some edge is not used equally often in both directions */
-    double volume;  /* signed volume of a closed component, in the unit common to all components
-                     * (mesh_parts.h) */
+    /* signed volume of a closed component, in the units of ebpo_mesh_frame (mesh_parts.h) */
+    double volume;
     double min[3], max[3]; /* bounding box */
     /* for a cavity, the component around the cavity; otherwise the component itself */
     uint32_t host;

@@ -64,7 +64,8 @@ static int compare_first(const void *x, const void *y)
     return a->first < b->first ? -1 : 1;
 }
 
-/* Adds face f to the component *number, which is created if it is EBPO_NO_INDEX. */
+/* Adds face f to the component *number. If *number is EBPO_NO_INDEX, creates the component first.
+ */
 static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, uint64_t *capacity,
                             ebpo_error *error)
 {

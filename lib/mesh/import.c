@@ -125,8 +125,8 @@ static bool has_signature(const uint8_t *data, uint64_t size)
     return false;
 }
 
-/* Checks the ending of the name. `format`: the format of this ending. Rejects the file if it begins
- * like a file of another format without a signature. */
+/* Checks the ending of the name. `format`: the format that the ending indicates. Rejects the file
+ * if it begins like a file of another format that has no signature. */
 static ebpo_status check_name(const ebpo_import_format *format, const ebpo_import_job *job,
                               ebpo_error *error)
 {

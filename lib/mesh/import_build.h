@@ -165,7 +165,7 @@ typedef struct ebpo_import_job {
 /* A format: a row of the table in import.c. */
 typedef struct ebpo_import_format {
     const char *called; /* name with an article for messages: "an OBJ" */
-    /* ending of file names: ".obj"; without the dot, the mesh's source_format */
+    /* ending of file names: ".obj". The text after the dot becomes the mesh's source_format */
     const char *ending;
     /* Returns true if the file begins like files of this format. */
     bool (*recognise)(const uint8_t *data, uint64_t size);

@@ -147,8 +147,8 @@ static ebpo_mesh_frame frame_of(const double greatest[3])
     return frame;
 }
 
-/* Examines all vertices first, which is fast. Only if the coordinates of some vertex are far from
- * 1, which is rare, examines the corners of faces, because that vertex may be unused. */
+/* Examines all vertices first, which is fast. If the coordinates of some vertex are far from 1,
+ * which is rare, this vertex may be unused. So only the corners of faces decide in this case. */
 ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh)
 {
     double greatest[3] = { 0, 0, 0 }, greatest_used[3] = { 0, 0, 0 };

@@ -366,7 +366,8 @@ ebpo_status ebpo_mesh_findings(const ebpo_mesh *mesh, const ebpo_findings_option
 
 enum {
     NOTHING = UINT8_MAX, /* in findings_picture.face */
-    /* bytes in the PLY file: three doubles; the number of corners, three indices and a colour */
+    /* bytes in the PLY file. A vertex has three doubles. A face has the number of corners, three
+     * indices and a colour */
     VERTEX_BYTES = 3 * 8,
     FACE_BYTES = 1 + 3 * 4 + 3
 };

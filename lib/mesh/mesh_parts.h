@@ -13,7 +13,7 @@
 #define EBPO_NO_INDEX UINT32_MAX
 
 /* The order of a mesh whose vertices and faces are sorted along a Morton curve (ebpo_mesh_arrange),
- * or whose faces were partly dropped. */
+ * or of which some faces were dropped. */
 struct ebpo_arrangement {
     /* the box around the referenced vertices (vertices that faces use); the coordinates of cell
      * faces are exact down to the level box.grid_level */
@@ -124,8 +124,8 @@ enum {
 EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                            ebpo_repair_record *record, ebpo_error *error);
 
-/* Makes neighbouring faces consistent: the first part of ebpo_mesh_orient. `closed`: NULL, or as
- * for ebpo_mesh_find_shells. */
+/* Makes neighbouring faces consistent: the first part of ebpo_mesh_orient. If `closed` is not NULL,
+ * *closed becomes the array that ebpo_mesh_find_shells computes. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                     uint32_t **closed, ebpo_error *error);
 
@@ -135,10 +135,10 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_repair
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
                                                 ebpo_repair_record *record, ebpo_error *error);
 
-/* Finds the shell of each face, closed [face_count]: a number unique to the shell, or
- * EBPO_NO_INDEX. A shell is a set of faces that forms a closed surface. Its faces are connected
- * across edges with two faces, or around edges with more faces. The mesh's workspace owns the
- * array. */
+/* Finds the shell of each face. *closed becomes an array [face_count]: for each face, a number
+ * unique to the face's shell, or EBPO_NO_INDEX. A shell is a set of faces that forms a closed
+ * surface. Its faces are connected across edges with two faces, or around edges with more faces.
+ * The mesh's workspace owns the array. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
                                                 uint32_t **closed, ebpo_error *error);
 

@@ -73,8 +73,8 @@ static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const
     return status;
 }
 
-/* If another program has changed the file during reading, returns this as an error in place of
- * `status`, because the change may have caused a format error. */
+/* If another program has changed the file during reading, returns an error about the change in
+ * place of `status`, because the change may have caused a format error. */
 static ebpo_status report_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
                                  ebpo_error *error)
 {

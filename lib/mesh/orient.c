@@ -50,7 +50,7 @@ typedef struct patch {
     uint32_t root;
     uint32_t seed; /* first face in the source; keeps its orientation if neither the volume nor the
                       number of turned faces decides */
-    bool closed;   /* every edge has a face on its other side */
+    bool closed;   /* the patch is a closed surface */
     bool seed_turned; /* the seed runs against the root */
     /* true: turn the seed and the faces that do not run against it; false: turn the other faces */
     bool turn_seed;
@@ -106,7 +106,7 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
 
 /* Joins the patches of faces a and b. turned: 1 if a runs against b, else 0. Links the higher root
  * to the lower root, so the roots do not depend on the order of calls. Returns false if the faces
- * are already in one patch and `turned` contradicts their orientations in it. */
+ * are already in one patch and `turned` contradicts their orientations in this patch. */
 static bool join_patches(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
@@ -126,8 +126,8 @@ static void set_flags(orienting *o, uint32_t face, uint8_t flags)
     __atomic_fetch_or(&o->flags[face], flags, __ATOMIC_RELAXED);
 }
 
-/* Joins the patches of an edge's two faces. Only sets a flag at an edge with one face or more than
- * two faces. */
+/* Joins the patches of an edge's two faces. At an edge with one face or more than two faces, only
+ * sets a flag. */
 static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
 {
     uint32_t a = ebpo_link_face(&links[0]), b = ebpo_link_face(&links[uses - 1]);

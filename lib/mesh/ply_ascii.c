@@ -1,6 +1,7 @@
 /* Reads the body of an ascii PLY file. White space separates values, so a long list may span
- * several lines. A row ends with its line. Extra values at the end of a line, such as MeshLab has
- * written, are counted and skipped. Without skipping, all following rows would be read wrongly. */
+ * several lines. The end of a row is also the end of a line. Extra values at the end of a line,
+ * such as MeshLab has written, are counted and skipped. Without skipping, all following rows would
+ * be read wrongly. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -17,8 +18,8 @@ typedef struct rows {
     uint64_t row; /* index of the current row */
     uint64_t to;  /* row in the attribute arrays; for a face, the row of its first triangle */
     bool store;   /* false: values are skipped */
-    /* true: extra values are counted. Elements that precede the vertices are read twice; this is
-     * false in the first pass, so that nothing is counted twice */
+    /* true: extra values are counted. Elements that precede the vertices are read twice;
+     * `count_surplus` is false in the first pass, so that nothing is counted twice */
     bool count_surplus;
     uint64_t line; /* line where the row begins */
 } rows;

@@ -87,7 +87,7 @@ static bool has_namesake(const ebpo_attributes *to, const ebpo_attribute *a, uin
 }
 
 /* Adds an array for `columns` properties from `property` on, and reserves space for its rows. If
- * the array cannot be kept, records this and succeeds. */
+ * the array cannot be kept, records the loss and succeeds. */
 static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *element,
                               ebpo_ply_property *property, unsigned columns)
 {

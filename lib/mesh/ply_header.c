@@ -1,5 +1,5 @@
-/* Parses the header of a PLY file. Also has the messages and the progress reports that the parts of
- * the PLY reader share. */
+/* Parses the header of a PLY file. Also contains the messages and the progress reports that the
+ * parts of the PLY reader share. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -258,8 +258,8 @@ static ebpo_status read_statement(reader *r, ebpo_ply_word line, bool *ended)
         return EBPO_OK;
     }
     /* Blender 2.47 omitted the word "comment" in its first line, so unknown statements before the
-     * first element are treated as comments. After the first element they are errors, because they
-     * could change the meaning of the body. */
+     * first element are treated as comments. After the first element, unknown statements are
+     * errors, because they could change the meaning of the body. */
     r->header->notes++;
     return r->header->elements ? fail_in_line(r, "unknown statement", words[0]) : EBPO_OK;
 }

@@ -84,9 +84,9 @@ static ebpo_status check_counts(const ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-/* Returns true if the mesh stores coordinates as floats: the file declares all three as floats.
- * Coordinates of other types are stored as doubles, which represent them exactly. Query points
- * (p->strict) are always stored as doubles. */
+/* Returns true if the mesh stores coordinates as floats. This is so if the file declares all three
+ * coordinates as floats. Coordinates of other types are stored as doubles, which represent them
+ * exactly. Query points (p->strict) are always stored as doubles. */
 static bool all_float(const ebpo_ply_parser *p)
 {
     const ebpo_ply_header *h = &p->header;

@@ -139,7 +139,7 @@ ebpo_status ebpo_ply_fail_end(const ebpo_ply_parser *p, const ebpo_ply_element *
 /* Returns "vertex", "face", "strip" or "element", for messages. */
 const char *ebpo_ply_row_name(const ebpo_ply_element *element);
 
-/* Returns true if a progress report is due. Fast enough for a call for each row. */
+/* Returns true if a progress report is due. The function is fast enough for a call for each row. */
 static inline bool ebpo_ply_report_due(const ebpo_ply_parser *p) { return p->at >= p->next_report; }
 ebpo_status ebpo_ply_report(ebpo_ply_parser *p);
 /* Returns EBPO_E_CANCELLED. */
@@ -180,7 +180,8 @@ uint64_t ebpo_ply_text_bits(ebpo_ply_parser *p, const ebpo_ply_property *propert
 /* Stores bits at address `at`. */
 void ebpo_ply_store_bits(uint8_t *at, unsigned bytes, uint64_t bits);
 
-/* Copies the values of face `row`, which came from a polygon, to all later faces. */
+/* Copies the values of face `row`, which came from a polygon, to all faces after `row`, which are
+ * the other triangles of the polygon. */
 EBPO_MUST_USE ebpo_status ebpo_ply_repeat_face(ebpo_ply_parser *p, uint64_t row);
 
 /* Sets zeros and empty lists for the faces from `first` on, which come from strips and have no row

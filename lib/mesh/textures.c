@@ -648,7 +648,7 @@ static found open_next_to_source(const char *source, const char *name, ebpo_whol
 
 /* --- names --- */
 
-/* Collects the names from a material library. Returns false if it cannot be read. */
+/* Collects the names from a material library. Returns false if the library cannot be read. */
 static bool read_library(image_search *f, const char *name)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;

@@ -39,8 +39,8 @@ const ebpo_attribute *ebpo_textures_array(const ebpo_attributes *all, ebpo_textu
 /* Returns the list of a row; an empty list if `a` is NULL or the row does not exist. */
 ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row);
 
-/* Adds a row to the mesh's textures. The first call creates the arrays, with bytes if `keep`.
- * EBPO_E_MEMORY, EBPO_E_IO. */
+/* Adds a row to the mesh's textures. The first call creates the arrays, with the array of bytes if
+ * `keep` is true. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
                                             const ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS],
                                             ebpo_error *error);
@@ -55,10 +55,10 @@ bool ebpo_textures_good(const ebpo_attributes *all);
 EBPO_MUST_USE ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
                                                    uint64_t count, ebpo_error *error);
 
-/* Adds the textures of a mesh to its attributes; with bytes if `keep`. The mesh was read from
- * `data`, the content of the file `path`. Files are searched only in the source's folder and below;
- * links that leave this folder are not followed. Missing and omitted files are recorded in the
- * attributes. EBPO_E_MEMORY, EBPO_E_IO. */
+/* Adds the textures of a mesh to its attributes, with the images' bytes if `keep` is true. The mesh
+ * was read from `data`, the content of the file `path`. Files are searched only in the source's
+ * folder and below; links that leave this folder are not followed. Missing and omitted files are
+ * recorded in the attributes. EBPO_E_MEMORY, EBPO_E_IO. */
 EBPO_MUST_USE ebpo_status ebpo_textures_find(ebpo_mesh *mesh, const char *path, const uint8_t *data,
                                              uint64_t size, bool keep, ebpo_error *error);
 

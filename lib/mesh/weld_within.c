@@ -115,7 +115,7 @@ static bool is_certain(double a, double b)
            fabs(a - b) > DOUBT * (a + b);
 }
 
-/* Appends signed products whose sum is |p - q|^2. */
+/* Appends products whose sum is sign * |p - q|^2. Returns the number of products. */
 static int put_distance(double (*factor)[2], double sign, const double p[3], const double q[3])
 {
     int n = 0;
@@ -143,8 +143,8 @@ static bool is_within(const double p[3], const double q[3], double distance)
     return ebpo_sign_of_products(factor[0], n + 1) <= 0;
 }
 
-/* Returns true if a is nearer to p than b; at equal distances, if a comes first in the order of x,
- * y and z. */
+/* Returns true if a is nearer to p than b. At equal distances, returns true if a comes first in the
+ * order of x, y and z. */
 static bool is_nearer(const double p[3], const double a[3], const double b[3])
 {
     double to_a = squared_distance(p, a), to_b = squared_distance(p, b), factor[24][2];

@@ -55,7 +55,7 @@ enum { EBPO_KIND_PLANES_MAX = 16 };
  * may have faces that the leaf does not list). Bits 40 to 63 are a box around the listed faces
  * within the cell, in sixteenths of the cell (EBPO_LISTED_CELLS), rounded outward. For each axis,
  * four bits are the lower side and four bits are 15 minus the upper side. Bits 40 to 63 are 0 (the
- * whole cell) until ebpo_leaf_is_bounded. */
+ * whole cell) until ebpo_leaf_is_bounded is true for the leaf's kind. */
 typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
 #define EBPO_LISTED_LAST (UINT64_C(1) << 29)
@@ -74,15 +74,16 @@ static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_
 static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
 
 /* A leaf. ebpo_leaf_query sets `rows`, `cell_face` and `cell_face_step` and then `kind`.
- * `cell_face` and `cell_face_step` are valid if ebpo_leaf_is_bounded, `rows` if
- * ebpo_leaf_has_planes (or see EBPO_NEAR_BORDER). Valid values do not change. */
+ * `cell_face` and `cell_face_step` are valid if ebpo_leaf_is_bounded is true for the kind. `rows`
+ * is valid if ebpo_leaf_has_planes is true for the kind (or see EBPO_NEAR_BORDER). Valid values do
+ * not change. */
 typedef struct ebpo_accel_leaf {
     uint32_t list; /* index in ebpo_accel.list of the leaf's first entry */
     /* winding number at the lowest corner, shifted by an infinitely small vector (format-spec,
      * section 10) */
     int32_t winding;
-    /* if ebpo_leaf_has_planes: number of the first row of the leaf's planes (EBPO_KIND_ROW); see
-     * also EBPO_NEAR_BORDER */
+    /* if ebpo_leaf_has_planes is true for the kind: number of the first row of the leaf's planes
+     * (EBPO_KIND_ROW); see also EBPO_NEAR_BORDER */
     uint32_t rows;
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; if !has_windings (ebpo_accel), always
                               * EBPO_LEAF_GENERAL */
@@ -195,8 +196,8 @@ typedef struct ebpo_bound {
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
 #define EBPO_NO_CHILD UINT32_MAX
 
-/* The sides of a child's box on one axis, decoded. Their rounding error is at most 2^-52 times the
- * greater of |origin| and |side|. */
+/* The sides of a child's box on one axis, decoded. The rounding error of a side is at most 2^-52
+ * times the greater of |origin| and |side|. */
 typedef struct ebpo_bound_sides {
     double low, high;
 } ebpo_bound_sides;
@@ -295,8 +296,8 @@ EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
 /* Does the same as ebpo_accel_make, but returns EBPO_E_LIMIT if the memory, including the slice,
- * would exceed the quota (NULL: no limit). For ordinary subtrees and models, this is known from
- * their counts before the memory is taken. */
+ * would exceed the quota (NULL: no limit). For ordinary subtrees and models, the counts show this
+ * before memory is taken. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
                                                  const ebpo_info *info, ebpo_quota *space,
                                                  bool with_planes, unsigned threads,
@@ -388,7 +389,8 @@ static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
         __builtin_prefetch(&s->face_source[local]);
 }
 
-/* Returns the face's index in the source, or in the file if it has no source indices. */
+/* Returns the face's index in the source. If the file has no source indices, returns the index in
+ * the file. */
 static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
 {
     return s->face_source ? s->face_source[local] : ebpo_accel_file_face(s, local);

@@ -1,7 +1,7 @@
 /* Makes an accel, the acceleration structure of a subtree (accel.h), from the subtree's slice of
  * the file, and estimates its memory.
  *
- * The stages: grouping of faces into blocks and blocks into a hierarchy (blocks.c), bounds of
+ * The stages are: grouping of faces into blocks and blocks into a hierarchy (blocks.c), bounds of
  * blocks (block_bounds.c), child tables and leaf records (here). Leaf kinds are found later
  * (leaf_kinds.c).
  *
@@ -412,8 +412,8 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     if (w->slice->pruned &&
         (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
-            w->rank[depth + 1][EBPO_WHITE] += 8; /* the file stores eight white nodes in place of
-                                                  * its children */
+            /* the file stores eight white nodes in place of the pruned node's children */
+            w->rank[depth + 1][EBPO_WHITE] += 8;
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
         return ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)group);

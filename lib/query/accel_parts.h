@@ -6,8 +6,8 @@
 #include "core/cpu.h"
 #include "query/accel.h"
 
-/* The layout assigns faces to blocks (at most eight faces each), and blocks to a hierarchy. It is
- * made in one walk through the tree, without coordinates. */
+/* The layout assigns faces to blocks (at most eight faces each), and blocks to a hierarchy. The
+ * layout is made in one walk through the tree, without coordinates. */
 typedef struct ebpo_layout {
     /* [block_count] first face of each block, and one past its last face, as local indices
      * (accel.h); the blocks together contain all faces, in order */

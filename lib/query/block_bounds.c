@@ -36,7 +36,8 @@ static const double cylinder_share = 0.01;
 /* Enlargement of boxes whose coordinates are all 0. */
 static const double least_slack = 0x1p-60;
 /* AXIS_UNIT: the coordinate 1 of an axis is stored as this value. SHORT_MAX: the greatest stored
- * value before it is rounded outward, so one less than 16 bits can hold. */
+ * value before it is rounded outward, so SHORT_MAX is one less than the greatest signed 16-bit
+ * value. */
 enum { AXIS_UNIT = 1 << 15, SHORT_MAX = 32766 };
 
 /* Extent of vertices in the subtree's frame, and the sum of the normals of their faces. */
@@ -203,7 +204,8 @@ static double choose_grid(double low, double high, float *origin, float *step)
     return slack;
 }
 
-/* Return floor and ceil of values that fit into an int, without a function call. */
+/* round_down and round_up return floor and ceil of a value that fits into an int, without a
+ * function call. */
 static int round_down(double x)
 {
     int whole = (int)x;
@@ -250,7 +252,7 @@ static double greatest_coordinate(const ebpo_bound *b)
 
 /* A bounding cylinder before it is rounded to 16 bits, in the subtree's frame. */
 typedef struct cylinder {
-    double middle[3], axis[3]; /* middle: of the child's box; axis: as it is stored */
+    double middle[3], axis[3]; /* middle: middle of the child's box; axis: as it is stored */
     double from, to, radius2;  /* extent along the axis from the middle; squared radius */
 } cylinder;
 

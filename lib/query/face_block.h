@@ -38,7 +38,7 @@ EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 co
         return;
     }
     f8_table table =
-        f8_table_load(x); /* loads 16 floats; those after the block's vertices are not used */
+        f8_table_load(x); /* loads 16 floats; the floats after the block's vertices are not used */
     for (int i = 0; i < 3; i++)
         corner[i] = f8_look_up(table, b->corner[i]);
 }

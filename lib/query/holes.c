@@ -398,7 +398,7 @@ ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, 
     holes->terms += w->terms;
     free(w->lists.entry);
     free(w);
-    if (table->grid) { /* the grid has copies of entries, so it is made again */
+    if (table->grid) { /* the grid has copies of entries, so the grid is made again */
         free(table->grid);
         free(table->grid_depth);
         table->grid = NULL;

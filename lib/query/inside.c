@@ -199,7 +199,7 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
     return !any_sign(not_below);
 }
 
-/* Counts a query of a leaf whose kind is not known; this may find the kind. Returns the kind. */
+/* Counts a query of a leaf whose kind is not known, and may find the kind. Returns the kind. */
 static __attribute__((noinline)) ebpo_leaf_kind query_kind(const ebpo_context *context,
                                                            const ebpo_accel *s,
                                                            ebpo_accel_leaf *leaf,
@@ -622,7 +622,7 @@ static const ebpo_node_table *top_nodes(const ebpo_model *m)
 }
 
 /* Decides the point at a node of the top or of a subtree, if this is possible without visiting the
- * node's children or faces. Returns false if it is not possible. */
+ * node's children or faces. Returns false if this is not possible. */
 static inline bool decide_at(const inside_query *query, const ebpo_node *node,
                              ebpo_inside_result *out)
 {

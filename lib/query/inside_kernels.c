@@ -5,9 +5,9 @@
  * Faces that are not certain in this precision ("open" faces) are decided exactly by inside.c.
  *
  * find_reached_cell_faces finds the cell faces that the leaf's faces reach. A face reaches a cell
- * face if the extent of the face on the cell face's axis goes up to the cell face or beyond. It
- * also computes the box of each block in the leaf's list. It is called once for each leaf, during
- * one of the first queries in this leaf. Its comparisons are exact.
+ * face if the extent of the face on the cell face's axis goes up to the cell face or beyond.
+ * find_reached_cell_faces also computes the box of each block in the leaf's list. It is called once
+ * for each leaf, during one of the first queries in this leaf. Its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
@@ -146,8 +146,8 @@ static int compare_plane(const double weight[3], const double size[3], const dou
 }
 
 /* Tests if a face, which certainly intersects the segment's line, intersects the segment. Returns 1
- * if it does, 0 if not, -1 if this is not certain. t: the face's corners. `turn`: as for
- * compare_plane. */
+ * if the face intersects the segment, 0 if it does not, -1 if this is not certain. t: the face's
+ * corners. `turn`: as for compare_plane. */
 static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axis_segment *g,
                               int turn)
 {

@@ -163,8 +163,9 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
         products += fabs(a) + fabs(b);
         greatest = ebpo_max3(greatest, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
-    /* The error of n is at most 2^-50 of the products, so 2^-40 of its norm. The error of n . xi is
-     * at most 2^-33 for every corner, which is less than the margin of sides_of (2^-26). */
+    /* The error of n is at most 2^-50 of the products, so at most 2^-40 of the norm of n. The error
+     * of n . xi is at most 2^-33 for every corner, which is less than the margin of sides_of
+     * (2^-26). */
     if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(greatest < 64))
         return false;
     out->d = 0;
@@ -460,7 +461,7 @@ static void end_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
 static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                            ebpo_cell_faces_fn *cell_faces)
 {
-    /* The first test is one read, and false in most queries. */
+    /* The first test is one read, and its result is false in most queries. */
     if (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_UNKNOWN &&
         begin_kind(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_CLAIMED)) {
         bound_leaf(s, leaf, cell, cell_faces);

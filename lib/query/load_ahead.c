@@ -176,8 +176,8 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
 enum {
     HINT_SUBTREES = 128, /* maximum number of subtrees: some megabytes of data */
     HINT_POINTS = 4096,  /* maximum number of points whose homes are in the hint */
-    /* in a batch without hints, the most points that are evaluated after the first point whose
-     * bytes are not available yet */
+    /* in a batch without hints, the maximum number of points that are evaluated after the first
+     * point whose bytes are not available yet */
     POINTS_AFTER_PENDING = 256
 };
 

@@ -42,7 +42,8 @@ static const double zero_share = 0x1p-85;
 /* Scaled coordinates are p / 2^exponent. `middle`: middle of the model's box, scaled. */
 typedef struct frame {
     int exponent;
-    double factor[2]; /* 2^-exponent as two factors, as it may not fit into one double */
+    /* 2^-exponent as two factors, because 2^-exponent may not fit into one double */
+    double factor[2];
     double middle[3];
 } frame;
 

@@ -147,8 +147,8 @@ enum { EBPO_SUBTREES_LEAST = 1 << 20 };
 /* The least bytes for decoded chunks. */
 enum { EBPO_CHUNKS_LEAST = 2 << 20 };
 
-/* Return the bytes of a budget for decoded chunks, for skeletons, and for both together. The
- * remaining bytes are for the top and subtrees. */
+/* The next three functions return the bytes of a budget for decoded chunks, for skeletons, and for
+ * both together. The remaining bytes are for the top and subtrees. */
 uint64_t ebpo_chunk_budget(uint64_t budget);
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *options, uint64_t budget);
 uint64_t ebpo_bytes_besides_subtrees(const ebpo_model_options *options, uint64_t budget);
@@ -175,8 +175,8 @@ EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_mode
  * A budget that several models share. It counts the bytes that each model takes permanently, and
  * the bytes for the caches of all models. Any thread may use it. */
 
-/* Return the pools of the caches of subtrees and of chunks. They are separate, because loading a
- * subtree needs memory for chunks. */
+/* ebpo_budget_subtrees and ebpo_budget_chunks return the pools of the caches of subtrees and of
+ * chunks. The pools are separate, because loading a subtree needs memory for chunks. */
 ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *budget);
 ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 

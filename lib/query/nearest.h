@@ -108,7 +108,7 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
 void ebpo_deep_bounds_make(ebpo_model *model);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
- * bounds when enough such subtrees have been loaded. Any thread. */
+ * bounds when enough such subtrees have been loaded. Any thread may call this function. */
 void ebpo_deep_bounds_report(ebpo_model *model, unsigned loaded);
 
 /* --- a model --- */

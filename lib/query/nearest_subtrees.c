@@ -160,7 +160,7 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
 
 /* Returns a guaranteed lower bound of the distance to the faces in the cell of a node of the cut
  * level, from deep bounds. `lower`: a known lower bound; the result is at least this bound. Once a
- * bound is beyond `limit`, no better bound is searched for. Any thread. */
+ * bound is beyond `limit`, no better bound is searched for. Any thread may call this function. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit)
 {
@@ -355,7 +355,7 @@ typedef struct owners {
     int level;                     /* level of S's root */
     double lower;                  /* bound with which S left the queue */
     const ebpo_shared_box *shared; /* box around some shared faces of S */
-    /* Called for each owner. The walk ends if it returns false. */
+    /* Called for each owner. The walk ends if `visit` returns false. */
     bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
     ebpo_status status;
 } owners;
@@ -396,7 +396,7 @@ static bool add_owner(owners *o, uint32_t below, ebpo_error *error)
     return o->status == EBPO_OK;
 }
 
-/* Visits the owners below a node. Returns false as soon as o->visit does. */
+/* Visits the owners below a node. Returns false as soon as o->visit returns false. */
 static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *error)
 {
     const ebpo_node_table *nodes = &o->g->c->model->top->nodes;
@@ -412,7 +412,7 @@ static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *
     return true;
 }
 
-/* Visits the owners of the faces in all boxes. Returns false as soon as o->visit does. */
+/* Visits the owners of the faces in all boxes. Returns false as soon as o->visit returns false. */
 static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, ebpo_error *error)
 {
     for (unsigned i = 0; i < count; i++) {
@@ -450,7 +450,8 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
 }
 
 /* Handles a subtree without skeleton that leaves the queue for the first time. If deep bounds
- * increase the subtree's bound, the subtree goes back to the queue. Otherwise it is searched. */
+ * increase the subtree's bound, the subtree goes back to the queue. Otherwise the subtree is
+ * searched. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };

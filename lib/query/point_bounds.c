@@ -221,7 +221,7 @@ static double margin_of(const ebpo_far *f, double greatest)
 /* A cell in coordinates y. */
 typedef struct placed_cell {
     double low[3], size[3];
-    double greatest; /* its greatest absolute coordinate */
+    double greatest; /* greatest absolute coordinate of the cell */
 } placed_cell;
 
 static placed_cell place_cell(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
@@ -344,8 +344,9 @@ double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_
 
 /* --- faces --- */
 
-/* |y|^2 >= 2 z . y - |z|^2 for every z. The right side is linear in y. So if it replaces |y|^2 in
- * the key, the minimum over the face is at a corner. Here z is the corner with the least key. */
+/* |y|^2 >= 2 z . y - |z|^2 for every z. The right side is linear in y. So if the right side
+ * replaces |y|^2 in the key, the minimum over the face is at a corner. Here z is the corner with
+ * the least key. */
 ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
 {
     double y[3][3], key[3], greatest = 0;

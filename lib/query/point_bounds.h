@@ -40,7 +40,7 @@ typedef struct ebpo_far {
     double centre[3];         /* c */
     double unit[2];           /* powers of two: y = (x - centre) * unit[0] * unit[1] */
     double toward[3];         /* u */
-    double half;              /* h, at most 1/32; 0 if it is too small for a double */
+    double half;              /* h, at most 1/32; 0 if h is too small for a double */
     double distance_in_units; /* |p - c| in the unit of y, at least 16, or INFINITY */
     double distance;          /* |p - c| with a relative error of 2^-50, or INFINITY */
 } ebpo_far;
@@ -51,11 +51,12 @@ void ebpo_far_make(ebpo_far *far, const ebpo_box *box, const double p[3]);
 
 /* Converts a limit of distances, 0 or more or INFINITY, to a limit of keys, rounded up. */
 double ebpo_far_limit(const ebpo_far *far, double distance);
-/* Return a lower and an upper bound of the distance for a key. */
+/* ebpo_far_lower and ebpo_far_upper return a lower and an upper bound of the distance for a key. */
 double ebpo_far_lower(const ebpo_far *far, double key);
 double ebpo_far_upper(const ebpo_far *far, double key);
 
-/* Return the same bounds as ebpo_envelope_distance and ebpo_cell_far, but as keys. */
+/* ebpo_far_envelope and ebpo_far_cell_end return the same bounds as ebpo_envelope_distance and
+ * ebpo_cell_far, but as keys. */
 double ebpo_far_envelope(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell,
                          const uint32_t *codes, uint32_t count, double enough);
 double ebpo_far_cell_end(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell);
@@ -66,12 +67,12 @@ typedef struct ebpo_far_frame {
     double offset[3], ratio;
     double margin; /* bound of the error of keys in this accel */
 } ebpo_far_frame;
-/* Makes this conversion. `centre`, `scale`: centre and scale of the accel's frame. `largest`: bound
- * of the absolute coordinates in the frame. */
+/* Makes an ebpo_far_frame. `centre`, `scale`: centre and scale of the accel's frame. `largest`:
+ * bound of the absolute coordinates in the frame. */
 ebpo_far_frame ebpo_far_frame_of(const ebpo_far *far, const double centre[3], double scale,
                                  double largest);
-/* Compute lower bounds of the keys of a node's children: of all children from their boxes, and of
- * one child (`lane`) from its bounding cylinder. */
+/* ebpo_far_boxes and ebpo_far_cylinder compute lower bounds of the keys of a node's children: of
+ * all children from their boxes, and of one child (`lane`) from its bounding cylinder. */
 void ebpo_far_boxes(const ebpo_far *far, const ebpo_far_frame *frame, const ebpo_bound *b,
                     double lower[8]);
 double ebpo_far_cylinder(const ebpo_far *far, const ebpo_far_frame *frame, const ebpo_bound *b,

@@ -93,7 +93,7 @@ typedef struct ebpo_probe {
  * are known to be farther than another face. */
 typedef struct ebpo_near_candidate {
     float low;           /* lower bound of the distance, in the frame */
-    uint32_t slot, node; /* the face's slot; the parent of its block */
+    uint32_t slot, node; /* the face's slot; the parent of the face's block */
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
 #define EBPO_NO_BLOCK UINT32_MAX

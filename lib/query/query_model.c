@@ -376,7 +376,7 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     return status;
 }
 
-/* Reads the border of a surface, if the file has it. Fails if the budget is too small. */
+/* Reads the border of a surface, if the file has the border. Fails if the budget is too small. */
 static ebpo_status open_border(ebpo_model *m, ebpo_error *error)
 {
     ebpo_model_plan plan;

@@ -150,7 +150,7 @@ void ebpo_context_let_go(ebpo_context *context);
 /* Envelopes that a context has computed and keeps for its next queries, because computing an
  * envelope takes ten times as long as finding its nearest point. For one thread. */
 
-/* Finds the envelope of the node with this cell. Returns false if it is not kept. */
+/* Finds the envelope of the node with this cell. Returns false if the envelope is not kept. */
 bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);
 /* Keeps an envelope, which may replace another kept envelope. *kept is NULL before the first call.
  * When out of memory, nothing is kept. */

@@ -240,7 +240,7 @@ static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranke
                                 ebpo_error *error);
 
 /* Returns a lower bound of the distance to a subtree's faces from its skeleton (upper nodes of its
- * hierarchy over faces), or 0 if it has none. */
+ * hierarchy over faces), or 0 if the subtree has no skeleton. */
 static double known_bound(const within *w, uint32_t below)
 {
     const ebpo_skeleton *k = ebpo_skeletons_find(w->context->model->skeletons, below);

@@ -287,7 +287,7 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     }
 }
 
-/* Sorts hits. If there are few, sorts by insertion, which is fast because the hits are nearly in
+/* Sorts hits. A few hits are sorted by insertion, which is fast because the hits are nearly in
  * order: the nearest boxes are visited first. */
 static void sort_found(ebpo_ray_found *found, uint64_t count, ebpo_segment *ray)
 {

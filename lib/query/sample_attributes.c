@@ -81,7 +81,8 @@ static bool of_element(const ebpo_attribute *head, const wanted *w, const char *
                                   memcmp(element, w->element, w->element_bytes) == 0));
 }
 
-/* Finds the column among the attributes of an element. Returns false if it is absent or a list. */
+/* Finds the column among the attributes of an element. Returns false if the column is absent or a
+ * list. */
 static bool find_column(const ebpo_file *file, const wanted *w, const char *element, sampled *out)
 {
     for (unsigned n = 0; n < file->attributes.count; n++) {

@@ -2,10 +2,10 @@
  * memory.
  *
  * The skeleton of a subtree has the upper nodes of the subtree's hierarchy over blocks of faces
- * (accel.h), eight at first. It is made when the subtree is loaded. Later searches load the subtree
- * again only if the lower bound from its skeleton is within the search's limit. If a search has
- * loaded a subtree and found no near face in it, nodes near the query point are added to the
- * skeleton. All skeletons together stay within their share of the budget. Skeletons give lower
+ * (accel.h), eight at first. The skeleton is made when the subtree is loaded. Later searches load
+ * the subtree again only if the lower bound from its skeleton is within the search's limit. If a
+ * search has loaded a subtree and found no near face in it, nodes near the query point are added to
+ * the skeleton. All skeletons together stay within their share of the budget. Skeletons give lower
  * bounds only (model_parts.h has the reason). Any thread may use a skeleton, also while it grows.
  *
  * A subtree owns some of its faces; its shared faces are owned by other subtrees (accel.h). */

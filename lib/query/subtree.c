@@ -123,8 +123,8 @@ typedef struct level_position {
     uint64_t rank[4], plane, leaf_plane;
 } level_position;
 
-/* Returns the stored winding number of a node. If the file stores none, the winding number is 1 for
- * black nodes and 0 for other nodes. */
+/* Returns the stored winding number of a node. If the file stores no winding numbers, the result is
+ * 1 for black nodes and 0 for other nodes. */
 static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t rank)
 {
     switch (type) {

@@ -1,5 +1,5 @@
-/* Computes winding numbers of points. For a solid they are integers; for a surface with holes, the
- * winding number is a real number, and bounds of it are returned. */
+/* Computes winding numbers of points. The winding numbers of a solid are integers. The winding
+ * number of a surface with holes is a real number; the functions return bounds of this number. */
 #include "core/strict_fp.h"
 
 #include <math.h>
