@@ -17,7 +17,7 @@
 
 enum {
     /* the faces at a vertex are searched for existing edges only if the vertex has at most this
-     * number of faces; so the work is linear in the size of the mesh */
+     * number of faces. So the work is linear in the size of the mesh */
     SEARCHED_DEGREE = 4096,
     /* numbers of vertices and of loops for each call of a thread's function */
     VERTEX_GRAIN = 1 << 13,

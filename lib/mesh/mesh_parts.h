@@ -118,9 +118,9 @@ enum {
     EBPO_REPAIR_DROP = 32
 };
 
-/* Performs the requested steps: merges vertices (within weld_distance of each other, or at equal
- * positions if weld_distance is 0), drops faces, orients, flips, fills holes, and orients the
- * components that filling holes has closed. */
+/* Performs the requested steps: merges vertices, drops faces, orients, flips, fills holes, and
+ * orients the components that filling holes has closed. Vertices are merged if they are within
+ * weld_distance of each other (0: at equal positions). */
 EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                            ebpo_repair_record *record, ebpo_error *error);
 

@@ -1,11 +1,11 @@
 /* Divides the memory budget of a model.
  *
  * A model is held completely in memory ("whole model") if the budget allows that. If not, the
- * budget is divided between four parts: the top of the tree (levels 0 to the cut level,
- * query_top.c), a cache of decoded chunks, skeletons, and a cache of subtrees, whose roots are at
- * the cut level. (A skeleton has the upper nodes of a subtree's hierarchy over faces: skeleton.c.)
- * The cut level is chosen so that subtrees are small enough. The plan uses only the counts in the
- * file header; no chunks are read.
+ * budget is divided between four parts: the top of the tree, a cache of decoded chunks, skeletons,
+ * and a cache of subtrees. The top is levels 0 to the cut level (query_top.c). The roots of
+ * subtrees are at the cut level. A skeleton has the upper nodes of a subtree's hierarchy over faces
+ * (skeleton.c). The cut level is chosen so that subtrees are small enough. The plan uses only the
+ * counts in the file header; no chunks are read.
  *
  * Several models may share a budget: the bytes that each model takes permanently are subtracted,
  * and the caches of all models share the remaining bytes. Any thread may use a shared budget. */

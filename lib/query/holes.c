@@ -4,18 +4,21 @@
  * The octree of a surface stores integers k, the winding numbers of the closed mesh that consists
  * of the surface and its caps. The winding number of the surface alone is w_S = k + w_D, where w_D
  * is the winding number of the discs D, which are the caps with reversed orientation
- * (geometry/cap_tree.h). A point is inside if w_S satisfies the rule with the threshold t.
+ * (geometry/cap_tree.h). A point is inside if w_S satisfies the file's rule (ebpo_rule) with a
+ * threshold t (ebpo_cap_rule).
  *
- * Bounds of w_D that are valid for all points of a cell often decide for the whole cell. If the
- * error of these bounds is small, no cap touches the cell, so k changes in the cell at faces only.
- * If |w_D| is also below t and below 1 - t, the rule for w_S gives the same result as the rule for
- * k, in this cell and in all cells below it. A white node in which |w_D| may be greater has one
- * result if the bounds of k + w_D are on one side of the rule's boundary. Near a cap, the value of
- * w_S at the cell's centre and a bound of its variation in the cell decide. Points of the remaining
- * cells are decided one by one (cap_winding.c).
+ * The functions here first compute bounds of w_D that are valid for all points of a cell. These
+ * bounds often decide for the whole cell. If the error of these bounds is small, no cap touches the
+ * cell, so k changes in the cell at faces only. If |w_D| is also below t and below 1 - t, the rule
+ * for w_S gives the same result as the rule for k, in this cell and in all cells below it. If |w_D|
+ * may be greater in a white node (a cell without faces), the whole cell still has one result if the
+ * bounds of k + w_D are on one side of the rule's boundary. Near a cap, the value of w_S at the
+ * cell's centre and a bound of its variation in the cell decide. Points of the remaining cells are
+ * decided one by one (cap_winding.c).
  *
- * Discs that are far from a cell are bounded once for all cells below it. Each cell has a list of
- * the other (near) discs, which is made from the list of its parent (cap_bounds.c). */
+ * If a disc is far from a cell, the angle at which the disc appears is bounded once for the cell
+ * and all cells below it. The other discs are near. Each cell has a list of its near discs, which
+ * is made from the list of the cell's parent (cap_bounds.c). */
 #include "core/strict_fp.h"
 
 #include <limits.h>
@@ -103,7 +106,7 @@ static void begin_front(marking *w, const ebpo_cap_box *box, const near_discs *n
                          near->end - near->begin, near->far);
 }
 
-/* Returns the bounds of 2 pi w_D that were begun. */
+/* Returns the bounds of 2 pi w_D after the refinements so far. *apart: as in ebpo_cap_front_sum. */
 static ebpo_bounded sum_front(marking *w, bool *apart)
 {
     w->terms += w->front.count;
@@ -222,7 +225,7 @@ static bool is_far_leaf(marking *w, ebpo_cell cell, const ebpo_cap_box *box, con
            (has_large_disc(w, box, near) && !caps_touch(w, cell) && is_far_by_centre(w, box));
 }
 
-/* Makes the list of a cell from the list of its parent. */
+/* Makes the list of a cell's near discs from the list of the cell's parent. */
 static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_discs *parent)
 {
     near_discs near = { w->lists.count, 0, parent->far, parent->decided };
@@ -289,8 +292,8 @@ static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf
     return (int32_t)index;
 }
 
-/* Returns the marked entry of a cell whose points may have different results. Other arguments: as
- * for mark_cell. `near`: the cell's list. */
+/* Returns the marked entry of a cell whose points may have different results. `near`: the cell's
+ * near discs. Other arguments: as for mark_cell. */
 static int32_t mark_undecided(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                               const near_discs *near)
 {
@@ -302,9 +305,9 @@ static int32_t mark_undecided(marking *w, ebpo_cell cell, int32_t winding, bool 
                       : ebpo_marked_entry(winding, EBPO_MARK_NEAR);
 }
 
-/* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf (`leaf`).
- * `winding`: for a cell without faces, k at the cell's lowest corner; for a leaf, the index of an
- * ebpo_near_cell with the caps that may touch the leaf, or -1 (see mark_leaf). */
+/* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf (`leaf`). For a
+ * cell without faces, `winding` is k at the cell's lowest corner. For a leaf, `winding` is the
+ * index of an ebpo_near_cell with the caps that may touch the leaf, or -1 (see mark_leaf). */
 static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
                          const near_discs *parent)
 {

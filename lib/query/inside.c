@@ -1,10 +1,10 @@
 /* Decides exactly whether points are inside a model.
  *
  * In leaves of some kinds, the signs of the planes of the leaf's faces at the point decide
- * (leaf_kinds.c). In other leaves, the winding number at the point is the winding number at a known
- * position of the cell, plus the crossings of faces on the way from this position to the point. The
- * way is one axis-parallel segment from a free cell face (a cell face that no face intersects), or
- * three such segments from the cell's lowest corner. A filter in single precision counts the
+ * (leaf_kinds.c). In other leaves, the query starts from the known winding number at another
+ * position of the cell. It adds the crossings of faces on the way from this position to the point.
+ * The way is one axis-parallel segment from a free cell face (a cell face that no face intersects),
+ * or three such segments from the cell's lowest corner. A filter in single precision counts the
  * crossings first (inside_kernels.c). A face that the filter cannot decide is *open*; exact
  * predicates decide it. In a model that is completely in memory, a batch goes down the tree with
  * several points at a time.

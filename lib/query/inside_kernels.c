@@ -86,10 +86,10 @@ EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u
 
 /* Rounding in double precision: the error of a difference of two doubles is at most 2^-53 of the
  * difference. The error of a cross product of two differences is at most CROSS_ERROR times the sum
- * of the absolute values of its two products. The error of a plane's height, a sum of three such
- * cross products with a factor each (compare_plane), is at most HEIGHT_ERROR times the sum of the
- * absolute values of all its products. UNDERFLOW_ERROR is added for underflow. Overflow makes
- * bounds infinite or NaN, and then nothing is certain. */
+ * of the absolute values of its two products. The height of a plane (compare_plane) is a sum of
+ * three such cross products, each times a factor. The error of the height is at most HEIGHT_ERROR
+ * times the sum of the absolute values of all products. UNDERFLOW_ERROR is added for underflow.
+ * Overflow makes bounds infinite or NaN, and then nothing is certain. */
 #define CROSS_ERROR     0x1p-50
 #define HEIGHT_ERROR    0x1p-47
 #define UNDERFLOW_ERROR 0x1p-960
@@ -132,9 +132,9 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
 
 /* Let x be the coordinate, on the segment's axis, of the point where the segment's line intersects
  * a face's plane. Returns 1 if x is greater than `at`, -1 if x is less, 0 if this is not certain.
- * weight[i]: cross_product of the two corners of edge i; size[i]: the *size that cross_product
- * sets. k: the corners' coordinates on the axis. `turn`: 1 if the face turns left around the line,
- * -1 if it turns right. */
+ * weight[i]: cross_product of the two corners of edge i; size[i]: *size of the same call of
+ * cross_product. k: the corners' coordinates on the axis. `turn`: 1 if the face turns left around
+ * the line, -1 if it turns right. */
 static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {

@@ -6,12 +6,13 @@
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * where s' is the transpose of s. All values are in double-double arithmetic, on coordinates scaled
  * by a power of two to about 1. They are summed in blocks of BLOCK_FACES faces, so that sums do not
- * depend on the number of threads. For volume and moments, the terms of a face have a factor: 1 if
- * the face's component bounds the solid, -1 if the component bounds the solid with the opposite
- * orientation, 0 if the component does not bound the solid (ebpo_component_times). If this is not
- * known, the factor is 1. For a surface with its border (the edges of its holes), the caps that
- * close the holes are faces, too (measure_caps.h). Source of the moments: Tonon 2004, "Explicit
- * exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
+ * depend on the number of threads. For volume and moments, the terms of a face have a factor
+ * (ebpo_component_times). The factor is 1 if the face's component bounds the solid, and -1 if the
+ * component bounds the solid with the opposite orientation. The factor is 0 if the component does
+ * not bound the solid. If the factor is not known, 1 is used. For a surface with its border (the
+ * edges of its holes), the caps that close the holes are faces, too (measure_caps.h). Source of the
+ * moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of
+ * its vertex coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>

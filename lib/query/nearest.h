@@ -93,8 +93,8 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
 
 /* --- deep bounds ---
  *
- * Deep bounds are nodes of the first levels below the cut level (at which the roots of subtrees
- * are), with their envelopes but without faces: a few bytes for each node. For a subtree that was
+ * Deep bounds are nodes of the first levels below the cut level, at which the roots of subtrees
+ * are. These nodes have envelopes but no faces, so each takes a few bytes. For a subtree that was
  * never loaded, deep bounds give a better bound than the envelope of the subtree's root. (For a
  * subtree that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep
  * bounds are read together. They are read when queries have loaded so many subtrees without need

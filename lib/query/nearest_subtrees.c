@@ -252,11 +252,12 @@ static bool is_in_memory(const ebpo_context *c, uint32_t below)
 
 /* Before a subtree of a remote file is entered, sends prefetch hints for this subtree and for other
  * new subtrees that the search probably needs, so that one round trip fetches all of them. The
- * result of the search is between the bound of this subtree and the limit; the subtrees with bounds
- * in the first 3/16 of this interval are requested. For 60 points anywhere in the box of a model of
- * 4.3 million faces, a query takes 11.5 round trips and 999 kB without these hints. With 3/16 of
- * the interval it takes 6.9 round trips and 1,040 kB, with 1/2 it takes 6.0 round trips and 1,103
- * kB. For far points, whose bounds are keys (point_bounds.h), no hints are sent. */
+ * distance that the search will find is between the bound of this subtree and the limit. The
+ * subtrees with bounds in the first 3/16 of this interval are requested. For 60 points anywhere in
+ * the box of a model of 4.3 million faces, a query takes 11.5 round trips and 999 kB without these
+ * hints. With hints for 3/16 of the interval, a query takes 6.9 round trips and 1,040 kB; with
+ * hints for 1/2, a query takes 6.0 round trips and 1,103 kB. For far points, whose bounds are keys
+ * (point_bounds.h), no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;

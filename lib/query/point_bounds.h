@@ -31,9 +31,9 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3]);
  * order as the distances. Let c be the middle of the model's box. The key of a point x is
  *     key(x) = (|p - x|^2 - |p - c|^2) / (2 |p - c|).
  * Its absolute value is at most about the model's size. Let y be the position of x relative to c,
- * in a unit of about the model's size, u the direction from c to p, and h = 1 / (2 |p - c|) in that
- * unit. Then key(x) = h |y|^2 - u . y. Bounds of keys are guaranteed; their error is about 2^-46 of
- * the model's size (docs/develop/bounds.md, "Points far away"). */
+ * in a unit of about the model's size. Let u be the direction from c to p, and h = 1 / (2 |p - c|)
+ * in that unit. Then key(x) = h |y|^2 - u . y. Bounds of keys are guaranteed; their error is about
+ * 2^-46 of the model's size (docs/develop/bounds.md, "Points far away"). */
 
 typedef struct ebpo_far {
     bool far;                 /* p is far; if false, the following fields are not valid */

@@ -169,13 +169,13 @@ struct ebpo_ray_search {
     bool any_hit; /* EBPO_WANTS_ANY: some face is certainly hit, and `decide` was not called */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
     const ebpo_accel *s;
-    /* In the frame (coordinates in which the subtree's cell has a size of 1 to 2): the direction,
-     * whose longest coordinate is 2^-12 to 2^12; the origin, moved along the ray to t = `moved`; a
-     * bound of the origin's error. */
+    /* The next three fields are in the frame (coordinates in which the subtree's cell has a size of
+     * 1 to 2). direction: its longest coordinate is 2^-12 to 2^12. origin: the ray's origin, moved
+     * along the ray to t = `moved`. error: bound of the error of `origin`. */
     double direction[3], origin[3], error;
     /* Set by the kernels. Each of the next three arrays has one float for each axis and an unused
-     * fourth float. near_from and far_from: the origin, moved by its error so that no box is
-     * missed; for the nearer and for the farther sides of boxes. inverse: reciprocals of the
+     * fourth float. near_from and far_from: the origin for tests of the nearer and of the farther
+     * sides of boxes, moved by `error` so that no box is missed. inverse: reciprocals of the
      * direction's coordinates. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
@@ -204,15 +204,16 @@ typedef struct ebpo_axis_segment {
     double to;
     int axis;
     /* Extent of the segment in the cell, in sixteenths of the cell, encoded almost as the box of an
-     * ebpo_listed_block. For each axis, the segment's upper side is stored in place of the box's
-     * lower side, and 15 minus the segment's lower side in place of 15 minus the box's upper side.
+     * ebpo_listed_block. For each axis, the segment's upper side is in the bits of the box's lower
+     * side. 15 minus the segment's lower side is in the bits of 15 minus the box's upper side.
      * EBPO_REACH_ALL: the segment may intersect all boxes. */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)
 
-/* Returns false if the listed faces of the block cannot intersect the segment, because one of the
- * six values of the block's box (four bits each) is greater than the same value of the segment. */
+/* Compares the six values of the block's box (four bits each) with the six values of the segment.
+ * Returns false if a value of the box is greater; the listed faces of the block then cannot
+ * intersect the segment. */
 static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint64_t listed)
 {
     const uint32_t digits = 0x0f0f0f, carry = 0x101010;

@@ -102,7 +102,7 @@ EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, 
 /* --- faces --- */
 
 /* Eight faces in coordinates of the ray: z is along the axis with the longest coordinate of the
- * direction; x and y are sheared so that the ray is at x = y = 0. */
+ * direction. x and y are sheared so that the ray is at x = y = 0. */
 typedef struct projected {
     f8 x[3], y[3], z[3];
 } projected;
@@ -142,9 +142,9 @@ EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b
     return out;
 }
 
-/* u, v, w: for each of the three edges of eight faces, twice the signed area of the triangle that
- * the edge forms with the ray, in x and y. least, greatest: the least and the greatest of u, v and
- * w. error: bound of the rounding error of u, v and w. */
+/* In the plane of x and y, the ray is the point 0. u, v, w: for each of a face's three edges, twice
+ * the signed area of the triangle of the edge and this point. least, greatest: the least and the
+ * greatest of u, v and w. error: bound of the rounding error of u, v and w. */
 typedef struct edges {
     f8 u, v, w, least, greatest, error;
 } edges;

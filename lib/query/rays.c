@@ -68,8 +68,9 @@ static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 
 /* --- one ray through one accel --- */
 
-/* If a coordinate of the ray's origin, in the accel's frame, is greater than this multiple of the
- * accel's largest coordinate, the origin is moved along the ray towards the faces. */
+/* The origin of a ray is moved along the ray towards the faces if the origin is far from the accel.
+ * That is so if a coordinate of the origin, in the accel's frame, is greater than this multiple of
+ * the accel's largest coordinate. */
 static const double near_enough = 4;
 /* This value is used in place of infinity, because infinity times 0 is NaN. */
 #define BEYOND 0x1p100f

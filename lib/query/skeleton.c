@@ -24,9 +24,9 @@
 
 /* A node of a skeleton. */
 typedef struct kept_node {
-    /* A child in bound.child is a block (EBPO_IS_BLOCK), a node of the skeleton (IS_KEPT + its
-     * index in the skeleton), or a node that the skeleton does not have (its index in the subtree's
-     * hierarchy). */
+    /* bound.child has three kinds of values: a block (EBPO_IS_BLOCK); a node of the skeleton
+     * (IS_KEPT + the node's index in the skeleton); a node that the skeleton does not have (the
+     * node's index in the subtree's hierarchy). */
     ebpo_bound bound;
     ebpo_bound_cylinder cylinder;
 } kept_node;
