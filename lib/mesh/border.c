@@ -3,13 +3,13 @@
  *
  * An edge that faces use n times from a to b and m times from b to a has weight n - m (n > m). At
  * each vertex, the edges of one face arrive as often as they leave. So at each vertex, the weights
- * of the edges that arrive and the weights of the edges that leave have equal sums. This is true
- * for any mesh: also non-manifold, twisted, or with neighbouring faces of opposite orientation. A
- * walk along edges of positive weight can therefore continue until it returns to one of its
- * vertices. The part of the walk from this vertex on is a simple loop. This loop is cut off. The
- * weight of the loop is the least weight of its edges, and is subtracted from the weight of every
- * edge of the loop. So at least one edge of the loop has the weight 0 afterwards, and the walks
- * come to an end.
+ * of the edges that arrive and the weights of the edges that leave have equal sums. These sums are
+ * equal in any mesh, also in a non-manifold or twisted mesh, and with neighbouring faces of
+ * opposite orientation. A walk along edges of positive weight can therefore continue until it
+ * returns to one of its vertices. The part of the walk from this vertex on is a simple loop. This
+ * loop is cut off. The weight of the loop is the least weight of its edges, and is subtracted from
+ * the weight of every edge of the loop. So at least one edge of the loop has the weight 0
+ * afterwards, and the walks come to an end.
  *
  * Walks begin at the least remaining edge and follow the least remaining edge at each vertex, in
  * the source's order. So the result depends neither on threads nor on the order of the mesh. */

@@ -189,7 +189,8 @@ static inline const char *ebpo_import_name(const ebpo_import_format *format)
 }
 
 /* The reader function of a format. Libraries without readers of meshes, such as the npm package,
- * are built with EBPO_NO_MESH_READERS: they recognise files of these formats, for messages. */
+ * are built with EBPO_NO_MESH_READERS. These libraries only recognise files of the formats, for
+ * messages. */
 #ifdef EBPO_NO_MESH_READERS
 #define EBPO_IMPORT_READER(reader) (false ? (reader) : NULL)
 #else

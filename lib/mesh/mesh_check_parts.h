@@ -108,8 +108,8 @@ static inline void ebpo_check_note(const ebpo_check *check, unsigned worker, ebp
         ebpo_found_add(check, worker, (ebpo_found){ (uint32_t)kind, (uint32_t)location, a, b });
 }
 
-/* Fills in the report of a check whose mesh, threads and report are set. This is the body of
- * ebpo_mesh_check. */
+/* Fills in the report of a check whose mesh, threads and report are set. ebpo_check_run is the body
+ * of ebpo_mesh_check. */
 EBPO_MUST_USE ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error);
 
 /* Checks that every coordinate is finite. */

@@ -30,7 +30,7 @@ ebpo_obj_text ebpo_obj_text_begin(const uint8_t *data, uint64_t size);
 bool ebpo_obj_next_word(ebpo_obj_text *t, ebpo_obj_word *word);
 
 /* Returns the rest of the line as a name, without surrounding blanks. Backslashes are part of the
- * name, because folder names contain them; they do not join lines. */
+ * name, because folder names contain backslashes; here, backslashes do not join lines. */
 ebpo_obj_word ebpo_obj_name(ebpo_obj_text *t);
 
 /* Moves to the next non-empty statement and reads its first word. Returns false at the end of the

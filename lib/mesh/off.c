@@ -124,8 +124,8 @@ typedef struct off_reading {
      * no colour; faces with an index of a colour */
     uint64_t surplus_vertices, surplus_faces, indexed;
     uint64_t divided; /* number of vertices with a weight other than 1 */
-    /* alpha: a colour has an opacity; both: vertices and faces have colours; more: text follows the
-     * last face */
+    /* alpha: a colour has an opacity. both: both vertices and faces have colours. more: text
+     * follows the last face */
     bool alpha, both, more;
 } off_reading;
 

@@ -76,8 +76,8 @@ static void lose_property(const ebpo_ply_parser *p, const ebpo_ply_element *elem
                          why);
 }
 
-/* Returns true if an earlier element of the same name has another number of rows. Such elements
- * cannot be kept, because arrays are found by name. */
+/* Returns true if an earlier element of the same name has another number of rows. The array `a`
+ * cannot be kept in this case, because arrays are found by the names of their elements. */
 static bool has_namesake(const ebpo_attributes *to, const ebpo_attribute *a, uint64_t rows)
 {
     for (uint64_t i = 0; i < to->count; i++)

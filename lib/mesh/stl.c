@@ -574,9 +574,9 @@ static ebpo_status make_faces(ebpo_import_build *b)
     return status == EBPO_OK ? ebpo_import_end(b) : status;
 }
 
-/* Returns true if the file is STL text: it begins with `solid` and is not a valid binary file. A
- * binary file may also begin with `solid`, but is unlikely to contain the word `facet`, and has
- * zero bytes. */
+/* Returns true if the file is STL text: the file begins with `solid` and is not a valid binary
+ * file. A binary file may also begin with `solid`, but is unlikely to contain the word `facet`, and
+ * has zero bytes. */
 static bool is_text(const uint8_t *data, uint64_t size)
 {
     uint64_t checked = size < CHECKED_BYTES ? size : CHECKED_BYTES;

@@ -1,7 +1,7 @@
 /* Acceleration structures ("accels"). An accel is a subtree of the octree (or the whole tree),
- * decoded for queries. It has child tables, leaves that list faces, the faces in blocks, and a
- * bounding hierarchy over the blocks. After an accel is made, only the kinds of its leaves change;
- * the first queries find these kinds. Any thread may use an accel.
+ * decoded for queries. An accel has child tables, leaves that list faces, the faces in blocks, and
+ * a bounding hierarchy over the blocks. After an accel is made, only the kinds of its leaves
+ * change; the first queries find these kinds. Any thread may use an accel.
  *
  * Terms: the "shared" faces of a subtree are listed by its leaves, but also by an earlier leaf of
  * the file outside the subtree; all its other faces are "owned". The "local index" of a face is its
@@ -277,9 +277,9 @@ typedef struct ebpo_accel {
     uint64_t bytes;
 } ebpo_accel;
 
-/* A function (of ebpo_inside_kernels) that sets the boxes of a leaf's list. It returns a bit for
- * each cell face that the leaf's faces intersect or may intersect: bit 2 * axis + side (1: upper).
- */
+/* A function (of ebpo_inside_kernels) that sets the boxes of a leaf's list. The function returns a
+ * bit for each cell face that the leaf's faces intersect or may intersect: bit 2 * axis + side (1:
+ * upper). */
 typedef unsigned ebpo_cell_faces_fn(const ebpo_accel *subtree, ebpo_listed_block *list,
                                     ebpo_cell cell);
 

@@ -439,7 +439,7 @@ static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **
         refs += slice->level[depth].ref_count;
     }
     if (slice->level_count < EBPO_LEVELS_MAX)
-        /* gray nodes of the last level are pruned: they have group numbers, but no groups */
+        /* gray nodes of the last level are pruned: these nodes have group numbers, but no groups */
         w->group_begin[slice->level_count] = groups;
     if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
         return ebpo_fail(w->error, EBPO_E_LIMIT,

@@ -60,9 +60,9 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
 /* --- kernels (block_measure_kernels.c) ---
  *
- * These kernels measure blocks of floats, eight vertices at a time. They are compiled for any
- * processor and for processors with AVX2, with the same operations in the same order. Error bounds:
- * docs/develop/bounds.md, "How bounding cylinders are measured". */
+ * These kernels measure blocks of floats, eight vertices at a time. The kernels are compiled for
+ * any processor and for processors with AVX2, with the same operations in the same order. Error
+ * bounds: docs/develop/bounds.md, "How bounding cylinders are measured". */
 
 typedef struct ebpo_block_extent {
     float low[3], high[3]; /* extent of the block's vertices, in the model's unit */

@@ -385,9 +385,9 @@ static double size_of(const ebpo_bound *b)
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
 }
 
-/* Returns false if squares have overflowed, because some faces are very far from their leaf. This
- * is possible in untrusted files. The steps of 16-bit values would then be infinite or NaN, so
- * set_cylinders gives the node cylinders that exclude nothing. */
+/* Returns false if squares have overflowed, because some faces are very far from their leaf.
+ * Untrusted files may have such faces. After an overflow, the steps of 16-bit values would be
+ * infinite or NaN, so set_cylinders gives the node cylinders that exclude nothing. */
 static bool are_finite(int count, const cylinder child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)

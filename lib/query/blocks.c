@@ -1,12 +1,12 @@
 /* Makes blocks and the hierarchy over the blocks (accel.h). A block has at most eight faces and the
  * vertices of these faces.
  *
- * First, the layout decides which faces are in one block, and builds the hierarchy; it uses no
- * coordinates. The new faces of a node (faces that no leaf before the node lists) have consecutive
- * local indices. So neighbouring children with few new faces can share a block. The hierarchy
- * follows the octree: the blocks below an octree node are passed up to the node's parent. If a
- * parent receives more than eight blocks or nodes of the hierarchy, some of these are joined in new
- * nodes of the hierarchy. Then the blocks are measured, numbered and filled in parallel;
+ * First, the layout decides which faces are in one block, and builds the hierarchy; the layout uses
+ * no coordinates. The new faces of a node (faces that no leaf before the node lists) have
+ * consecutive local indices. So neighbouring children with few new faces can share a block. The
+ * hierarchy follows the octree: the blocks below an octree node are passed up to the node's parent.
+ * If a parent receives more than eight blocks or nodes of the hierarchy, some of these are joined
+ * in new nodes of the hierarchy. Then the blocks are measured, numbered and filled in parallel;
  * block_bounds.c computes their bounds. */
 #include "core/strict_fp.h"
 
@@ -20,9 +20,9 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* The result of the walk below a node of the octree. It has either at most eight faces that have no
- * block yet, or at most eight members: blocks or nodes of the hierarchy that contain the octree
- * node's faces. */
+/* The result of the walk below a node of the octree. A bundle has either at most eight faces that
+ * have no block yet, or at most eight members: blocks or nodes of the hierarchy that contain the
+ * octree node's faces. */
 typedef struct bundle {
     uint32_t begin, end; /* range of faces, as local indices */
     int members;         /* number of members; 0: the faces have no block yet */

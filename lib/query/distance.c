@@ -1,11 +1,11 @@
 /* Computes the distance to the surface, the nearest point and the normal (EBP 2017, 4.4).
  *
  * nearest_subtrees.c finds the exact minimum. Three other modes, from the thesis, do not always
- * find the minimum. They search only the leaf that contains the point, all leaves below the deepest
- * gray node that contains the point, or the envelope of a node. With a level, a query returns an
- * interval for the distance, from the envelopes of that level's nodes. If a deadline passes, the
- * query returns an interval from the nodes that were searched until then. In a subset, a query
- * fails with EBPO_E_ABSENT if an omitted face might be nearer than the found face. */
+ * find the minimum. These modes search only the leaf that contains the point, all leaves below the
+ * deepest gray node that contains the point, or the envelope of a node. With a level, a query
+ * returns an interval for the distance, from the envelopes of that level's nodes. If a deadline
+ * passes, the query returns an interval from the nodes that were searched until then. In a subset,
+ * a query fails with EBPO_E_ABSENT if an omitted face might be nearer than the found face. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,13 +1,15 @@
 /* Kernels of the query "inside" (inside.c), for the faces that a leaf lists, eight faces at a time.
  *
- * sum_crossings sums the crossings of the faces with a segment that is parallel to an axis. It uses
- * single precision, or double precision in accels (acceleration structures of subtrees) of doubles.
- * Faces that are not certain in this precision ("open" faces) are decided exactly by inside.c.
+ * sum_crossings sums the crossings of the faces with a segment that is parallel to an axis. The
+ * function uses single precision, or double precision in accels (acceleration structures of
+ * subtrees) of doubles. Faces that are not certain in this precision ("open" faces) are decided
+ * exactly by inside.c.
  *
  * find_reached_cell_faces finds the cell faces that the leaf's faces reach. A face reaches a cell
  * face if the extent of the face on the cell face's axis goes up to the cell face or beyond.
- * find_reached_cell_faces also computes the box of each block in the leaf's list. It is called once
- * for each leaf, during one of the first queries in this leaf. Its comparisons are exact.
+ * find_reached_cell_faces also computes the box of each block in the leaf's list. The function is
+ * called once for each leaf, during one of the first queries in this leaf. The comparisons of
+ * find_reached_cell_faces are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
@@ -49,8 +51,8 @@ EBPO_EIGHT turns combine_turns(unsigned some_left, unsigned some_right, unsigned
  * its two products.
  *
  * The code uses larger bounds: 2^-43 R M (`turn_error_constant` of ebpo_accel) plus
- * TURN_ERROR_FACTOR times this sum. They also cover the rounding of the bounds themselves, and
- * underflow: accels with blocks of floats have R above 2^-41 and M above 2^-40. */
+ * TURN_ERROR_FACTOR times this sum. The larger bounds also cover the rounding of the bounds
+ * themselves, and underflow: accels with blocks of floats have R above 2^-41 and M above 2^-40. */
 #define TURN_ERROR_FACTOR 0x1p-20f
 
 /* Computes the coordinates of the faces' corners on an axis, minus `from`. */

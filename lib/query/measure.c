@@ -236,8 +236,8 @@ static void scale_point(const frame *f, const double p[3], double out[3])
         out[k] = p[k] * f->factor[0] * f->factor[1];
 }
 
-/* Adds the caps. Their triangles are those of the discs (geometry/cap_triangles.h) with the
- * opposite orientation. */
+/* Adds the caps. The triangles of a cap are the triangles of a disc (geometry/cap_triangles.h) with
+ * the opposite orientation. */
 static void add_caps(moments *m, const frame *f, const ebpo_border_loops *loops)
 {
     const double *point = loops->point;
@@ -392,8 +392,8 @@ static ebpo_status count_components(measuring *p, const ebpo_solid_shells *s, eb
 }
 
 /* Returns true if the surface has one component, no edge of more than two faces, and no edge whose
- * faces have opposite orientations. Its winding numbers with caps are then 0 and 1, or 0 and -1,
- * unless faces or caps intersect. */
+ * faces have opposite orientations. The winding numbers of such a surface with caps are 0 and 1, or
+ * 0 and -1, unless faces or caps intersect. */
 static bool is_one_sheet(const ebpo_info *info)
 {
     const ebpo_mesh_report *r = &info->report;

@@ -2,10 +2,10 @@
  * box is along the axes of coordinates. The other box is along the loop's vector area, and is thin
  * if the loop is nearly flat.
  *
- * Rounding. Points relative to the first point are at most `span` long. Their products with axes,
- * which are unit vectors up to an error of 2^-50, have an error below 2^-49 span, so boxes are
- * enlarged by this error on both sides. Three axes that are orthogonal up to an error of 2^-45 span
- * the volume of an exact box up to a relative error of 2^-40. */
+ * Rounding. Points relative to the first point are at most `span` long. The axes are unit vectors
+ * up to an error of 2^-50. So the products of these points with the axes have an error below 2^-49
+ * span, and boxes are enlarged by this error on both sides. Three axes that are orthogonal up to an
+ * error of 2^-45 span the volume of an exact box up to a relative error of 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -172,8 +172,8 @@ EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_mode
 
 /* --- shared budgets ---
  *
- * A budget that several models share. It counts the bytes that each model takes permanently, and
- * the bytes for the caches of all models. Any thread may use it. */
+ * Several models may share a budget. The budget counts the bytes that each model takes permanently,
+ * and the bytes for the caches of all models. Any thread may use a shared budget. */
 
 /* ebpo_budget_subtrees and ebpo_budget_chunks return the pools of the caches of subtrees and of
  * chunks. The pools are separate, because loading a subtree needs memory for chunks. */
@@ -182,10 +182,10 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
 
-/* ebpo_budget_take_whole reserves bytes for a model that is held completely in memory. It returns
- * false if the bytes exceed the quota of whole models or the free part of the budget.
- * ebpo_budget_give_back_whole gives bytes back: unused bytes, or, when the model is closed, all
- * bytes. */
+/* ebpo_budget_take_whole reserves bytes for a model that is held completely in memory.
+ * ebpo_budget_take_whole returns false if the bytes exceed the quota of whole models or the free
+ * part of the budget. ebpo_budget_give_back_whole gives bytes back: unused bytes, or, when the
+ * model is closed, all bytes. */
 bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
 void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
 

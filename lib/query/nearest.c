@@ -1,10 +1,10 @@
 /* Finds the nearest face: the search in one accel (acceleration structure of a subtree, accel.h),
  * and the comparison of two faces.
  *
- * The search walks down the hierarchy over blocks of faces depth first, the nearest child first. It
- * drops nodes that are certainly farther than the best face. Bounds of nodes and faces are in
- * single precision with bounded errors (nearest_kernels.c). The remaining faces are compared by
- * guaranteed bounds in double precision. If the bounds of two faces overlap, exact arithmetic
+ * The search walks down the hierarchy over blocks of faces depth first, the nearest child first.
+ * The search drops nodes that are certainly farther than the best face. Bounds of nodes and faces
+ * are in single precision with bounded errors (nearest_kernels.c). The remaining faces are compared
+ * by guaranteed bounds in double precision. If the bounds of two faces overlap, exact arithmetic
  * compares the faces. If several faces are equally near, the result is the face with the lowest
  * index in the file. If the point is so far from the subtree that single precision does not
  * suffice, the search uses boxes in double precision. A far point is so far from the model that its
@@ -35,7 +35,7 @@ static bool is_edge(ebpo_feature feature)
 }
 
 /* Returns true if the nearest features (corner or edge) of both faces are the same vertex or edge,
- * so that the distances are equal. This is the most frequent case of equal distances. */
+ * so that the distances are equal. Most equal distances are of this kind. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {

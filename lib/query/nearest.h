@@ -97,11 +97,11 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  * are. These nodes have envelopes but no faces, so each takes a few bytes. For a subtree that was
  * never loaded, deep bounds give a better bound than the envelope of the subtree's root. (For a
  * subtree that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep
- * bounds are read together. They are read when queries have loaded so many subtrees without need
- * that reading the deep bounds takes no longer than these loads took. So deep bounds delay neither
- * opening a model nor queries along a path. Deep bounds are used for local files only, because for
- * remote files the additional request would cost as much as it saves. Their memory counts towards
- * the quota of skeletons. */
+ * bounds are read together. The deep bounds are read when queries have loaded many subtrees without
+ * need: so many that these loads took at least as long as reading the deep bounds takes. So deep
+ * bounds delay neither opening a model nor queries along a path. Deep bounds are used for local
+ * files only, because for remote files the additional request would cost as much as it saves. The
+ * memory of deep bounds counts towards the quota of skeletons. */
 
 /* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
  * levels below the cut level. Reports no error: if the file cannot be read, later queries fail. */
@@ -116,8 +116,8 @@ void ebpo_deep_bounds_report(ebpo_model *model, unsigned loaded);
 /* Finds the nearest face of a model. If the model is not completely in memory, visits nodes of the
  * top and subtrees in the order of guaranteed lower bounds of their distance. The search ends when
  * the next bound is beyond the found distance. So a subtree is searched, and loaded if needed, only
- * if its bound is at most the result; this does not depend on what is in memory. After a deadline,
- * the least bound that was not visited is in search->passed_over. */
+ * if its bound is at most the result. This is true whichever subtrees are in memory. After a
+ * deadline, the least bound that was not visited is in search->passed_over. */
 EBPO_MUST_USE ebpo_status ebpo_nearest_first(ebpo_context *context, ebpo_nearest *search,
                                              ebpo_error *error);
 

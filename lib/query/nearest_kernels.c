@@ -1,6 +1,6 @@
-/* The kernel that finds the nearest face of one accel (acceleration structure of a subtree). It
- * walks from node to node of the hierarchy over blocks of faces, eight children or eight faces at a
- * time, in single precision.
+/* The kernel that finds the nearest face of one accel (acceleration structure of a subtree). The
+ * kernel walks from node to node of the hierarchy over blocks of faces, eight children or eight
+ * faces at a time, in single precision.
  *
  * The walk drops only nodes and faces that are certainly farther than the best upper bound. All
  * other faces become candidates, which nearest.c compares.

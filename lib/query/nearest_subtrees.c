@@ -3,7 +3,7 @@
  *
  * Nodes of the top (levels 0 to the cut level) and subtrees wait in a queue, ordered by guaranteed
  * lower bounds of their distance. The search ends when the next bound is beyond the best face. So a
- * subtree is loaded only if its bound is at most the result; this does not depend on what is in
+ * subtree is loaded only if its bound is at most the result. This is true whichever subtrees are in
  * memory. If a subtree was loaded before, its bound comes from its skeleton (upper nodes of its
  * hierarchy over faces, skeleton.c). If a subtree was never loaded, its bound comes from the
  * envelopes of the first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are

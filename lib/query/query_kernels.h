@@ -116,8 +116,8 @@ struct ebpo_near_search {
     uint32_t from[EBPO_VISITS_MAX]; /* parents of the stack's visits */
 };
 
-/* This value is added to errors of distances. The error from underflow of squares is far less:
- * about sqrt(2^-149). */
+/* EBPO_NEAR_UNDERFLOW is added to errors of distances. The error from underflow of squares is far
+ * less: about sqrt(2^-149). */
 #define EBPO_NEAR_UNDERFLOW 0x1p-56f
 
 /* Lowers `best` and the limit for squared bounds, which includes rounding errors. */

@@ -411,8 +411,8 @@ static ebpo_status open_planned(ebpo_model *m, ebpo_error *error)
         uint64_t memory = m->options.memory;
         status = m->options.budget ? open_shared_whole(m, plan.whole, error) : open_whole(m, error);
         m->options.memory = memory;
-        /* After EBPO_E_LIMIT, the model is loaded in parts: it takes more memory than ordinary
-         * models with the same counts, for which the plan is made. */
+        /* After EBPO_E_LIMIT, the model is loaded in parts, because the whole model takes more
+         * memory than ordinary models with the same counts, for which the plan is made. */
         if (status != EBPO_E_LIMIT || !m->options.memory)
             return status;
         status = ebpo_plan_parts(m->file, &m->options, &plan, error);

@@ -4,8 +4,8 @@
  * Faces are found in bands. A band has a limited number of faces: the next faces in this order,
  * after the last face of the previous band. So a stream of any length needs little memory. The
  * first band is small, for callers that need few faces. The search for a band is depth first, the
- * nearest child first. It skips nodes and faces that are certainly beyond the band's limit, or
- * certainly in an earlier band. Subtrees that are not in memory are loaded in the order of
+ * nearest child first. The search skips nodes and faces that are certainly beyond the band's limit,
+ * or certainly in an earlier band. Subtrees that are not in memory are loaded in the order of
  * guaranteed lower bounds of their distance, until the next bound is beyond the band. */
 #include "core/strict_fp.h"
 

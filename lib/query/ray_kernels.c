@@ -1,6 +1,6 @@
-/* The kernel that finds the hits of a ray. It walks down the hierarchy over blocks of faces of one
- * accel (acceleration structure of a subtree, accel.h), and filters eight faces at a time, in
- * single precision.
+/* The kernel that finds the hits of a ray. The kernel walks down the hierarchy over blocks of faces
+ * of one accel (acceleration structure of a subtree, accel.h), and filters eight faces at a time,
+ * in single precision.
  *
  * The kernel drops only faces that the ray certainly misses, or certainly hits beyond the limit of
  * t (a hit is at origin + t * direction). If the kernel reports a certain hit, the face is also hit

@@ -101,8 +101,8 @@ static void lower_bound(ebpo_ray_search *r)
 /* Returns the maximum, without a function call. */
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
-/* Scales a very long or very short direction by a power of two. This is done only if necessary,
- * because it delays all later steps. */
+/* Scales a very long or very short direction by a power of two. Scales only if necessary, because
+ * scaling delays all later steps. */
 static void scale_direction(ebpo_ray_search *r, double longest)
 {
     int exponent;

@@ -8,7 +8,8 @@
  * the skeleton. All skeletons together stay within their share of the budget. Skeletons give lower
  * bounds only (model_parts.h has the reason). Any thread may use a skeleton, also while it grows.
  *
- * A subtree owns some of its faces; its shared faces are owned by other subtrees (accel.h). */
+ * A subtree owns some of the faces that it lists. The other listed faces are shared faces, which
+ * other subtrees own (accel.h). */
 #include "core/strict_fp.h"
 
 #include "query/model_parts.h"
