@@ -24,8 +24,9 @@ void *ebpo_alloc_lines(uint64_t count, size_t size);
 void *ebpo_realloc(void *block, uint64_t count, size_t size);
 
 /* Ensures that a growing array has capacity for `need` items. `array`: address of the pointer to
- * the items. *capacity: number of items of `size` bytes that have space; grows by at least half.
- * Returns false when out of memory; the array stays valid. */
+ * the items. *capacity: number of items of `size` bytes for which memory is allocated. If this
+ * number is less than `need`, it grows by at least half. Returns false when out of memory; the
+ * array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
 
 /* The memory limit of an object that is being built, for one thread. All members are in bytes. */

@@ -1,10 +1,12 @@
 /* Keeps items in caches under a memory budget. A pool is a budget that several caches share; a
- * cache with a separate budget has its own pool. A pool has one lock, one table of slots by cache
- * and key, and one order of last use for all its caches. Memory for an item is reserved before the
- * item is loaded, and the lock is not held while a source loads or releases items. While an item is
- * loaded, its slot is LOADING, and threads that need the same key wait. Waiting reservations are
- * served in order of arrival; otherwise a large reservation might wait for ever. A background
- * thread loads prefetched keys; it drops no item that is in use or in the same prefetch. */
+ * cache with a separate budget has its own pool. A slot is the record of one key of one cache. A
+ * pool has one lock, one table of slots, and one order of last use for all its caches. Memory for
+ * an item is reserved before the item is loaded, and the lock is not held while a source loads or
+ * releases items. While an item is loaded, its slot is LOADING, and threads that need the same key
+ * wait. Waiting reservations are served in order of arrival; otherwise a large reservation might
+ * wait for ever. A prefetch is a list of keys that the caller will need soon. A background thread
+ * loads their items. To free memory, this thread drops no item that is in use or in the same
+ * prefetch. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <signal.h>
@@ -55,12 +57,12 @@ struct ebpo_cache_pool {
     uint64_t bytes, peak_bytes;
     uint64_t pinned;    /* bytes of pinned items */
     uint64_t taken;     /* bytes that ebpo_cache_pool_take has reserved */
-    uint64_t aside_max; /* sum of aside_max of all caches */
+    uint64_t aside_max; /* sum of the bytes that all caches have set aside */
     /* bytes reserved for running loads, and bytes of items that are being released: they will
      * become free or pinned when the loads and releases end */
     uint64_t passing;
-    /* tickets: number of tickets given so far. Each reservation takes one, except those of the
-     * background threads and of bytes set aside. serving: the ticket whose turn it is */
+    /* tickets: number of tickets given so far. Each reservation takes a ticket; reservations of
+     * background threads and of bytes set aside take none. serving: the ticket whose turn it is */
     uint64_t tickets, serving;
 };
 
@@ -72,7 +74,8 @@ struct ebpo_cache {
     /* signalled when the background thread has work; separate from `changed`, because each unpin
      * broadcasts `changed`, which would wake the thread */
     pthread_cond_t work_added;
-    /* aside_max: bytes set aside (ebpo_cache_set_aside); aside: how many of these bytes are used */
+    /* aside_max: bytes of the budget that are set aside for data other than items; aside: how many
+     * of these bytes are used */
     uint64_t aside_max, aside;
     uint64_t leaving; /* number of items that are out of the table and being released */
     ebpo_cache_stats stats;
@@ -84,13 +87,13 @@ struct ebpo_cache {
     uint64_t prefetch_count;          /* number of calls of ebpo_cache_prefetch */
 };
 
-/* A request to reserve bytes. Requests of the background thread wait until no other request waits,
- * and drop no item of the same prefetch. */
+/* A request to reserve bytes. A request of the background thread waits until no other request
+ * waits, and drops no item of the latest prefetch. */
 typedef struct cache_demand {
     ebpo_cache *cache;  /* NULL: ebpo_cache_pool_take */
     uint64_t key, peak; /* peak: bytes to reserve */
     bool ahead;         /* true: the background thread loads the item */
-    bool aside;         /* true: the bytes are a part of those that are set aside */
+    bool aside;         /* true: the request uses bytes that are set aside */
     bool known;         /* true: `peak` is known from an earlier attempt */
 } cache_demand;
 
@@ -99,11 +102,11 @@ typedef struct cache_demand {
  * bytes. */
 typedef enum cache_capacity { CAPACITY_MADE, CAPACITY_LATER, CAPACITY_NEVER } cache_capacity;
 
-/* Static functions are called with the pool's lock held, unless their comment says otherwise. Those
- * that wait, or call a source, release the lock meanwhile. */
+/* Callers of a static function hold the pool's lock, except where the function's comment says
+ * otherwise. A function that waits, or calls a source, releases the lock meanwhile. */
 
-/* Makes an empty table; the lock does not exist yet. Returns false when out of memory. The caller
- * frees the slots, and then t->bucket. */
+/* Makes an empty table. Called before the pool's lock exists. Returns false when out of memory. The
+ * caller frees the slots, and then t->bucket. */
 static bool make_slots(cache_slots *t)
 {
     enum { BUCKETS = 64 };
@@ -192,7 +195,7 @@ static void unlink_slot(cache_slots *t, cache_slot *s)
 
 /* --- reservations in a budget: the least recently used item of any cache is dropped first --- */
 
-/* Adds bytes to those of the pool and of the cache `c` (NULL: no cache). */
+/* Adds `bytes` to the bytes in use of the pool and of the cache `c` (NULL: no cache). */
 static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
 {
     p->bytes += bytes;
@@ -247,8 +250,9 @@ static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
     *leaving = s;
 }
 
-/* Returns the bytes of the unpinned items that must not be dropped for this request: for a request
- * of the background thread, the items of the same prefetch; otherwise 0. */
+/* Returns the bytes of the unpinned items that must not be dropped for this request. A request of
+ * the background thread keeps the items of the latest prefetch. Other requests keep no unpinned
+ * item. */
 static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t bytes = 0;
@@ -264,8 +268,8 @@ static uint64_t saturated_sum(uint64_t a, uint64_t b)
     return a > UINT64_MAX - b ? UINT64_MAX : a + b;
 }
 
-/* Returns the least budget with which the request is possible after all items are dropped that may
- * be dropped. It is the sum of the bytes in use, set aside, and requested. */
+/* Returns the least budget that suffices for the request once every item that may be dropped is
+ * dropped. This budget is the sum of the bytes in use, set aside, and requested. */
 static uint64_t least_budget(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t used = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_max);
@@ -443,8 +447,8 @@ static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, e
 }
 
 /* Calls the source to load an item with the `reserved` bytes. Called without the lock. If the item
- * is larger, releases the item and fails. If the source refuses to load with so few bytes, sets
- * *needed to the bytes that it requests; otherwise to 0. */
+ * is larger than `reserved`, releases the item and fails. If the source refuses to load with so few
+ * bytes, sets *needed to the bytes that the source requests; otherwise sets *needed to 0. */
 static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
@@ -811,8 +815,8 @@ void ebpo_cache_free(ebpo_cache *c)
     stop_ahead(c);
     pthread_mutex_lock(&p->lock);
     drop_unpinned(c);
-    /* Other threads may have dropped items of this cache for their requests, and release them now.
-     */
+    /* Other threads may have dropped items of this cache for their requests, and may still be
+     * releasing these items. */
     while (c->leaving)
         pthread_cond_wait(&p->changed, &p->lock);
     p->bytes -= c->aside;

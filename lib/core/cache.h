@@ -9,12 +9,12 @@
 typedef struct ebpo_cache ebpo_cache;
 
 /* Callbacks that load the items of a cache. Any thread may call them, without a lock; estimate and
- * load are never called at the same time for the same key. They may use other caches; of this cache
- * they may only call ebpo_cache_take_aside. */
+ * load are never called at the same time for the same key. The callbacks may use other caches. With
+ * this cache, they may only call ebpo_cache_take_aside. */
 typedef struct ebpo_cache_source {
     void *user;
-    /* Estimates the memory for an item. *peak: bytes that loading takes, including the item. They
-     * are reserved before the item is loaded. *keep: bytes of the loaded item. */
+    /* Estimates the memory for an item. *peak: bytes that loading takes, including the item. The
+     * cache reserves these bytes before it loads the item. *keep: bytes of the loaded item. */
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error);
     /* Loads an item with at most `most` bytes of memory: the reserved bytes, or UINT64_MAX if there
@@ -33,8 +33,8 @@ typedef struct ebpo_cache_stats {
     uint64_t loads; /* number of items that ebpo_cache_get has loaded */
     uint64_t prefetched; /* number of items that the background thread has loaded */
     uint64_t evicted;    /* number of items that were dropped so that others fit in the budget */
-    /* bytes of items, of reservations for running loads, and of used bytes that were set aside:
-     * now, and greatest so far */
+    /* bytes of items, of reservations for running loads, and of ebpo_cache_take_aside: now, and
+     * greatest so far */
     uint64_t bytes, peak_bytes;
     double load_seconds; /* time that callers of ebpo_cache_get waited */
 } ebpo_cache_stats;
@@ -50,14 +50,14 @@ EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t b
                                                ebpo_error *error);
 /* Frees the pool; call it after freeing its caches. NULL is allowed. */
 void ebpo_cache_pool_free(ebpo_cache_pool *pool);
-/* Reserves bytes of the budget for other data than items, until ebpo_cache_pool_give_back is
+/* Reserves bytes of the budget for data other than items, until ebpo_cache_pool_give_back is
  * called. Drops items to free these bytes. Returns EBPO_E_LIMIT if the items in use leave too few
  * bytes. */
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *pool, uint64_t bytes,
                                                ebpo_error *error);
 void ebpo_cache_pool_give_back(ebpo_cache_pool *pool, uint64_t bytes);
-/* Gets the bytes in use now, the greatest number so far, and the bytes that ebpo_cache_pool_take
- * has reserved. */
+/* Sets *now to the bytes in use, *peak to the greatest number of bytes in use so far, and *taken to
+ * the bytes that ebpo_cache_pool_take has reserved. */
 void ebpo_cache_pool_get_bytes(ebpo_cache_pool *pool, uint64_t *now, uint64_t *peak,
                                uint64_t *taken);
 
@@ -93,13 +93,14 @@ bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
  * are ignored. Items that are already in memory count as just used. */
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 
-/* Sets `most` bytes of the budget aside for other data than items: loads are refused as if all
- * these bytes were in use. Call this function before the cache is used. */
+/* Sets `most` bytes of the budget aside for data other than items: items can no longer use these
+ * bytes. Call this function before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Uses bytes that are set aside, and drops items to free memory. Returns false if fewer bytes are
- * still set aside, or if items in use and running loads leave too little memory now. */
+/* Takes bytes that are set aside, and drops items to free memory. Returns false if fewer than
+ * `bytes` bytes of those set aside are left, or if items in use and running loads leave too little
+ * memory now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
-/* Returns bytes that ebpo_cache_take_aside has used. */
+/* Gives back bytes that ebpo_cache_take_aside has taken. */
 void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);
 
 /* Drops all unpinned items. */

@@ -1,5 +1,5 @@
-/* Computes checksums: SHA-256 (nettle) of sources and content, and Jenkins' lookup3 of HDF5
- * metadata. Compares checksums with the values that a file states. */
+/* Computes checksums: SHA-256 (by the library nettle) of source meshes and of the content of files,
+ * and Jenkins' lookup3 of HDF5 metadata. Compares checksums with the values that a file states. */
 #ifndef EBPO_CORE_CHECKSUM_H
 #define EBPO_CORE_CHECKSUM_H
 

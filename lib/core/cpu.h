@@ -3,9 +3,9 @@
  *
  * A kernel is a table of functions. NAME_kernels.c defines the table as EBPO_KERNEL(TABLE), its
  * header declares it by EBPO_KERNELS(TYPE, TABLE), and callers use TABLE_best(), which returns the
- * table for this processor. lib/meson.build has one row for each instruction set: its suffix and
- * its compiler flags. With EBPO_BASE_KERNELS_ONLY, tests compile only the kernels of the base set,
- * with other flags. */
+ * table for this processor. lib/meson.build has one row for each instruction set, with its suffix
+ * and its compiler flags. The suffix `base` is the compiler's default instruction set. Tests define
+ * EBPO_BASE_KERNELS_ONLY to use only the base kernels, which they compile with other flags. */
 #ifndef EBPO_CORE_CPU_H
 #define EBPO_CORE_CPU_H
 

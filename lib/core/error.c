@@ -116,8 +116,8 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
     return EBPO_E_IO;
 }
 
-/* Limits of struct_size: a value outside of them was not initialised by the caller. A struct has at
- * least the member struct_size and one more member. */
+/* Limits of struct_size: if the value is outside these limits, the caller did not initialise the
+ * struct. A struct has at least the member struct_size and one more member. */
 enum { SMALLEST = 2 * sizeof(size_t), LARGEST = 8192 };
 
 static bool is_plausible_size(size_t size)

@@ -21,7 +21,7 @@ ebpo_status ebpo_fail_at(ebpo_error *error, ebpo_status status, const char *file
                          const char *object, int64_t offset, const char *format, ...)
     EBPO_PRINTF(6, 7);
 
-/* Copies the error of another call to *error, and returns its status. */
+/* Copies the error `cause` of another call to *error, and returns the status of `cause`. */
 ebpo_status ebpo_fail_with(ebpo_error *error, const ebpo_error *cause);
 
 /* Returns EBPO_E_MEMORY. `bytes`: the number of bytes that could not be allocated, for the message.
@@ -35,9 +35,9 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
  * structs that begin with their size (ebpo/base.h), so the caller may have been compiled with any
  * version of the header. */
 
-/* Reads the caller's options `given` into *own, which has the defaults. If `given` is NULL, *own
- * does not change. EBPO_E_ARGUMENT: struct_size is not set. EBPO_E_UNSUPPORTED: a member is set
- * that this version of the library does not support. */
+/* Reads the caller's options `given` into the library's struct *own, which already has the
+ * defaults. If `given` is NULL, *own does not change. EBPO_E_ARGUMENT: struct_size is not set.
+ * EBPO_E_UNSUPPORTED: a member is set that this version of the library does not support. */
 #define EBPO_TAKE(type, own, given, error)  \
     (!(given) ? EBPO_OK                     \
      : (given)->struct_size == sizeof(type) \
@@ -47,7 +47,7 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
 /* Returns EBPO_E_ARGUMENT when the caller's result struct does not state its size. */
 #define EBPO_CHECK_SIZED(type, out, error) ebpo_sized_check((out)->struct_size, #type, error)
 
-/* Copies *filled to the caller's struct *out, as far as *out has the members. Members of *out that
+/* Copies to the caller's struct *out those members of *filled that *out has. Members of *out that
  * *filled lacks become 0. Keeps the caller's struct_size. If struct_size is not set, returns
  * EBPO_E_ARGUMENT and writes nothing. */
 #define EBPO_GIVE(type, out, filled) \

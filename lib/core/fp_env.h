@@ -24,7 +24,7 @@ typedef struct ebpo_fp_env {
 enum { EBPO_FP_CONTROL = 0xffc0, EBPO_FP_DEFAULT = 0x1f80 };
 
 /* Sets the default environment. The asm prevents the compiler from moving memory reads, and
- * computations with the values read, to the other side of this line. */
+ * computations with these values, from after this line to before it. */
 static inline ebpo_fp_env ebpo_fp_enter(void)
 {
     ebpo_fp_env env = { _mm_getcsr() };

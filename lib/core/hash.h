@@ -20,8 +20,8 @@ static inline uint64_t ebpo_hash_three(const uint64_t key[3])
     return ebpo_hash_number(ebpo_hash_number(ebpo_hash_number(key[0]) + key[1]) + key[2]);
 }
 
-/* Returns the FNV-1a hash of bytes that follow the bytes with the hash `hash`. For the first bytes,
- * `hash` is EBPO_HASH_BYTES_BEGIN. */
+/* Extends the FNV-1a hash `hash` of earlier bytes by these bytes, and returns the result. For the
+ * first bytes, `hash` is EBPO_HASH_BYTES_BEGIN. */
 #define EBPO_HASH_BYTES_BEGIN UINT64_C(0xcbf29ce484222325)
 static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t size)
 {

@@ -24,8 +24,8 @@ static inline double ebpo_seconds(void) { return 1e-9 * (double)ebpo_clock(); }
 /* Returns the number of cores that this process may use, at least 1. */
 int ebpo_cores(void);
 
-/* Advises the system to use pages of 2 MiB for an array, as far as such pages are completely within
- * the array. With pages of 4 KiB, address translation takes a fifth of the time of a search in a
+/* Advises the system to use pages of 2 MiB for the part of an array that such pages fill
+ * completely. With pages of 4 KiB, address translation takes a fifth of the time of a search in a
  * large model. Call this function before the array is filled. Any pointer and size are allowed. */
 void ebpo_prefer_huge_pages(void *array, size_t bytes);
 

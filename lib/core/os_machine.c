@@ -1,8 +1,8 @@
 /* Reads the machine's properties from the operating system: instruction sets, cores, and the memory
- * that this process may use. Also advises the system on large pages. The memory is that of the
- * machine, or the lowest limit of the control groups of this process (as in a container), if this
- * is less. Control groups of version 1 and 2 are supported (cgroups(7)). On systems without the
- * files in /proc and /sys, the values come from sysconf. */
+ * that this process may use. Also advises the system on large pages. If a control group of this
+ * process (as in a container) limits the memory to less than the machine has, the result is the
+ * lowest such limit. Control groups of version 1 and 2 are supported (cgroups(7)). On systems
+ * without the files in /proc and /sys, the values come from sysconf. */
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -27,7 +27,8 @@ bool ebpo_cpu_has_v3(void)
 
 enum { PATH_BYTES = 4096 };
 
-/* Returns the number in a file. Returns 0 if the file is missing or has no number ("max"). */
+/* Returns the number in a file. Returns 0 if the file is missing, or has the word "max" (no limit)
+ * instead of a number. */
 static uint64_t number_in(const char *path)
 {
     unsigned long long value = 0;
@@ -40,8 +41,8 @@ static uint64_t number_in(const char *path)
     return value;
 }
 
-/* Returns the number after `word` in the first line of a file that begins with this word. Returns 0
- * if there is none. */
+/* Returns the number after `word` in the first line that begins with this word in the file `path`.
+ * Returns 0 if no line begins with the word. */
 static uint64_t number_of(const char *path, const char *word)
 {
     char line[256];
@@ -94,10 +95,10 @@ static uint64_t least_limit(const group_files *files, char *path, bool free, uin
     }
 }
 
-/* Returns the least of `least` and the memory limits (`free`: free memory) of the control groups of
- * this process. `groups`: file with the lines "0::/path", or in version 1 "4:memory:/path"
- * (cgroups(7)). In a container, the path may not exist, but the topmost group is that of the
- * container. */
+/* Returns the least of `least` and the memory limits of the control groups of this process. If
+ * `free` is true, uses their free memory in place of the limits. `groups`: file with the lines
+ * "0::/path", or in version 1 "4:memory:/path" (cgroups(7)). In a container, the path may not
+ * exist, but the topmost group is that of the container. */
 static uint64_t group_memory(const char *groups, bool free, uint64_t least)
 {
     char line[PATH_BYTES];

@@ -1,13 +1,12 @@
 /* Declares the part of POSIX that the project uses and that Windows (mingw-w64) lacks, or has with
  * another meaning. Builds for Windows include this file before every source file, so that all other
- * files are written for POSIX. Functions of the C library that POSIX extends are renamed here, also
- * where the name is that of a structure or a member. The headers in core/windows have the names of
- * POSIX headers and are empty.
+ * files are written for POSIX. Macros here rename functions of the C library that POSIX extends. A
+ * macro also renames structures and members with the same name. The headers in core/windows have
+ * the names of POSIX headers and are empty.
  *
  * Paths are UTF-8 with '/' or '\' between names, and may be long; the functions convert paths to
- * UTF-16.
- * Errors are values of errno. Functions that are not provided on Windows (fork, sockets of haptics)
- * fail with ENOSYS. */
+ * UTF-16. Errors are values of errno. Functions that are not provided on Windows (fork, sockets of
+ * haptics) fail with ENOSYS. */
 #ifndef EBPO_CORE_OS_WINDOWS_H
 #define EBPO_CORE_OS_WINDOWS_H
 

@@ -1,8 +1,8 @@
 /* Implements the functions of POSIX for files and folders (os_windows.h) with functions of Windows.
  *
  * Every file is opened so that other programs may read, write, rename and remove it at any time, as
- * on POSIX. A removed file loses its name at once if the file system supports this (NTFS),
- * otherwise when it is closed. A path gets the prefix "\\?\", which permits paths of 32,767
+ * on POSIX. A removed file loses its name at once if the file system supports this (NTFS), and
+ * otherwise when the file is closed. A path gets the prefix "\\?\", which permits paths of 32,767
  * characters. A descriptor of a folder stands for the folder's current path. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
@@ -11,7 +11,7 @@
 #include "core/os_windows_parts.h"
 
 enum {
-    WIDE_MAX = 32768, /* longest path in UTF-16, with its zero */
+    WIDE_MAX = 32768, /* longest path in units of UTF-16, with the final zero */
     TRIES = 20,       /* attempts to rename a file, or to find a new name */
     TRY_MS = 10       /* milliseconds between attempts */
 };
@@ -177,8 +177,8 @@ static char *path_of(HANDLE file)
 
 static HANDLE handle_of(int fd) { return (HANDLE)_get_osfhandle(fd); }
 
-/* Returns the path of a name below a folder. Returns NULL on failure, with errno; EXDEV: the name
- * might lead out of the folder, because it contains '\' or ':' or begins with '/'. The caller frees
+/* Returns the path of a name below a folder. Returns NULL on failure, with errno. EXDEV: the name
+ * contains '\' or ':', or begins with '/', and so might lead out of the folder. The caller frees
  * the path. */
 static char *path_below(int folder, const char *name)
 {
@@ -223,8 +223,8 @@ static bool names_link(const WCHAR *path)
     return yes;
 }
 
-/* Returns the value of CreateFile for the flags of open: whether the file is created or truncated.
- */
+/* Converts the flags of open to the value with which CreateFile creates or truncates the file, or
+ * does neither. */
 static DWORD way_of(int flags)
 {
     if (flags & O_CREAT)
@@ -524,8 +524,8 @@ int unlinkat(int folder, const char *name, int flags)
     return result;
 }
 
-/* Renames a file even if another program has the target open; that program keeps the former file.
- */
+/* Renames a file even if another program has the target `to` open. That program keeps the former
+ * content open. */
 static bool rename_at_once(const WCHAR *from, const WCHAR *to)
 {
     size_t bytes = wcslen(to) * sizeof *to;
@@ -604,7 +604,7 @@ int mkdirat(int folder, const char *name, mode_t mode)
     return result;
 }
 
-/* Replaces the six X at the end of a pattern by letters that are probably not in use. */
+/* Replaces the six X at the end of a pattern by characters that probably no other name has. */
 static void choose_letters(char *pattern)
 {
     static atomic_uint number;
@@ -661,8 +661,8 @@ ssize_t pwrite(int fd, const void *data, size_t bytes, off_t at)
     return ebpo_windows_fail();
 }
 
-/* Locks a byte far behind the content, because a lock of Windows keeps other processes from reading
- * the locked bytes. */
+/* Locks one byte far after the end of the file. On Windows, no other process can read locked bytes,
+ * so a lock of the content would keep others from reading it. */
 int flock(int fd, int how)
 {
     OVERLAPPED where = { .OffsetHigh = 0x40000000 };

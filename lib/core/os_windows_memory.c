@@ -8,7 +8,7 @@
 #include "core/os.h"
 #include "core/os_windows_parts.h"
 
-#undef free /* here, `free` is that of the C library */
+#undef free /* in this file, `free` is the function of the C library */
 
 /* --- pages --- */
 
@@ -80,8 +80,8 @@ int munmap(void *at, size_t bytes)
 }
 
 /* Gives the pages of a mapped file back to the system. VirtualUnlock of pages that were never
- * locked removes them from the working set of the process; Windows writes them to the file when it
- * needs their memory. */
+ * locked removes the pages from the working set of the process. Windows writes these pages to the
+ * file when it needs their memory. */
 int msync(void *at, size_t bytes, int flags)
 {
     (void)flags;
@@ -112,9 +112,8 @@ int munlockall(void) { return not_provided(); }
 /* --- aligned blocks --- */
 
 /* A block of aligned_alloc: `at` is the address that the caller uses, and `from` is the address to
- * free. All blocks are in a hash table by `at`, with linear probing; there are some thousands at
- * most.
- */
+ * free. A hash table with linear probing has all blocks, by `at`. There are at most some thousand
+ * blocks. */
 typedef struct aligned_block {
     void *at, *from;
 } aligned_block;

@@ -60,7 +60,8 @@ void (*ebpo_windows_signal(int number, void (*handler)(int)))(int)
     return is_known(number) ? signal(number, handler) : SIG_DFL;
 }
 
-/* Supports only SA_RESETHAND: the C library restores the default action when a signal arrives. */
+/* Always behaves as with the flag SA_RESETHAND, because the C library restores the default action
+ * when a signal arrives. */
 int sigaction(int number, const struct sigaction *action, struct sigaction *before)
 {
     if (!is_known(number)) {
@@ -229,8 +230,8 @@ int dladdr(const void *address, Dl_info *out)
 
 static char temporary_folder[PATH_MAX];
 
-/* Sets temporary_folder to TMPDIR, or to the folder that Windows names, or to "" if no folder is
- * known. */
+/* Sets temporary_folder to TMPDIR. If TMPDIR is not set, uses the temporary folder of Windows, or
+ * "" if there is no such folder. */
 static void find_temporary_folder(void)
 {
     WCHAR wide[PATH_MAX];
@@ -339,8 +340,8 @@ FILE *open_memstream(char **text, size_t *size)
     return file;
 }
 
-/* Returns the stream of open_memstream that has this file, or NULL. `closes`: removes the stream
- * from the list. */
+/* Returns the stream of open_memstream that has this file, or NULL. If `closes` is true, also
+ * removes the stream from the list. */
 static memory_stream *find_stream(const FILE *file, bool closes)
 {
     pthread_mutex_lock(&streams_lock);

@@ -1,9 +1,9 @@
 /* Runs independent pieces of work on several threads, which take the pieces in ascending order. The
- * calling thread is one of these threads, and only the calling thread reports progress. Which
- * thread runs a piece is not determined, so results must not depend on the thread. If several
- * pieces fail, the failure of the lowest piece is returned. This file starts all threads of the
- * library, with a fixed stack size. The threads compute with the default floating-point environment
- * (fp_env.h). */
+ * calling thread is one of these threads, and only the calling thread reports progress. Any thread
+ * may run any piece, so results must not depend on the thread. If several pieces fail, the failure
+ * of the piece with the lowest items is returned. This file starts all threads of the library, with
+ * a fixed stack size. The threads compute with the default floating-point environment (fp_env.h).
+ */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
@@ -13,8 +13,8 @@
 #include "core/fp_env.h"
 #include "core/workspace.h"
 
-/* STACK_BYTES: stack of a thread. The library uses less than a quarter of it, but with sanitizers
- * several times as much. */
+/* STACK_BYTES: stack of a thread. The library uses less than a quarter of this stack, but several
+ * times as much when it is compiled with sanitizers. */
 enum { MAX_THREADS = 256, STACK_BYTES = 4 << 20 };
 
 /* State of ebpo_parallel_for. */
@@ -61,8 +61,8 @@ unsigned ebpo_thread_count(unsigned requested)
     return cores < 1 ? 1 : cores > MAX_THREADS ? MAX_THREADS : (unsigned)cores;
 }
 
-/* Records the failure of the piece that begins at item `at`, unless a lower piece has failed, and
- * stops the run. */
+/* Stops the run, and records the failure of the piece that begins at item `at`. If a piece with
+ * lower items has failed, keeps the failure of that piece. */
 static void record_failure(run *r, uint64_t at, ebpo_status status, const ebpo_error *error)
 {
     pthread_mutex_lock(&r->lock);
@@ -125,7 +125,7 @@ static bool report_pass(void *user, const char *stage, uint64_t done, uint64_t t
 {
     const ebpo_pass *p = user;
     double share = total ? (double)done / (double)total : 0;
-    enum { PARTS = 1024 }; /* so that shares of a pass are whole numbers */
+    enum { PARTS = 1024 }; /* steps reported for a pass, because `report` takes whole numbers */
     return p->to->report(p->to->user, stage,
                          PARTS * p->begin + (uint64_t)(share * PARTS * (double)(p->end - p->begin)),
                          PARTS * p->of);

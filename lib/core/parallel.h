@@ -23,10 +23,10 @@ unsigned ebpo_thread_count(unsigned requested);
 
 /* Divides the items [0, count) into pieces of `grain` items (at least 1), and calls `task` for each
  * piece on `threads` threads (ebpo_thread_count). Pieces are begun in ascending order. The calling
- * thread also works, and reports progress: `stage` and the number of finished items, from 0 on.
- * Which thread runs a piece is not determined, so results must not depend on the thread. After each
- * piece, pages of `workspace` (may be NULL) are released if its budget requires this, so tasks need
- * not release pages. If several pieces fail, the failure of the lowest piece is returned. */
+ * thread also works, and reports progress: the name `stage`, and the number of finished items,
+ * beginning with 0. Any thread may run any piece, so results must not depend on the thread. After
+ * each piece, pages of `workspace` (may be NULL) are released if its budget requires this, so tasks
+ * need not release pages. If several pieces fail, the failure of the lowest piece is returned. */
 ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,
                               uint64_t grain, ebpo_task_fn task, void *context,
                               const ebpo_progress *progress, const char *stage, ebpo_error *error);
@@ -44,7 +44,8 @@ bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64
  * of the stage, so that the reported progress never goes back. */
 typedef struct ebpo_pass {
     const ebpo_progress *to; /* progress of the stage; may be NULL */
-    uint64_t begin, end, of; /* this pass is passes [begin, end) of a stage with `of` passes */
+    uint64_t begin, end,
+        of; /* the stage has `of` equal shares; this pass has the shares [begin, end) */
 } ebpo_pass;
 
 /* Returns the progress of a pass; `pass` must outlive the result. */

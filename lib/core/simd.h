@@ -4,9 +4,10 @@
  * AVX2). A mask has all bits of a lane set (true) or clear (false).
  *
  * f8_all(x): x in all lanes. f8_load_twice(x): x[0] to x[3] in lanes 0 to 3 and 4 to 7; f8_spread0
- * to f8_spread3 of this vector: one of these four floats in all lanes. f8_pick(mask, yes, no):
- * `yes` in the lanes where the mask is set, else `no`. f8_bits(mask): bit i is set if lane i of the
- * mask is set. f8_about_inverse(a): a rough approximation of 1 / a. */
+ * to f8_spread3 of this vector: one of these four floats in all lanes. f8_pick(mask, yes, no): a
+ * lane has the float of `yes` if the mask is set in this lane, else the float of `no`.
+ * f8_bits(mask): bit i is set if lane i of the mask is set. f8_about_inverse(a): a rough
+ * approximation of 1 / a. */
 #ifndef EBPO_CORE_SIMD_H
 #define EBPO_CORE_SIMD_H
 
@@ -76,13 +77,14 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 }
 /* Eight numbers below 16, which select from the 16 floats of an f8_table (f8_look_up). */
 typedef struct n8 {
-    /* low: the numbers, whose lower three bits are used; high: mask with the lanes set that have
-     * numbers of 8 or more */
+    /* low: the numbers, of which only the lower three bits are used. high: a mask in which a lane
+     * is set if its number is at least 8 */
     __m256i low, high;
 } n8;
 typedef struct f8_table {
     f8 first;
-    __m256i difference; /* bits of floats 0 to 7, exclusive-or those of floats 8 to 15 */
+    __m256i
+        difference; /* exclusive or of the bits of floats 0 to 7 with the bits of floats 8 to 15 */
 } f8_table;
 EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
 {
@@ -204,7 +206,8 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
                    _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(words, words), 16)) } };
 }
 #elif defined(EBPO_SIMD_WASM)
-/* The pseudo-minimum of WebAssembly returns its first operand unless the second one is less. */
+/* The pseudo-minimum of WebAssembly returns the second operand if it is less, else the first
+ * operand. The operands are swapped here, because the minimum of SSE returns b unless a is less. */
 EBPO_EIGHT f8 f8_min(f8 a, f8 b)
 {
     EBPO_BOTH(wasm_f32x4_pmin((v128_t)b.half[h], (v128_t)a.half[h]));
@@ -335,8 +338,8 @@ EBPO_EIGHT float f8_least(f8 a)
 #endif
 }
 
-/* Four doubles at a time, in the compiler's own vectors. All functions are inline, so no vector is
- * passed between functions, and the ABI does not matter. */
+/* Four doubles at a time, in the compiler's own vectors. The warning about the ABI of such vectors
+ * is switched off: all functions are inline, so no vector is passed in a call. */
 
 #if !defined(__clang__)
 #pragma GCC diagnostic push
@@ -403,8 +406,8 @@ static inline unsigned v4l_mask(v4l m)
 typedef __m256d d3; /* the fourth lane is unused */
 
 EBPO_EIGHT d3 d3_all(double x) { return _mm256_set1_pd(x); }
-/* Loads the doubles one by one, because the processor cannot forward values that were just stored
- * one by one as a vector. */
+/* Loads the doubles one by one. Often they were just stored one by one, and a vector load would
+ * then wait until these stores have reached the cache. */
 EBPO_EIGHT d3 d3_load(const double x[3]) { return _mm256_setr_pd(x[0], x[1], x[2], 0); }
 EBPO_EIGHT d3 d3_add(d3 a, d3 b) { return _mm256_add_pd(a, b); }
 EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { return _mm256_sub_pd(a, b); }
@@ -412,7 +415,8 @@ EBPO_EIGHT d3 d3_mul(d3 a, d3 b) { return _mm256_mul_pd(a, b); }
 EBPO_EIGHT d3 d3_div(d3 a, d3 b) { return _mm256_div_pd(a, b); }
 EBPO_EIGHT d3 d3_max(d3 a, d3 b) { return _mm256_max_pd(a, b); }
 EBPO_EIGHT d3 d3_abs(d3 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
-/* Returns a with the signs of b; no component of a may be negative. */
+/* Returns the components of `a` with the signs of the components of `b`. No component of `a` may be
+ * negative. */
 EBPO_EIGHT d3 d3_signed(d3 a, d3 b)
 {
     return _mm256_or_pd(a, _mm256_and_pd(b, _mm256_set1_pd(-0.0)));
@@ -428,7 +432,7 @@ EBPO_EIGHT void d3_store_floats_after(float x[4], d3 a)
     __m128 y = _mm256_cvtpd_ps(a);
     _mm_storeu_ps(x, _mm_shuffle_ps(y, y, _MM_SHUFFLE(2, 1, 0, 3)));
 }
-/* Returns the rounding error: a minus its value as floats. */
+/* Returns the rounding errors of the conversion to floats: `a` minus the floats. */
 EBPO_EIGHT d3 d3_beyond_floats(d3 a) { return d3_sub(a, _mm256_cvtps_pd(_mm256_cvtpd_ps(a))); }
 
 #else
