@@ -25,8 +25,9 @@ unsigned ebpo_thread_count(unsigned requested);
  * piece on `threads` threads (ebpo_thread_count). Pieces are begun in ascending order. The calling
  * thread also works, and reports progress: the name `stage`, and the number of finished items,
  * beginning with 0. Any thread may run any piece, so results must not depend on the thread. After
- * each piece, pages of `workspace` (may be NULL) are released if its budget requires this, so tasks
- * need not release pages. If several pieces fail, the failure of the lowest piece is returned. */
+ * each piece, pages of `workspace` (may be NULL) are released if the workspace's budget requires
+ * this, so tasks need not release pages. If several pieces fail, the failure of the piece with the
+ * lowest items is returned. */
 ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,
                               uint64_t grain, ebpo_task_fn task, void *context,
                               const ebpo_progress *progress, const char *stage, ebpo_error *error);

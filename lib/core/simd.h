@@ -207,7 +207,8 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 }
 #elif defined(EBPO_SIMD_WASM)
 /* The pseudo-minimum of WebAssembly returns the second operand if it is less, else the first
- * operand. The operands are swapped here, because the minimum of SSE returns b unless a is less. */
+ * operand. The calls swap the operands, because the minimum of SSE returns its second operand,
+ * except if the first operand is less. */
 EBPO_EIGHT f8 f8_min(f8 a, f8 b)
 {
     EBPO_BOTH(wasm_f32x4_pmin((v128_t)b.half[h], (v128_t)a.half[h]));

@@ -1,9 +1,9 @@
 /* Sorts records that may take more than memory, in three passes. The first pass makes the records.
  * The second pass distributes the records to groups by the leading bits of their keys. The third
  * pass sorts each group in memory, by the digits of the keys; the caller's comparison orders
- * records with equal keys. Each pass reads and writes arrays in order, or at one position for each
- * group, so a workspace can keep the arrays in files. The result depends neither on the number of
- * threads nor on memory. */
+ * records with equal keys. A pass reads and writes an array either from begin to end, or at one
+ * position for each group. So a workspace can keep the arrays in files. The result depends neither
+ * on the number of threads nor on memory. */
 #include "core/sort.h"
 
 #include <stdlib.h>
@@ -14,9 +14,10 @@
 #include "core/parallel.h"
 
 enum {
-    GROUP = 1 << 16,         /* least number of records in a group; so many fit a core's cache */
+    GROUP = 1 << 16, /* least number of records in a group; this number fits in a core's cache */
     LARGE_GROUP = 4 * GROUP, /* groups with more records are sorted in arrays of the workspace */
-    /* about the maximum number of groups; limited, because all groups are written to at one time */
+    /* about the maximum number of groups; limited, because the second pass writes to all groups at
+     * the same time */
     GROUPS_MAX = 1024,
     GRAIN = 1 << 14,     /* number of records that a thread takes at a time */
     DIGIT = 256,         /* number of values of a digit of a key */
@@ -27,8 +28,8 @@ enum {
 /* State of a sort. A bin is a value of the leading bits of a key. */
 typedef struct sorting {
     const ebpo_sort *s;
-    uint8_t *made;      /* records in the order in which they were made */
-    uint8_t *dealt;     /* records by groups */
+    uint8_t *made;      /* records in the order in which the caller made them */
+    uint8_t *dealt;     /* records in the order of their groups */
     uint64_t *first;    /* [groups + 1] first record of each group in `dealt` */
     uint64_t *next;     /* [groups] position in `dealt` of the group's next records */
     uint32_t *group_of; /* [EBPO_SORT_BINS] group of each bin */
@@ -84,16 +85,16 @@ static bool form_groups(sorting *t)
 
 /* Distributes the made records [begin, end) to the groups. First copies the records to `grouped`,
  * ordered by group; `grouped` fits in the core's cache. Then copies the records of each group to
- * `dealt` with one memcpy. A thread thus writes to `dealt` at one position at a time. */
+ * `dealt` with one memcpy. So a thread writes to `dealt` at only one position at a time. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    /* For each group, first the number of its records in [begin, end). Then the index in `grouped`
-     * of the first of these records, and after the copying, the index after the last one. There
-     * can be slightly more than GROUPS_MAX groups, because form_groups rounds the size of groups
-     * down. */
+    /* For each group, cursor is first the number of the group's records in [begin, end). Then it is
+     * the index in `grouped` of the first of these records, and after the copying, the index after
+     * the last of these records. There can be slightly more than GROUPS_MAX groups, because
+     * form_groups rounds the size of groups down. */
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);
@@ -246,8 +247,9 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
     return status;
 }
 
-/* Returns the number of threads that sort groups. Each thread has one group in memory; all threads
- * together use at most an eighth of the budget, unless one group takes more. */
+/* Returns the number of threads that sort groups. Each thread has one group in memory, and all
+ * threads together use at most an eighth of the budget. If one group takes more than this, a single
+ * thread sorts the groups. */
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;

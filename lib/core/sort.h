@@ -1,7 +1,7 @@
 /* Sorts more records than memory holds. Also provides qsort with a context, and heaps. Records are
  * distributed to groups by the leading bits of their keys; each group is a contiguous part of the
- * result and is sorted separately. Arrays are read and written in order, or at one position for
- * each group. */
+ * result and is sorted separately. An array is read and written either from begin to end, or at one
+ * position for each group. */
 #ifndef EBPO_CORE_SORT_H
 #define EBPO_CORE_SORT_H
 
@@ -11,7 +11,7 @@
 #include "core/workspace.h"
 
 enum {
-    EBPO_SORT_BINS = 1 << 18, /* number of values of the leading bits of a key */
+    EBPO_SORT_BINS = 1 << 18, /* number of values that the leading bits of a key may have */
     EBPO_SORT_PASSES = 3,     /* passes of a sort, for the progress */
     EBPO_SORT_RECORD_MAX = 64 /* greatest size of a record in bytes */
 };
@@ -23,12 +23,14 @@ typedef struct ebpo_sort {
     unsigned threads;
     const ebpo_progress *progress; /* may be NULL */
     const char *stage;             /* name of the stage, for the progress */
-    uint64_t passes_before;        /* passes of this stage before the sort, for the progress */
+    uint64_t
+        passes_before; /* number of passes of this stage that precede the sort, for the progress */
     uint64_t count;
     size_t record;  /* bytes of a record; its first 8 bytes are its key, a uint64_t */
     unsigned shift; /* key >> shift is below EBPO_SORT_BINS for all keys */
     void *context;
-    /* Writes the records [begin, end), before sorting. Called from any thread. */
+    /* Makes the records [begin, end) of the unsorted order, and writes them to `records`. Called
+     * from any thread. */
     ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
                         ebpo_error *error);
     /* Compares two different records with equal keys. Returns a number below 0 if `a` comes first,
@@ -45,8 +47,8 @@ EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error
 /* Sorts an array of numbers in ascending order; fast for short arrays. */
 void ebpo_sort_numbers(uint64_t *numbers, uint64_t count);
 
-/* ebpo_sort_with is qsort with a context for the comparison. Systems have such a function with
- * different declarations (qsort_r), or do not have it. */
+/* ebpo_sort_with is qsort with a context for the comparison. Some systems have no such function;
+ * the others have qsort_r, but with different declarations. */
 
 typedef int (*ebpo_compare_with)(const void *a, const void *b, void *context);
 
@@ -69,7 +71,7 @@ static inline int ebpo_compare_now(const void *a, const void *b)
     return ebpo_sorting.compare(a, b, ebpo_sorting.context);
 }
 
-/* Sorts with a context; must not be called from within a comparison. */
+/* Sorts with a context. A comparison must not call this function. */
 static inline void ebpo_sort_with(void *items, size_t count, size_t size, ebpo_compare_with compare,
                                   void *context)
 {

@@ -1,9 +1,9 @@
-/* Guarantees IEEE double arithmetic with one rounding to nearest for each operation. Files whose
- * results depend on this include this header first. Rejects compilers and flags that do not
- * guarantee this arithmetic. Disables contraction into FMA (fused multiply-add) even if the flags
- * request it. With gcc, disables the SLP vectoriser, which drops the rounding of neighbouring
- * (double)(float) casts (gcc 12). tests/lint/flags/test_strict_fp.py checks the sources and this
- * file. */
+/* Guarantees IEEE double arithmetic with one rounding to nearest for each operation. A source file
+ * whose results depend on this arithmetic includes this header first. The header rejects compilers
+ * and flags that do not guarantee this arithmetic. Disables contraction into FMA (fused
+ * multiply-add) even if the flags request it. With gcc, disables the SLP vectoriser, which drops
+ * the rounding of neighbouring (double)(float) casts (gcc 12). tests/lint/flags/test_strict_fp.py
+ * checks the sources and this file. */
 #ifndef EBPO_CORE_STRICT_FP_H
 #define EBPO_CORE_STRICT_FP_H
 
@@ -17,7 +17,7 @@
 #error \
     "exact predicates need strict floating point: build without -funsafe-math-optimizations and its parts (-fassociative-math, -freciprocal-math, -fno-signed-zeros)"
 #endif
-/* The value 16 is as good as 0, because 16 changes only the treatment of _Float16, not of double.
+/* The value 16 is also allowed: it differs from 0 only in the treatment of _Float16, not of double.
  */
 #if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
 #error \

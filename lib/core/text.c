@@ -1,7 +1,7 @@
 /* Checks that text is valid UTF-8 (RFC 3629) without control characters. Checks dates and times of
- * ISO 8601. Provides streams into memory by fopencookie, so that every lack of memory is reported.
- * If the C library has no fopencookie, open_memstream is used, which does not always report a lack
- * of memory. */
+ * ISO 8601. Provides streams into memory. The streams use fopencookie, because with open_memstream
+ * a failed allocation is not always reported. If the C library has no fopencookie, the streams use
+ * open_memstream nevertheless. */
 #include <stdlib.h>
 #include <string.h>
 

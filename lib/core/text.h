@@ -15,15 +15,15 @@ bool ebpo_text_ok(const char *text);
 /* Returns the length of the UTF-8 byte order mark at the beginning of text, or 0. */
 uint64_t ebpo_text_bom_length(const void *text, uint64_t size);
 
-/* A stream into memory that reports a lack of memory. open_memstream of the C library may lose data
- * silently, so open_memstream is used only if the C library has no fopencookie. */
+/* A stream into memory that reports failed allocations. open_memstream of the C library may lose
+ * data silently, so the stream uses open_memstream only if the C library has no fopencookie. */
 typedef struct ebpo_text_stream {
     char *text; /* the written text, with a final zero byte after the end; the caller frees it */
     uint64_t bytes, capacity; /* length of the text, and allocated bytes */
     FILE *file;               /* stream to print to */
     bool failed;
     size_t size;       /* length of the text, if open_memstream is used */
-    char buffer[1024]; /* buffer of `file`, so that stdio allocates none */
+    char buffer[1024]; /* buffer of `file`, so that stdio does not allocate a buffer */
 } ebpo_text_stream;
 
 /* Begins a stream; `s` must not move until the stream has ended. Returns false when out of memory;
@@ -37,7 +37,8 @@ bool ebpo_text_stream_end(ebpo_text_stream *s);
 typedef struct ebpo_named_run {
     const char *name; /* points into the file's bytes, without surrounding spaces */
     size_t size;
-    uint64_t faces; /* number of triangles, which follow those of the previous run */
+    uint64_t
+        faces; /* number of triangles in this run; they follow the triangles of the previous run */
 } ebpo_named_run;
 
 #endif

@@ -1,5 +1,5 @@
-/* Computes with integers of 128 bits, modulo 2^128, also where the compiler has no such type (on
- * 32-bit machines). */
+/* Computes with integers of 128 bits, modulo 2^128. Also works with compilers that have no such
+ * type (on 32-bit machines). */
 #ifndef EBPO_CORE_WIDE_H
 #define EBPO_CORE_WIDE_H
 
@@ -17,7 +17,7 @@ static inline ebpo_wide ebpo_wide_plus(ebpo_wide a, ebpo_wide b)
     return (ebpo_wide){ a.high + b.high + (low < a.low), low };
 }
 
-/* Returns the exact product, for compilers without a 128-bit product. */
+/* Returns the exact product, without a type of 128 bits. */
 static inline ebpo_wide ebpo_wide_product_by_halves(uint64_t a, uint64_t b)
 {
     uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
@@ -84,7 +84,7 @@ static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
                            (ebpo_wide){ a.high ^ sign, a.low });
 }
 
-/* Returns the remainder of the unsigned a divided by m, which is 1 to 2^63. */
+/* Returns the remainder of the unsigned number `a` divided by `m`. `m` must be 1 to 2^63. */
 static inline uint64_t ebpo_wide_modulo(ebpo_wide a, uint64_t m)
 {
     uint64_t remainder = a.high % m;

@@ -1,11 +1,11 @@
 /* Manages workspaces, the owners of large arrays. A large array is an extent (a range of whole
- * pages). As long as all extents take at most half of the budget, new extents are in memory; after
- * that, each new extent is in an unnamed temporary file. Arrays smaller than LEAST_EXTENT share an
- * extent (a pool), and arrays smaller than a page come from malloc. Each extent counts as a holder
- * of its workspace, so the workspace and its extents may be freed in any order. Pages of a file
- * count towards the budget only while they are in memory (resident): loops release them between
- * pieces of work (ebpo_release_pages), and data that were written stay in the file. Any thread may
- * allocate and free. docs/develop/building.md describes how a build keeps to a budget. */
+ * pages). A new extent is in memory if all extents in memory then take at most half of the budget;
+ * otherwise it is in an unnamed temporary file. Arrays smaller than LEAST_EXTENT share an extent (a
+ * pool), and arrays smaller than a page come from malloc. Each extent counts as a holder of its
+ * workspace, so the workspace and its extents may be freed in any order. Pages of a file count
+ * towards the budget only while they are in memory (resident): loops release them between pieces of
+ * work (ebpo_release_pages), and data that were written stay in the file. Any thread may allocate
+ * and free. docs/develop/building.md describes how a build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -24,7 +24,8 @@
 
 enum {
     PAGE_BYTES = 4096,      /* smaller arrays come from malloc */
-    LEAST_EXTENT = 1 << 16, /* smaller arrays are parts of a pool, because a build has thousands */
+    LEAST_EXTENT = 1 << 16, /* smaller arrays are parts of a pool, because a build has thousands of
+                               such arrays */
     POOL_BYTES = 1 << 20,   /* size of a pool */
     BUCKET_BITS = 10        /* the table of extents has 2^BUCKET_BITS buckets */
 };
@@ -127,8 +128,8 @@ ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const
     return status;
 }
 
-/* Removes one holder of the workspace (its owner or an extent). The last one frees the workspace.
- */
+/* Removes one holder of the workspace (its owner or an extent). The last holder frees the
+ * workspace. */
 static void leave_workspace(ebpo_workspace *w)
 {
     pthread_mutex_lock(&w->lock);
@@ -199,8 +200,9 @@ static void enter_extent(ebpo_workspace *w, extent *b)
 
 static bool is_at(const extent *b, const void *at) { return b->at == at && b->kind != EXTENT_POOL; }
 
-/* Removes the extent that begins at `at` from the table and returns it. Returns NULL if there is
- * none. Never returns a pool; the pool's first part begins at the same address. */
+/* Removes the extent that begins at `at` from the table and returns it. Returns NULL if no extent
+ * begins there. Never returns a pool, but may return the pool's first part, which begins at the
+ * same address. */
 static extent *remove_extent(ebpo_workspace *w, const void *at)
 {
     pthread_mutex_lock(&w->table_lock);
@@ -292,7 +294,7 @@ static void *map_memory(ebpo_workspace *w, size_t bytes)
 /* Makes an extent. Returns NULL on failure, with the reason in w->failed. */
 static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
 {
-    /* released here, because callers may make many extents without releasing pages */
+    /* Pages are released here, because some callers make many extents without releasing pages. */
     ebpo_release_pages(w);
     extent *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b) {
@@ -320,9 +322,9 @@ static void unmap_extent(ebpo_workspace *w, extent *b)
 
 /* --- parts of pools --- */
 
-/* Makes a part in the current pool, or in a new pool if the part does not fit. The bytes of a pool
- * are used only once, so the bytes of a new part are 0. Returns NULL on failure, with the reason in
- * w->failed. */
+/* Makes a part in the current pool, or in a new pool if the part does not fit. A pool never reuses
+ * the bytes of a freed part, so the bytes of a new part are 0. Returns NULL on failure, with the
+ * reason in w->failed. */
 static extent *make_part(ebpo_workspace *w, size_t bytes)
 {
     extent *part = ebpo_alloc_zero(1, sizeof *part);
@@ -386,8 +388,8 @@ static void free_extent(ebpo_workspace *w, extent *b)
         unmap_extent(w, b);
         return;
     }
-    /* With larger pages, a part might share a page with a neighbour, which must not be discarded.
-     */
+    /* If the system's pages are larger than PAGE_BYTES, a part may share a page with another part.
+     * This page must not be discarded. */
     if (w->page == PAGE_BYTES)
         discard_pages(b);
     extent *pool = b->pool;
@@ -426,7 +428,7 @@ void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size)
 
 void ebpo_array_free(ebpo_workspace *workspace, void *array)
 {
-    /* an array of malloc begins at a page only by chance, so the table decides */
+    /* Extents begin at a page. An array of malloc may do so by chance, so the table decides. */
     extent *b = workspace && array && (uintptr_t)array % PAGE_BYTES == 0
                     ? remove_extent(workspace, array)
                     : NULL;
@@ -498,7 +500,8 @@ static residency read_residency(const ebpo_workspace *w)
         char *end;
         pages[i] = strtoull(at, &end, 10);
         if (end == at)
-            return (residency){ UINT64_MAX, UINT64_MAX }; /* not known, so pages are released */
+            return (residency){ UINT64_MAX,
+                                UINT64_MAX }; /* not known; so large that pages are released */
         at = end;
     }
     return (residency){ pages[1] * w->page, pages[2] * w->page };
@@ -530,8 +533,8 @@ void ebpo_release_pages(ebpo_workspace *workspace)
         for (extent *b = w->table[i]; b; b = b->next)
             if (b->kind != EXTENT_PART && b->filed)
                 release_extent(b);
-    /* The floor rises slowly, because pages that other threads have brought into memory meanwhile
-     * do not belong to it. */
+    /* The floor rises slowly, because `resident` also counts pages that other threads have brought
+     * into memory meanwhile, and the floor must not include these pages. */
     uint64_t resident = read_residency(w).files, floor_max = w->floor + w->usage.memory / 64;
     w->floor = resident < floor_max ? resident : floor_max;
     pthread_mutex_unlock(&w->table_lock);

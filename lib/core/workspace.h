@@ -1,12 +1,13 @@
-/* Provides workspaces, whose arrays are in memory or, beyond half of the budget, in temporary
- * files; and loops over such arrays, which release pages (return memory to the system) as they
- * proceed. */
+/* Provides workspaces. A workspace keeps arrays in memory up to half of its budget, and further
+ * arrays in temporary files. Also provides loops over such arrays; these loops release pages
+ * (return memory to the system) as they proceed. */
 #ifndef EBPO_CORE_WORKSPACE_H
 #define EBPO_CORE_WORKSPACE_H
 
 #include <ebpo/workspace.h>
 
-/* Same as ebpo_workspace_new without a minimum, for tests that keep small models in files. */
+/* Same as ebpo_workspace_new, but without a minimum of the budget, for tests that keep small models
+ * in files. */
 EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory,
                                                   const char *temp_dir, ebpo_error *error);
 
@@ -41,8 +42,9 @@ enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
  * not release them. A body may `continue`, `break` and return; `end` is evaluated once. If
  * `workspace` is NULL, a loop costs only one more test. */
 
-/* Releases pages whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two. The
- * bodies of `every` items should visit at most a few megabytes. */
+/* Loops from `begin` to `end` - 1 with the variable `i`, a uint64_t. Releases pages whenever `i`
+ * becomes a multiple of `every`, a power of two. For `every` items together, the body should visit
+ * at most a few megabytes. */
 #define EBPO_FOR_ITEMS_EVERY(workspace, every, i, begin, end) \
     for (uint64_t i = (begin), i##_end = (end); i < i##_end; ebpo_items_step(workspace, every, ++i))
 
@@ -54,8 +56,8 @@ enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 #define EBPO_FOR_ITEMS_SCATTERED(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_SCATTERED, i, begin, end)
 
-/* Loops over pieces of a few megabytes each, or of less if the work on a piece takes long. Each
- * piece begins at `at`. */
+/* Loops over [0, end) in steps of `piece`, with the variable `at`. A piece should have a few
+ * megabytes, or less if the work on it takes long. */
 #define EBPO_FOR_PIECES(workspace, at, end, piece)         \
     for (uint64_t at = 0, at##_end = (end); at < at##_end; \
          at += (piece), ebpo_release_pages(workspace))
@@ -85,7 +87,7 @@ bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capa
 /* Frees an array of `workspace`, or of malloc if `workspace` is NULL. A NULL array is allowed. */
 void ebpo_array_free(ebpo_workspace *workspace, void *array);
 
-/* Copies or fills arrays, as memcpy and memset. */
+/* Copies or fills arrays as memcpy and memset do, and releases pages meanwhile. */
 void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes);
 void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes);
 
