@@ -3,8 +3,8 @@
  * otherwise it is in an unnamed temporary file. Arrays smaller than LEAST_EXTENT share an extent (a
  * pool), and arrays smaller than a page come from malloc. Each extent counts as a holder of its
  * workspace, so the workspace and its extents may be freed in any order. Pages of a file count
- * towards the budget only while they are in memory (resident): loops release them between pieces of
- * work (ebpo_release_pages), and data that were written stay in the file. Any thread may allocate
+ * towards the budget only while they are in memory (resident). Loops release these pages between
+ * pieces of work (ebpo_release_pages); the written data stay in the file. Any thread may allocate
  * and free. docs/develop/building.md describes how a build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>

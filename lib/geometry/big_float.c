@@ -1,4 +1,5 @@
-/* Computes with numbers of 512 bits: aligned limbs, truncated results. */
+/* Computes with floating-point numbers of 512 bits. A limb is a machine word of GMP. The mantissa
+ * fills its limbs, and results are truncated. */
 #include "core/strict_fp.h"
 
 #include "geometry/big_float.h"
@@ -46,7 +47,8 @@ static ebpo_big normalise_limbs(ebpo_big a)
     return a;
 }
 
-/* Shifts right by `by`, in 0 .. EBPO_BIG_BITS - 1, and drops the bits that are shifted out. */
+/* Shifts the limbs right by `by` bits (0 .. EBPO_BIG_BITS - 1), and drops the bits that are shifted
+ * out. */
 static void shift_right(mp_limb_t *limb, unsigned by)
 {
     unsigned limbs = by / LIMB_BITS, bits = by % LIMB_BITS;

@@ -1,5 +1,5 @@
 /* Floating-point numbers of 512 bits. Each operation has an error of at most one unit in the last
- * place. Uses GMP's functions for arrays of limbs, and allocates no memory. */
+ * place. Uses GMP's functions for arrays of limbs (machine words), and allocates no memory. */
 #ifndef EBPO_GEOMETRY_BIG_FLOAT_H
 #define EBPO_GEOMETRY_BIG_FLOAT_H
 
@@ -18,8 +18,8 @@ typedef struct ebpo_big {
 
 /* Converts a finite double, exactly. */
 ebpo_big ebpo_big_of(double x);
-/* These functions return the truncated result. The relative error is at most 2^-510, except for
- * sums of numbers of opposite signs, whose error is at most 2^-510 of the larger operand. */
+/* These functions return the truncated result. The relative error is at most 2^-510. Exception: if
+ * numbers of opposite signs are added, the error is at most 2^-510 of the larger operand. */
 ebpo_big ebpo_big_add(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_subtract(const ebpo_big *a, const ebpo_big *b);
 ebpo_big ebpo_big_multiply(const ebpo_big *a, const ebpo_big *b);

@@ -1,26 +1,28 @@
-/* Bounds winding numbers of the discs of a border, at points and in boxes. cap_tree.h explains the
- * mesh S, its discs, the nodes of their tree, and the winding numbers k, w_S and w_D. A half angle
- * is half of a solid angle.
+/* Bounds the winding number w_D of the discs of a border, at points and in boxes. The discs are
+ * triangles that close the holes of a mesh S. cap_tree.h explains S, its discs, the nodes of their
+ * tree, and the winding numbers k, w_S and w_D. A half angle is half of a solid angle. An entry is
+ * the index of a node, or of a node's own triangle (cap_bounds.h).
  *
- * Discs. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
- * centre c and radius R. With r = |x - p|, the solid angle at p is the integral of f . dA over the
- * triangles, f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 /
- * r^3. Let a box have the centre q and half the diagonal s, and a distance g > 0 from the ball. For
- * every p in the box, the half angle is at most a / (2 g^2). It differs from V . f(c) / 2 at q by
- * at most a (R + s) / g^3, because the differences x - p form a convex set, in which the norm is at
- * least g. The half angle of a triangle is also at most pi.
+ * Discs. Let the triangles of a node be in a ball of centre c and radius R. Let a be the sum of
+ * their areas and V the sum of their vector areas, each times the weight of the triangle. With r =
+ * |x - p|, the solid angle at p is the integral of f . dA over the triangles, where f(x) = (x - p)
+ * / r^3. The norm of f is 1 / r^2, and the norm of its derivative is 2 / r^3. Let a box have the
+ * centre q and half the diagonal s, and a distance g > 0 from the ball. For every p in the box, the
+ * half angle is at most a / (2 g^2). It differs from V . f(c) / 2 at q by at most a (R + s) / g^3,
+ * because the differences x - p form a convex set, in which the norm is at least g. The half angle
+ * of a triangle is also at most pi.
  *
  * Border edges. Away from the faces of S, w_S is smooth, also on caps. The gradient of 4 pi w_S is
  * the integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of
  * length l at the distance d contributes at most l / d^2, and at most 2 / d, the value of a whole
- * line. So the border bounds how much 2 pi w_S varies in a box that no face touches: by s / 2 times
- * the sum over the edges. For a whole loop the variation is also at most a s / g^3, for the same
- * reason as above.
+ * line. So in a box that no face touches, 2 pi w_S varies by at most s / 2 times the sum of the
+ * contributions of all edges. For a whole loop the variation is also at most a s / g^3, by the
+ * bound of the derivative of f.
  *
- * Rounding. Each quantity is computed with a relative error below 2^-45, except V, whose error
- * `slack` bounds. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
- * only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900, which may underflow,
- * change the results by less than the constants that are added (TINY, 2^-500). */
+ * Rounding. Each quantity is computed with a relative error below 2^-45, except V; `slack` bounds
+ * the error of V. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
+ * only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900 may underflow. They
+ * change the results by less than the constants TINY and 2^-500, which are added. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -36,8 +38,8 @@ static const double DISTANCE_MIN = 0x1p-300, DISTANCE_MAX = 0x1p300, TINY = 0x1p
 /* Discs are far from a box if the sum of both radii is at most FAR times their distance. */
 static const double FAR = 0.5;
 
-/* Depth of walks: at most 32 levels of groups and 32 of stretches, with two entries each and one
- * triangle. */
+/* Capacity of a stack of entries. A walk goes down at most 32 levels of groups and 32 levels of
+ * stretches, and each level adds at most three entries. */
 enum { STACK = 224 };
 
 ebpo_cap_box ebpo_cap_box_of(const double low[3], const double high[3])
@@ -104,7 +106,7 @@ static ebpo_bounded bound_triangle(const ebpo_cap_tree *t, const ebpo_cap_node *
     return (ebpo_bounded){ weight * half.middle, weight * half.error };
 }
 
-/* Adds to a sum; the error includes the rounding of both sums. */
+/* Adds a term to a sum. The error of the sum then includes the rounding of these additions. */
 static inline void add_bounded(ebpo_bounded *sum, ebpo_bounded term)
 {
     sum->middle += term.middle;
@@ -113,7 +115,8 @@ static inline void add_bounded(ebpo_bounded *sum, ebpo_bounded term)
 
 /* --- entries --- */
 
-/* Returns the node of an entry. If the entry is a single triangle, its node is written to *own. */
+/* Returns the node of an entry. If the entry is a single triangle, makes a node of this triangle in
+ * *own. */
 static const ebpo_cap_node *node_of(const ebpo_cap_tree *t, uint32_t entry, ebpo_cap_node *own)
 {
     const ebpo_cap_node *n = &t->node[entry & ~EBPO_CAP_TRIANGLE];
@@ -130,8 +133,9 @@ static bool has_parts(const ebpo_cap_tree *t, uint32_t entry)
     return !(entry & EBPO_CAP_TRIANGLE) && (n->weight == 0 || n->to - n->from > 2);
 }
 
-/* Writes the parts of a node. The parts of a group are its two nodes. The parts of a stretch are
- * its triangle, and each of its two halves that has triangles. Returns the number of parts. */
+/* Writes the parts of a node. The parts of a group are its two nodes. A stretch is a path along a
+ * border loop; its parts are its triangle, and those of its two halves that have triangles. Returns
+ * the number of parts. */
 static uint32_t find_parts(const ebpo_cap_tree *t, uint32_t entry, uint32_t part[3])
 {
     const ebpo_cap_node *n = &t->node[entry];
@@ -263,7 +267,8 @@ static void refine_entry(ebpo_cap_front *f, uint32_t i)
     f->bound[i] = f->bound[f->count];
     if (has_parts(f->tree, entry))
         count = find_parts(f->tree, entry, part);
-    else /* a node of one triangle, at a point: bound_triangle is more accurate than bound_node */
+    else /* The node has one triangle, and the box is a point. For points, bound_triangle is more
+            accurate than bound_node. */
         part[0] = entry | EBPO_CAP_TRIANGLE;
     for (uint32_t k = 0; k < count; k++) {
         if (f->box.radius == 0 && part[k] & EBPO_CAP_TRIANGLE) {
@@ -288,7 +293,9 @@ bool ebpo_cap_front_refine(ebpo_cap_front *front)
             front->stuck += front->bound[i].error;
     if (!(most > 0) || !(front->stuck < EBPO_PI_LOW))
         return false;
-    for (uint32_t i = front->count; i-- > 0;) /* an entry that is moved to i has been visited */
+    for (uint32_t i = front->count;
+         i-- >
+         0;) /* refine_entry moves the last entry to i; the loop has visited that entry before */
         if (front->bound[i].error >= most / 4 && front->count + 2 < EBPO_CAP_FRONT &&
             (point || has_parts(front->tree, front->entry[i]))) {
             refine_entry(front, i);
@@ -303,7 +310,7 @@ typedef struct varying {
     const ebpo_cap_tree *tree;
     const ebpo_cap_box *box;
     double sum;  /* upper bound of the variation of 2 pi w_S so far */
-    double most; /* the computation ends when `sum` is not below this */
+    double most; /* the computation ends when `sum` is not below `most` */
 } varying;
 
 /* Adds a bound of the variation that a border edge causes. */
@@ -326,8 +333,8 @@ static void vary_by_edge(varying *v, uint64_t i, uint64_t j, double weight)
         v->sum = INFINITY;
 }
 
-/* Returns true if the distance of a node's ball from the box is greater than its radius and in the
- * range that is used. *gap: lower bound of this distance. */
+/* Returns true if the distance of a node's ball from the box is greater than the ball's radius, and
+ * between DISTANCE_MIN and DISTANCE_MAX. *gap: lower bound of this distance. */
 static bool is_apart(const ebpo_cap_box *box, const ebpo_cap_node *n, double *gap)
 {
     double x[3];

@@ -1,4 +1,6 @@
-/* Finds caps in a tree of caps: the crossings of a segment, and the caps near a box.
+/* Finds caps in a tree of caps: the crossings of a segment, and the caps near a box. Discs are caps
+ * with the opposite orientation, so a crossing of a cap is minus the crossing of the disc. Nodes
+ * are groups of loops, and stretches (paths along a loop, cap_triangles.h).
  *
  * A node of the tree is skipped if the ball around its caps is certainly apart from the box or the
  * segment. Crossings are exact (ebpo_axis_crossing). */
@@ -27,7 +29,8 @@ static bool ball_is_apart(const ebpo_cap_node *n, const double low[3], const dou
     return false;
 }
 
-/* Returns the crossings of the stretch's own triangle, which belongs to neither of its halves. */
+/* Returns the crossings of the stretch's own triangle, which belongs to neither half of the
+ * stretch. */
 static int32_t cross_triangle(const cap_segment *g, const ebpo_cap_node *n)
 {
     const ebpo_cap_tree *t = g->tree;

@@ -1,7 +1,8 @@
-/* Makes a tree over the caps of a border. The upper nodes are groups of loops, which are halved
- * until they have a single loop; the nodes below are the stretches of this loop. Each node has a
- * ball around its triangles, and sums over its triangles for the bounds in cap_bounds.c. Radii,
- * lengths and areas are upper bounds, because they are enlarged by a factor of 1 + 2^-40. */
+/* Makes a tree over the caps of a border. The upper nodes are groups of loops. Each group is halved
+ * until it has a single loop. The nodes below are stretches of this loop, that is, paths along it
+ * (cap_triangles.h). Each node has a ball around its triangles, and sums over its triangles for the
+ * bounds in cap_bounds.c. Radii, lengths and areas are upper bounds, because they are enlarged by a
+ * factor of 1 + 2^-40. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,7 +26,7 @@ typedef struct growing {
     uint64_t *order;        /* [loops] the loops, in the order of the tree */
 } growing;
 
-/* Sets the node's ball to a ball around positions. */
+/* Sets the node's ball to a ball around these positions. */
 static void enclose_positions(ebpo_cap_node *n, double (*position)[3], uint64_t count)
 {
     double low[3], high[3], most = 0;
@@ -46,7 +47,7 @@ static void enclose_positions(ebpo_cap_node *n, double (*position)[3], uint64_t 
     n->radius = most * ENLARGE + 0x1p-500;
 }
 
-/* Adds the sums of a part of the node. */
+/* Adds the sums of a part to the sums of the node. */
 static void add_part(ebpo_cap_node *n, const ebpo_cap_node *part)
 {
     n->area = (n->area + part->area) * (1 + 0x1p-50);
@@ -93,8 +94,8 @@ static void add_edge(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t i, uint6
     n->length += n->weight * (ebpo_vec3_length(edge) * ENLARGE + 0x1p-500);
 }
 
-/* Makes the nodes of the stretch [i, j], in preorder, as ebpo_cap_triangle numbers triangles.
- * Recursive, at most 32 deep. */
+/* Makes the nodes of the stretch from position i to position j, in preorder: the order in which
+ * ebpo_cap_triangle numbers triangles. Recursive, at most 32 deep. */
 static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weight)
 {
     ebpo_cap_node *n = &t->node[t->node_count++];
@@ -114,7 +115,8 @@ static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weig
     }
 }
 
-/* Returns the mean coordinate of a loop's first and middle vertex on the axis: a cheap centre. */
+/* Returns the mean coordinate of a loop's first and middle vertex on the axis, which roughly
+ * approximates the loop's centre. */
 static double loop_key(const growing *g, uint64_t loop, int axis)
 {
     uint64_t a = g->first[loop], b = ebpo_cap_middle(a, g->first[loop + 1]);

@@ -2,14 +2,15 @@
  *
  * Caps are triangles that close the holes of a mesh S: each loop of its border (mesh/border.h) has
  * caps (geometry/cap_triangles.h). S and its caps together have an integer winding number k. The
- * discs D are the caps with the opposite orientation, so that their boundary is the border in its
- * direction. So the winding number of S is
+ * discs D are the caps with the opposite orientation, so the boundary of the discs has the
+ * direction of the border. Therefore the winding number of S is
  *
  *   w_S(p) = k(p) + w_D(p).
  *
  * w_D is a sum of solid angles over few triangles. A tree gives bounds of this sum, which are
- * refined only as far as a decision needs. At a point on a cap, k and w_D jump. There, both are
- * taken at the point shifted as in ebpo_axis_crossing. w_S does not jump at caps. */
+ * refined only as far as a decision needs. At a point on a cap, k and w_D jump, but w_S does not.
+ * There, k and w_D are those of the point after the infinitely small shift of ebpo_axis_crossing.
+ */
 #ifndef EBPO_GEOMETRY_CAP_TREE_H
 #define EBPO_GEOMETRY_CAP_TREE_H
 
@@ -17,8 +18,9 @@
 
 #include "geometry/solid_angle.h"
 
-/* A node of the tree: a stretch, that is, a path along a loop (geometry/cap_triangles.h), with all
- * its triangles; or a group of two nodes. The first node is the root. */
+/* A node of the tree is a stretch or a group. A stretch is a path along a loop
+ * (geometry/cap_triangles.h), with all its triangles. A group has two nodes. The weight of a loop
+ * is the number of times that the loop counts. The first node is the root. */
 typedef struct ebpo_cap_node {
     double centre[3], radius; /* a ball around the triangles */
     double area;              /* upper bound of the sum of weight * area */
@@ -44,24 +46,25 @@ typedef struct ebpo_cap_tree {
 /* Bytes of a tree for each point of its loops: a position and at most one node. */
 enum { EBPO_CAPS_BYTES = sizeof(double[3]) + sizeof(ebpo_cap_node) };
 
-/* Makes the tree of loops: loop i has the positions first[i] .. first[i + 1] - 1, at least three,
- * and weight[i] >= 1. `position`, an array of malloc, is taken over, also on failure. EBPO_E_LIMIT:
- * more than 2^31 positions. */
+/* Makes the tree of loops. Loop i has the positions first[i] .. first[i + 1] - 1 (at least three)
+ * and the weight weight[i] (at least 1). The function takes over `position`, an array of malloc,
+ * also on failure. EBPO_E_LIMIT: more than 2^31 - 1 positions. */
 EBPO_MUST_USE ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3],
                                              const uint64_t *first, const uint32_t *weight,
                                              uint64_t loop_count, ebpo_error *error);
-/* Makes the tree of the loops of a file or tree. */
+/* Makes the tree of the border loops that a file or a tree has. */
 EBPO_MUST_USE ebpo_status ebpo_cap_tree_of_loops(ebpo_cap_tree *out, const ebpo_border_loops *loops,
                                                  ebpo_error *error);
 void ebpo_cap_tree_free(ebpo_cap_tree *tree);
 
-/* Sets `out` to a node of the one triangle of a stretch that does not belong to its halves. The
- * length of this node is 0. */
+/* Sets `out` to a node of one triangle: the triangle of a stretch that belongs to neither of its
+ * halves. The length of this node is 0. */
 void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stretch,
                             ebpo_cap_node *out);
 
-/* Returns the sum of the crossings of a segment with all caps, each as ebpo_axis_crossing defines
- * it. */
+/* Returns the sum of the crossings of a segment with all caps. A crossing is 1, -1 or 0, as
+ * ebpo_axis_crossing defines it. The segment runs from `from` along `axis` to the coordinate `to`.
+ */
 int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis);
 /* Returns false if certainly no cap touches the box. */
 bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3]);
@@ -70,9 +73,9 @@ bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double
  * `tolerance` are refined, down to single triangles. */
 ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], double tolerance);
 
-/* Converts bounds of the half angles' sum to bounds of w_S = winding + w_D. The error is enlarged
- * by 2^-50 of the middle, which covers the rounding of the interval's ends and of the boundaries
- * with which they are compared. */
+/* Converts bounds of the half angles' sum to bounds of w_S = winding + w_D. Enlarges the error by
+ * 2^-50 of the middle. This covers the rounding of middle - error and middle + error, and of the
+ * rule's boundaries, with which the caller compares these two ends. */
 ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding);
 
 /* Bounds w_S = winding + w_D at p, with an error of at most `width` / 2 if doubles suffice. */
@@ -88,9 +91,10 @@ typedef struct ebpo_cap_rule {
 
 typedef struct ebpo_cap_decision {
     bool inside;
-    /* w_S equals a boundary of the rule, such as t, or 512 bits do not decide; `inside` is false */
+    /* w_S equals a boundary of the rule, such as t, or 512 bits do not suffice to decide; then
+     * `inside` is false */
     bool tie;
-    ebpo_bounded winding; /* bounds of w_S as far as they were needed */
+    ebpo_bounded winding; /* bounds of w_S, only as accurate as the decision needed */
 } ebpo_cap_decision;
 
 /* Decides by w_S = winding + w_D at p; exact. `winding` is the winding number of the shifted

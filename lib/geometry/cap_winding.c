@@ -1,20 +1,20 @@
 /* Decides by winding numbers whether points are inside a mesh with holes. cap_tree.h explains the
  * rules and the winding numbers w = w_S and k.
  *
- * Bounds of w in doubles are refined until the rule gives one result for the whole interval.
- * Doubles do not suffice if w equals a boundary s of the rule, or nearly so; s is an even integer
- * plus or minus the threshold t. Then the sign of w - s is found without any arctangent. Half
- * angles are arguments of complex numbers (geometry/solid_angle.h). So the product z of these
- * numbers, each to the power of its weight, has the argument 2 pi (w - k) up to whole turns.
- * Because w is close to s,
+ * Bounds of w in doubles are refined until the rule gives the same result for all values between
+ * the bounds. Doubles do not suffice if w equals a boundary s of the rule, or nearly so; s is an
+ * even integer plus or minus the threshold t. Then the sign of w - s is found without any
+ * arctangent. Half angles are arguments of complex numbers (geometry/solid_angle.h). So the product
+ * z of these numbers, each to the power of its weight, has the argument 2 pi (w - k) up to whole
+ * turns. Because w is close to s,
  *
  *   sign(w - s) = sign(Im(z exp(-2 pi i s))).
  *
  * The product is computed in 512 bits. Its relative error is the sum of the relative errors of its
  * factors, and the argument of z exp(-2 pi i s) is known within twice this error. exp(2 pi i t) is
  * the product of exp(2 pi i / 2^j) over the bits of t. Each of these factors follows from the
- * previous one by square roots (half angles). The factors below 2^-64 of a turn have lost fewer
- * than 100 bits. */
+ * previous one by square roots (half angles). The last factor, which is at least 2^-64 of a turn,
+ * has lost fewer than 100 bits. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -48,7 +48,7 @@ int ebpo_cap_rule_result(const ebpo_cap_rule *rule, double low, double high)
 {
     double t = rule->threshold, middle = low / 2 + high / 2,
            even = rule->rule == EBPO_RULE_EVENODD ? 2 * nearbyint(middle / 2) : 0;
-    bool apart = low > even + t || high < even + t; /* no boundary is in [low, high] */
+    bool apart = low > even + t || high < even + t; /* true: no boundary is in [low, high] */
     if (rule->rule != EBPO_RULE_POSITIVE)
         apart = apart && (low > even - t || high < even - t);
     if (rule->rule == EBPO_RULE_EVENODD) /* the boundaries around the next even integers */
@@ -90,7 +90,7 @@ typedef struct exact_sum {
     ebpo_bounded angle;    /* sum of the half angles, in doubles */
 } exact_sum;
 
-/* Adds `weight` times a half angle. */
+/* Adds `weight` times a half angle to the sum, that is, multiplies z by a power of a->turn. */
 static void multiply_power(exact_sum *s, const ebpo_exact_angle *a, uint32_t weight)
 {
     ebpo_big_complex power = a->turn;
@@ -148,8 +148,8 @@ static ebpo_big_complex turn_of(double t)
     return out;
 }
 
-/* Returns the sign of w_S - s, where w_S is near s, and s is an even integer plus side * threshold;
- * 0 if 512 bits do not decide. */
+/* Returns the sign of w_S - b for the boundary b = even integer + side * threshold, which is near
+ * w_S. `s`: the exact sum for w_S. Returns 0 if 512 bits do not suffice. */
 static int sign_at_boundary(const exact_sum *s, int side, double threshold)
 {
     ebpo_big_complex turn = turn_of(threshold);
@@ -165,7 +165,7 @@ static int sign_at_boundary(const exact_sum *s, int side, double threshold)
     return sine > 0 ? 1 : -1;
 }
 
-/* Decides in 512 bits. */
+/* Decides with numbers of 512 bits. */
 static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double p[3],
                                         int32_t winding, const ebpo_cap_rule *rule)
 {
@@ -184,7 +184,9 @@ static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double 
 
 /* --- decisions --- */
 
-/* Refines a front until its bounds decide. Returns 1 (inside) or 0, or -1 if they do not decide. */
+/* A front is a set of tree nodes that together have all discs, with their bounds. Refines a front
+ * until its bounds decide. Returns 1 (inside) or 0 (outside), or -1 if the finest bounds do not
+ * decide. */
 static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_cap_rule *rule,
                            ebpo_bounded *w)
 {
@@ -197,7 +199,7 @@ static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_ca
     return result;
 }
 
-/* Returns 1 (inside) or 0 if bounds in doubles decide, else -1. */
+/* Returns 1 (inside) or 0 (outside) if bounds in doubles decide, else -1. */
 static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                             const ebpo_cap_rule *rule, ebpo_bounded *w)
 {
@@ -205,7 +207,7 @@ static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_
     ebpo_cap_front front;
     ebpo_cap_front_begin_all(&front, tree, &point);
     int result = decide_by_front(&front, winding, rule, w);
-    /* a front has space for few nodes; these sums use as many nodes as they need */
+    /* A front has space for few nodes. These sums use as many nodes as the tolerance requires. */
     for (double t = 0x1p-8; t >= 0 && result < 0; t = next_tolerance(t)) {
         *w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, t), winding);
         result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);

@@ -1,11 +1,11 @@
-/* Cells of an octree: the root box, positions in the grid of a level, octcodes.
+/* Computes with cells of an octree: the root box, positions in the grid of a level, and octcodes.
  *
  * Each axis of the root box has a unit u = 2^e, chosen so that the coordinates of the cell faces of
  * all levels are u times integers of at most 53 bits. So every cell face is a double without
  * rounding, and neighbouring cells agree on it.
  *
- * An octcode is a leading 1 and three bits for each level (EBP 2017, section 3.2.3), the
- * interleaved bits of the cell's position. */
+ * An octcode is a leading 1, followed by three bits for each level (EBP 2017, section 3.2.3). These
+ * are the interleaved bits of the cell's position. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,9 +16,9 @@
 
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
-/* Margins on each side of the model: a fraction of the extent along the axis, and at least a
- * fraction of the largest extent, so that the cells of flat models are not too thin for arithmetic.
- */
+/* The root box has a margin on each side of the model. On each axis the margin is own_margin times
+ * the extent along this axis, but at least flat_margin times the largest extent; otherwise cells of
+ * flat models would be too thin for arithmetic. */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
 /* Returns false if min > max on an axis, or a coordinate is too large or NaN. */
@@ -32,7 +32,7 @@ static bool extents_usable(const double min[3], const double max[3])
     return true;
 }
 
-/* Returns a length that represents the model's size: never 0. */
+/* Returns a length that represents the model's size, and is never 0. */
 static double model_size(const double min[3], const double max[3])
 {
     double extent = 0, magnitude = 0;
@@ -45,8 +45,8 @@ static double model_size(const double min[3], const double max[3])
     return magnitude > 0 ? magnitude : 1;
 }
 
-/* Sets one axis with the unit 2^e. Returns false when the unit is too fine. [low, high] is [min,
- * max] with margins. */
+/* Sets the box's origin and size on one axis, with the unit 2^e. Returns false when the unit is too
+ * fine. `min`, `max`: the model's extent; `low`, `high`: the extent with margins. */
 static bool axis_with_unit(ebpo_box *box, int axis, double min, double max, double low, double high,
                            int e)
 {

@@ -1,5 +1,5 @@
-/* Cells of nodes: the root box on a dyadic grid, and the cells that result from halving. All
- * corners are exact doubles. */
+/* Defines cells of nodes: the root box, and the cells that result from halving it. All corners are
+ * exact doubles, because the root box is aligned to multiples of powers of two. */
 #ifndef EBPO_GEOMETRY_CELLS_H
 #define EBPO_GEOMETRY_CELLS_H
 
@@ -36,8 +36,8 @@ static inline double ebpo_half_power(int n)
     return out;
 }
 
-/* Returns the coordinate of cell face `k` (0 .. 2^level) at `level` on `axis`; exact for level <=
- * grid_level: origin + k * (size / 2^level). */
+/* Returns the coordinate of cell face `k` (0 .. 2^level) at `level` on `axis`: origin + k * (size /
+ * 2^level). The result is exact if level <= grid_level. */
 static inline double ebpo_cell_face(const ebpo_box *box, int axis, int level, uint32_t k)
 {
     return box->origin[axis] + (double)k * (box->size[axis] * ebpo_half_power(level));
@@ -87,8 +87,8 @@ static inline bool ebpo_cell_equal(ebpo_cell a, ebpo_cell b)
     return a.level == b.level && a.at[0] == b.at[0] && a.at[1] == b.at[1] && a.at[2] == b.at[2];
 }
 
-/* Returns the octant (position in the parent cell) of the ancestor `up` levels above the cell at
- * position `at`. */
+/* Takes the cell at position `at`, and its ancestor `up` levels above. Returns the octant of this
+ * ancestor, that is, its position in its parent cell. */
 static inline unsigned ebpo_octant_at(const uint32_t at[3], int up)
 {
     return (at[0] >> up & 1) | (at[1] >> up & 1) << 1 | (at[2] >> up & 1) << 2;
@@ -101,8 +101,8 @@ static inline unsigned ebpo_cell_octant(ebpo_cell cell, int level)
     return ebpo_octant_at(cell.at, cell.level - level - 1);
 }
 
-/* Computes the cell of the same level that is -1, 0 or 1 steps away on each axis: across a face, an
- * edge or a corner. Returns false if this cell is outside the root cell. */
+/* Computes the neighbour of the same level that is step[k] (-1, 0 or 1) cells away on each axis k.
+ * Returns false if the neighbour is outside the root cell. */
 static inline bool ebpo_cell_neighbour(ebpo_cell cell, const int step[3], ebpo_cell *out)
 {
     *out = cell;
@@ -159,8 +159,9 @@ static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int a
     return i;
 }
 
-/* Finds the cell of the given level that contains p (cell faces belong to the upper cell). Returns
- * false outside the root cell. Exact for level <= grid_level. */
+/* Finds the cell of the given level that contains p. A point on a cell face belongs to the cell
+ * with the higher coordinates. Returns false if p is outside the root cell. The result is exact if
+ * level <= grid_level. */
 static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -190,7 +191,7 @@ static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
 {
     ebpo_locator l = { .box = *box, .level = level, .half = (double)(1u << level) / 2 };
     for (int k = 0; k < 3; k++)
-        l.scale[k] = 2 * l.half / box->size[k]; /* infinite for boxes of almost no size */
+        l.scale[k] = 2 * l.half / box->size[k]; /* infinite if the size is almost 0 */
     return l;
 }
 
@@ -212,9 +213,10 @@ static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], e
     return __builtin_expect(sure, 1) || ebpo_locator_decide(l, p, out);
 }
 
-/* Converts a coordinate within the cell (0 .. 1) to a coordinate of the model. A point on a cell
- * face (`sides`: see ebpo_polytope_sides) gets exactly the coordinate of that face, so that
- * neighbouring cells have equal points. */
+/* Converts `xi`, a coordinate within the cell (0 .. 1), to a coordinate of the model. `sides`: the
+ * cell faces on which the point is; bit 2 * axis is the low face, and bit 2 * axis + 1 the high
+ * face. A point on a cell face gets exactly the coordinate of this face, so that neighbouring cells
+ * have equal points. */
 static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
                                           unsigned sides)
 {
@@ -228,8 +230,8 @@ static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, i
 
 /* Octcodes: locational codes of octree nodes. 64 bits: a leading 1, then three bits for each level,
  * the most significant first; the root is 1. Numeric order is breadth-first order. Bit 0 of each
- * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.2.3 (there with separate level bits
- * and at most 20 levels). */
+ * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.2.3; the codes of that thesis have
+ * separate bits for the level, and at most 20 levels. */
 
 typedef uint64_t ebpo_octcode;
 

@@ -1,16 +1,17 @@
-/* Moves a position in an octree from node to node, for any holder of nodes.
+/* Moves a position in an octree from node to node. A holder is the data structure that has the
+ * nodes; the cursor works for any holder.
  *
  * The cursor keeps the nodes from the root down to the current node, each with its children once
  * they have been read. Therefore a move to a parent reads nothing, and a move to a nearby cell
- * reads only nodes below the common ancestor. Nodes come from an ebpo_node_source: levels in
- * memory, a file, or the tables of a decoded tree. */
+ * reads only nodes below the common ancestor. The functions of an ebpo_node_source read nodes from
+ * the holder: levels in memory, a file, or the tables of a decoded tree. */
 #include "core/strict_fp.h"
 
 #include "geometry/cursor.h"
 
 #include <string.h>
 
-/* Makes a node the current node, at this depth. */
+/* Makes `node` the current node, `depth` levels below the root of the cursor. */
 static void arrive_at(ebpo_cursor *c, int depth, const ebpo_node *node)
 {
     c->depth = depth;
@@ -75,7 +76,7 @@ ebpo_status ebpo_cursor_next(ebpo_cursor *c, bool over, bool *more, ebpo_error *
     return status;
 }
 
-/* Returns true if the node's cell contains the cell. */
+/* Returns true if the node's cell contains `cell`. */
 static bool node_holds(const ebpo_node *node, ebpo_cell cell)
 {
     return node->cell.level <= cell.level &&

@@ -1,5 +1,5 @@
-/* Converts decimal text to the nearest float or double. There are three methods. Each is exact
- * where it applies, and the fastest is tried first:
+/* Converts decimal text to the nearest float or double. There are three methods. Each method is
+ * exact for the numbers that it accepts. The fastest method is tried first:
  * 1. Digits below 2^53, multiplied or divided by a power of ten up to 10^22. Both numbers are
  *   doubles, so one operation rounds once (Clinger, "How to read floating point numbers
  *   accurately", 1990). The float is this double, rounded again, unless the double is exactly
@@ -32,8 +32,8 @@ static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 static bool is_sign(char c) { return c == '+' || c == '-'; }
 
-/* Adds an exponent to d->exponent. `s`: digits without sign. Returns false if other characters
- * follow. */
+/* Adds the exponent in [s, end), digits without a sign, to d->exponent. `negative`: subtracts it
+ * instead. Returns false if the text has other characters. */
 static bool scan_exponent_of(decimal *d, bool negative, const char *s, const char *end)
 {
     int32_t e = 0;
@@ -84,8 +84,8 @@ static bool scan_number(decimal *d, const char *s, const char *end)
            scan_exponent_of(d, *s == '-', s + 2, end);
 }
 
-/* Recognises infinite and undefined numbers as Microsoft's C library prints them; zeros may follow,
- * depending on the precision. */
+/* Recognises the words that Microsoft's C library prints for infinite and undefined numbers.
+ * Depending on the precision, this library adds zeros. */
 static bool scan_foreign_word(double *out, const char *s, size_t n)
 {
     static const struct {
@@ -148,9 +148,9 @@ static uint64_t power_of_five(int exponent)
     return five;
 }
 
-/* Converts by method 2 to a number of `bits` bits. The quotient q has at least 65 bits, so the bits
- * of q below the last kept bit and the remainder determine the rounding. Returns false if this
- * method does not apply. */
+/* Converts by method 2 to a number with a mantissa of `bits` bits. The quotient q has at least 65
+ * bits, so the bits of q below the last kept bit and the remainder determine the rounding. Returns
+ * false if this method does not apply. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -171,10 +171,10 @@ static bool long_quotient(double *out, const decimal *d, int bits)
     return true;
 }
 
-/* Decides exactly whether `value`, the float nearest to digits / 10^e, gives the digits when it is
- * rounded to the last digit (ties to even). That is so if value * 10^e differs from the digits by
- * less than a half. The value is from 1e-27 to 1e20, where floats are normal. *keeps: the result.
- * Returns false if this method does not apply. */
+/* Decides exactly whether `value`, the float nearest to digits / 10^e, gives the digits again when
+ * it is rounded to the last digit (ties to even). It does so if value * 10^e differs from the
+ * digits by less than 0.5, where e = -d->exponent. The value is from 1e-27 to 1e20, where floats
+ * are normal. *keeps: the result. Returns false if this method does not apply. */
 static bool compare_scaled(bool *keeps, float value, const decimal *d)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -240,8 +240,8 @@ static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c
     return strtof_l(buffer, NULL, c_locale);
 }
 
-/* Prints the value with `count` digits. Returns true if the digits and the power of ten of the
- * first digit are equal to these. */
+/* Prints the value with `count` digits. Returns true if the printed digits are `digits`, and the
+ * first digit has the power of ten `first`. */
 static bool prints_digits(float value, const char *digits, size_t count, int32_t first)
 {
     char printed[EBPO_NUMBER_LONGEST + 16];
@@ -253,9 +253,9 @@ static bool prints_digits(float value, const char *digits, size_t count, int32_t
     return count == 1 || memcmp(exponent - (count - 1), digits + 1, count - 1) == 0;
 }
 
-/* Decides by printing whether the float, rounded to the text's last digit, gives the text. (If the
- * text is a power of ten, such as 1000, the float may be less, such as 999.7. Then it has one digit
- * fewer before this position, and is printed with one digit fewer.) */
+/* Decides by printing whether the float, rounded to the text's last digit, gives the text. If the
+ * text is a power of ten, such as 1000, the float may be less, such as 999.7. Such a float has one
+ * digit fewer before the decimal point, so it is also printed with one digit fewer. */
 static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 {
     char digits[EBPO_NUMBER_LONGEST];
@@ -273,9 +273,10 @@ static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 }
 
 /* Returns true if arithmetic in doubles shows that the float nearest to digits * 10^exponent keeps
- * the digits: the float differs from the number by less than half of 10^exponent. That is so for
- * digits below 2^23, because a unit of the last digit is greater than the distance between floats.
- * For digits below 2^40 the double is accurate to 2^-12 of that half. */
+ * the digits, because it differs from the number by less than half of 10^exponent. This is always
+ * true for digits below 2^23: then 10^exponent is greater than the distance between neighbouring
+ * floats. For digits below 2^40 the double `nearest` is accurate enough for this test: its error is
+ * at most 2^-12 of half of 10^exponent. */
 static inline bool surely_keeps(double nearest, float value, const decimal *d)
 {
     return d->digits < UINT64_C(1) << 23 ||
@@ -288,7 +289,7 @@ static bool keeps_digits(float value, const decimal *d, const char *s, size_t n,
 {
     bool keeps;
     double wide_value;
-    if (isinf(value)) /* a double may be finite */
+    if (isinf(value)) /* the number is too large for a float, but perhaps not for a double */
         return ebpo_number_double(&wide_value, s, n, c_locale) && isinf(wide_value);
     return compare_scaled(&keeps, value, d) ? keeps : prints_as(value, d, s, n);
 }

@@ -8,10 +8,10 @@
 /* Converts s[0 .. n), which must be exactly one number: [+-] digits [. digits] [e [+-] digits], or
  * nan, inf, infinity in upper or lower case. Also accepts 3.1+e2 and the words of Microsoft's C
  * library: 1.#INF, 1.#IND, 1.#QNAN, 1.#SNAN, each with any number of zeros after it, nan(ind) and
- * nan(snan). Hexadecimal numbers are rejected. The result is the nearest double, ties to even;
- * beyond the range of doubles it is infinite. Returns false for other text, and for text longer
- * than EBPO_NUMBER_LONGEST bytes. `c_locale`: from newlocale(LC_ALL_MASK, "C", 0); used for the few
- * numbers that the fast exact methods cannot convert. */
+ * nan(snan). Hexadecimal numbers are rejected. The result is the nearest double, ties to even.
+ * Numbers beyond the range of doubles give an infinite result. Returns false for other text, and
+ * for text longer than EBPO_NUMBER_LONGEST bytes. `c_locale`: from newlocale(LC_ALL_MASK, "C", 0);
+ * used for the few numbers that the fast exact methods cannot convert. */
 bool ebpo_number_double(double *out, const char *s, size_t n, locale_t c_locale);
 enum { EBPO_NUMBER_LONGEST = 1200 };
 
@@ -26,7 +26,7 @@ static inline bool ebpo_number_float(float *out, const char *s, size_t n, locale
     return ebpo_number_float_kept(out, &kept, s, n, c_locale);
 }
 
-/* Converts [+-] digits, at most 18. Returns false for other text. */
+/* Converts an integer: [+-] and at most 18 digits. Returns false for other text. */
 bool ebpo_number_integer(int64_t *out, const char *s, size_t n);
 
 #endif

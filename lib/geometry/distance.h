@@ -20,8 +20,9 @@ typedef enum ebpo_feature {
 } ebpo_feature;
 
 /* Guaranteed bounds: lo <= distance <= hi. The difference of the bounds is usually some 1e-15 of
- * the distance or of the largest |p - corner|, whichever is greater. `feature` is certain unless
- * UNKNOWN. Overflow and underflow give wide bounds (lo = 0, hi = INFINITY), never wrong bounds. */
+ * the distance or of the largest |p - corner|, whichever is greater. `feature` is certain, or
+ * EBPO_NEAR_UNKNOWN. Overflow and underflow give wide bounds (lo = 0, hi = INFINITY), never wrong
+ * bounds. */
 typedef struct ebpo_distance_bounds {
     double lo, hi;
     ebpo_feature feature;
@@ -56,8 +57,8 @@ int ebpo_triangle_distance_compare_to(const double p[3], const double triangle[3
  * triangle without area. */
 void ebpo_triangle_unit_normal(const double triangle[3][3], double normal[3]);
 
-/* Computes the squared distance as a fraction of integers, in squares of 2^unit; all coordinates
- * are multiples of 2^unit. Allocates through GMP. */
+/* Computes the squared distance as a fraction of integers: square / denominator, in the unit
+ * (2^unit)^2. All coordinates must be multiples of 2^unit. Allocates through GMP. */
 void ebpo_triangle_square_gmp(const double p[3], const double triangle[3][3], int unit,
                               mpz_t square, mpz_t denominator);
 

@@ -5,9 +5,9 @@
  * overflows or underflows.
  *
  * Errors of distances are bounded relative to the distance. Errors of rays are bounded relative to
- * the computed permanent (the sum of absolute values, as in predicates.c). If the bound is too
- * large to decide, the caller uses exact arithmetic. So all builds give the same decisions and
- * results. */
+ * the computed permanent, which is the sum of the absolute values of all products (as in
+ * predicates.c). If the bound is too large to decide, the caller uses exact arithmetic. So all
+ * builds give the same decisions and results. */
 #include "core/strict_fp.h"
 
 #ifdef __FMA__
@@ -113,8 +113,8 @@ static inline bool normal_of(const pair_plane *plane, double normal[3])
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
         double products = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
         bool nothing = (e[u].head == 0 || f[v].head == 0) && (e[v].head == 0 || f[u].head == 0);
-        /* The error is 2^-96 of the products. If each product has a factor of 0, the component is
-         * exactly 0. */
+        /* The error of a component is 2^-96 of `products`. If each of its two products has a factor
+         * of 0, the component is exactly 0. */
         sure = sure && (nothing || (fabs(n[k].head) > 0x1p-40 * products && products > 0x1p-800));
     }
     if (!sure)
@@ -152,8 +152,8 @@ const ebpo_distance_pairs EBPO_KERNEL(ebpo_distance_pairs) = { to_feature, unit_
 
 /* --- rays: ray_triangle.c --- */
 
-/* The slack (EBPO_RAY_SLACK) covers underflow. An overflow makes a bound infinite or NaN, so that
- * no comparison succeeds. */
+/* Error bounds include EBPO_RAY_SLACK, which covers underflow. An overflow makes a bound infinite
+ * or NaN; then no comparison with this bound succeeds. */
 
 /* A normal and, for each component, the sum of the absolute values of its products. */
 typedef struct plane_normal {

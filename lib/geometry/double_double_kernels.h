@@ -18,9 +18,10 @@ typedef struct ebpo_measured {
 } ebpo_measured;
 
 typedef struct ebpo_distance_pairs {
-    /* Computes the triangle's distance when its nearest feature is known. Products of four
-     * coordinates, and their rounding errors, must be in the range of doubles. Also calls
-     * unit_normal for `normal` and returns its result; returns true if `normal` is NULL. */
+    /* Computes the distance of p from the triangle, whose nearest feature is known. Products of
+     * four coordinates, and their rounding errors, must be in the range of doubles. If `normal` is
+     * not NULL, also computes the unit normal, and returns the result of unit_normal; otherwise
+     * returns true. */
     bool (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
                     double *normal, ebpo_measured *out);
     /* Computes the unit normal. Returns false when double-double arithmetic does not suffice:
@@ -54,9 +55,9 @@ typedef struct ebpo_ray_pairs {
 
 EBPO_KERNELS(ebpo_ray_pairs, ebpo_ray_pairs)
 
-/* Added to error bounds, to cover underflow. This number is much larger than the sum of all
- * underflow errors (2^-1075 each), and it is a normal number, because arithmetic on denormals is
- * slow. */
+/* A number that is added to error bounds to cover underflow. It is much larger than the sum of all
+ * underflow errors (2^-1075 each). It is not a denormal, because arithmetic on denormals is slow.
+ */
 #define EBPO_RAY_SLACK 0x1p-960
 
 #endif

@@ -1,8 +1,9 @@
-/* Computes exactly with doubles: a value is an unevaluated sum of doubles (an expansion). The bits
- * of the components do not overlap. Components are sorted by absolute value and are not 0. Results
- * are exact as long as nothing overflows or underflows; callers keep exponents in range (see
- * predicates.c). An expansion of n = 0 components is 0. Include strict_fp.h first. Source: Shewchuk
- * 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT, FAST-EXPANSION-SUM and SCALE-EXPANSION. */
+/* Computes exactly with doubles. A value is an expansion, that is, an unevaluated sum of doubles.
+ * These doubles are its components. The bits of the components do not overlap. Components are
+ * sorted by absolute value and are not 0. Results are exact as long as nothing overflows or
+ * underflows; callers keep exponents in range (see predicates.c). An expansion of n = 0 components
+ * is 0. Include strict_fp.h first. Source: Shewchuk 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT,
+ * FAST-EXPANSION-SUM and SCALE-EXPANSION. */
 #ifndef EBPO_GEOMETRY_EXPANSION_H
 #define EBPO_GEOMETRY_EXPANSION_H
 
@@ -23,7 +24,7 @@ static inline ebpo_pair ebpo_two_sum(double a, double b)
 
 static inline ebpo_pair ebpo_two_difference(double a, double b) { return ebpo_two_sum(a, -b); }
 
-/* Splits into halves of at most 26 bits. */
+/* Splits a double into two doubles of at most 26 bits each. */
 static inline ebpo_pair ebpo_split(double a)
 {
     double c = 0x1.0000002p27 * a;
@@ -125,8 +126,8 @@ static inline int ebpo_expansion_compress(double *e, int n)
     return top;
 }
 
-/* Computes out = e * f for f of at most two components and e of at most 16; `out` has capacity 4 n.
- */
+/* Computes out = e * f, where f has at most two components and e at most 16. `out` has capacity 4
+ * n. */
 static inline int ebpo_expansion_times(double *out, const double *e, int n, const double *f, int m)
 {
     double low[32], high[32];
@@ -200,9 +201,9 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / b.head));
 }
 
-/* Computes two doubles, equal or adjacent, one of which is the exact a / b rounded to nearest. They
- * are equal if the rounding is certain. `error`: relative error of a and b together. Returns false
- * if the quotient is too large or too small. */
+/* Computes two doubles, of which at least one is the exact a / b, rounded to nearest. The two
+ * doubles are equal if the rounding is certain, and otherwise adjacent. `error`: sum of the
+ * relative errors of a and b. Returns false if the quotient is too large or too small. */
 static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])
 {
     double q = a.head / b.head;

@@ -1,7 +1,7 @@
 /* Converts doubles to multiples of a common power of two, and results back to doubles with one
- * rounding. Used for cases that filters and expansions do not decide. Quotients and roots are
- * computed with some 70 bits, and the lowest bit is set when the remainder is not 0, so that
- * rounding to a double is always correct. */
+ * rounding. Used for cases that neither filters (tests in doubles with error bounds) nor expansions
+ * (expansion.h) decide. Quotients and roots are computed with some 70 bits. Their lowest bit is set
+ * when the remainder is not 0, so that rounding to a double is always correct. */
 #include "core/strict_fp.h"
 
 #include "geometry/integer_vectors.h"
@@ -64,8 +64,8 @@ void ebpo_set_integer(mpz_t out, double x, int unit)
         mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - 53 - unit));
 }
 
-/* Returns the double nearest to m * 2^exponent, ties to even; the lowest bit of m may represent a
- * remainder below it. */
+/* Returns the double nearest to m * 2^exponent, ties to even; the lowest bit of m may stand for a
+ * remainder that is less than this bit. */
 static double round_integer(const mpz_t m, long exponent)
 {
     if (mpz_sgn(m) == 0)

@@ -25,8 +25,8 @@ int ebpo_common_unit(const double *x, int n, int unit);
 /* Computes out = x / 2^unit. */
 void ebpo_set_integer(mpz_t out, double x, int unit);
 
-/* Returns sqrt(square / denominator) * 2^unit, rounded to the nearest double, ties to even;
- * INFINITY beyond the range of doubles. */
+/* Returns sqrt(square / denominator) * 2^unit, rounded to the nearest double, ties to even. Returns
+ * INFINITY if the result is beyond the range of doubles. */
 double ebpo_round_root(const mpz_t square, const mpz_t denominator, int unit);
 
 /* Returns (numerator / denominator) * 2^unit, rounded in the same way; denominator > 0. */

@@ -1,12 +1,13 @@
 /* Reads the nodes of an octree in memory: as levels, and as a table of children.
  *
- * Levels store node types in groups of eight siblings, 16 bits for each group. A node is found by
- * its rank: the number of preceding nodes of its type in its level. Ranks are prefix sums of the
- * counts in the groups, and are computed once for each level. Contradictory counts are rejected.
+ * Levels store node types in groups of eight siblings. A group is a word of 16 bits, two for each
+ * sibling. A node is found by its rank: the number of preceding nodes of its type in its level.
+ * Ranks are prefix sums of the counts in the groups, and are computed once for each level.
+ * Contradictory counts are rejected.
  *
  * The table of children stores four bytes for each node. A grid over its top levels replaces the
- * first steps from the root. The grid has at most about twice as many cells as the table has
- * groups. */
+ * first steps from the root. The grid has at most as many cells as the groups of the table have
+ * entries. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,8 +33,8 @@ static inline uint64_t sum_of_bytes(uint64_t x)
     return ((x & BYTES) + (x >> 8 & BYTES)) * UINT64_C(0x0001000100010001) >> 48;
 }
 
-/* Adds the counts of black, leaf and gray nodes in at most 128 groups, four in a word. With at most
- * 32 words, every byte of the sums is below 256. */
+/* Adds the counts of black, leaf and gray nodes to `counts`. A word has four groups. At most 32
+ * words are allowed, so that no byte of the sums exceeds 255. */
 static void count_words(const uint8_t *types, unsigned words, uint64_t counts[4])
 {
     uint64_t low = 0, high = 0, both = 0;
@@ -92,8 +93,8 @@ static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_no
     return EBPO_OK;
 }
 
-/* Computes out->before, and checks the level's counts of nodes. number: of the level, for messages.
- */
+/* Computes out->before, and checks the level's counts of nodes. `number`: number of the level, for
+ * messages. */
 static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, int number,
                               ebpo_error *error)
 {
@@ -110,7 +111,8 @@ static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, in
     if (status != EBPO_OK)
         return status;
     if (number == 0 && wanted[EBPO_WHITE])
-        count[EBPO_WHITE] -= 7; /* octants that the root's group does not have */
+        count[EBPO_WHITE] -=
+            7; /* the root's group has only octant 0; its other octants are not nodes */
     if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count ||
         count[EBPO_BLACK] != level->black_count || count[EBPO_WHITE] != level->white_count)
         return ebpo_fail(error, EBPO_E_FORMAT,
@@ -252,8 +254,9 @@ typedef struct painter {
     int bits; /* the grid has 2^bits cells along each axis */
 } painter;
 
-/* Writes an entry to the grid cells that its node contains, or the entries of its descendants if
- * the node is larger than a grid cell. `cell`: cell of the node, relative to the table's root. */
+/* Writes `entry` to the grid cells that its node contains. If the node is gray and larger than a
+ * grid cell, writes the entries of its descendants instead. `cell`: cell of the node, relative to
+ * the table's root. */
 static void paint_grid(painter *p, uint32_t entry, ebpo_cell cell)
 {
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && cell.level < p->bits) {

@@ -28,7 +28,7 @@ static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node
     return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
 }
 
-/* Returns a word whose bit 2i is set when octant i is a leaf or gray, that is, when faces touch
+/* Returns a word whose bit 2 * i is set when octant i is a leaf or gray, that is, when faces touch
  * this octant. */
 static inline unsigned ebpo_group_filled(uint16_t types) { return types >> 1 & 0x5555u; }
 
@@ -60,14 +60,14 @@ static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64
             counts[type] = ebpo_group_count(types[0], (ebpo_node_type)type, 1);
 }
 
-/* A node of an octree, identified by its position; shared by all holders of nodes (levels in
- * memory, a file, the tables of a decoded tree). A node is a value and may be copied, kept and
- * queued. */
+/* A node of an octree, identified by its position. A holder is a data structure that has nodes:
+ * levels in memory, a file, or the tables of a decoded tree. All holders use this type. A node is a
+ * value and may be copied, kept and queued. */
 
 typedef struct ebpo_node {
     ebpo_cell cell;
     ebpo_node_type type;
-    bool pruned; /* a gray node without children in its holder, as far as known */
+    bool pruned; /* true: a gray node, and its holder is known to have no children of it */
     /* key by which the holder finds the node */
     union {
         uint64_t rank;  /* in levels and files: rank among the nodes of its type in its level */
@@ -85,7 +85,7 @@ static inline bool ebpo_node_is_uniform(const ebpo_node *node)
 }
 
 /* Returns a gray node's child. `types`: types in the group of the children. `ranks`: for each type,
- * the rank in the next level of the group's first node of this type. */
+ * the number of nodes of this type that precede the group in the children's level. */
 static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, uint16_t types,
                                         const uint64_t ranks[4])
 {
@@ -95,7 +95,7 @@ static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, 
                         .rank = ranks[type] + ebpo_group_count(types, type, octant) };
 }
 
-/* Returns true where points of this winding number belong to the solid. */
+/* Returns true if points with this winding number belong to the solid. */
 static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
 {
     switch (rule) {
@@ -106,17 +106,17 @@ static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
     return winding != 0;
 }
 
-/* The interface of a cursor to a holder of nodes: levels in memory, a file, the tables of a decoded
- * tree, a model that loads subtrees as they are needed. */
+/* The functions through which a cursor reads the nodes of a holder. A holder may also be a model
+ * that loads subtrees when they are needed. */
 
-enum { EBPO_NODE_PLANES = 255 }; /* counts of planes are bytes */
+enum { EBPO_NODE_PLANES = 255 }; /* most planes of a node; files store this count in a byte */
 
 typedef struct ebpo_node_source {
     /* Returns the eight children of a gray node. If the holder has none, marks the node as pruned
      * instead. May also store other results in the node, so that they are not computed again. */
     ebpo_status (*children)(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error);
-    /* Returns the codes of the planes that a gray node adds to its parent's envelope; other nodes
-     * have none, except leaves if the levels store the planes of leaves. */
+    /* Returns the codes of the planes that a gray node adds to its parent's envelope. Leaves have
+     * planes only if the levels store the planes of leaves. Other nodes have no planes. */
     ebpo_status (*planes)(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
                           unsigned *count, ebpo_error *error);
     /* Returns the winding number in a white or black node of a solid. */
@@ -124,9 +124,9 @@ typedef struct ebpo_node_source {
                            ebpo_error *error);
 } ebpo_node_source;
 
-/* Ranks in one level of a tree in memory: the index of a group's first node of each type, the index
- * of a node's first plane, and the index of the first face in a leaf's list. Ranks are prefix sums,
- * so nodes can be visited in any order. */
+/* Ranks in one level of a tree in memory. They give the index of a group's first node of each type,
+ * of a node's first plane, and of the first face in a leaf's list. Ranks are sums over all
+ * preceding items, so nodes can be visited in any order. */
 
 typedef struct ebpo_level_ranks {
     /* [group_count] by type: number of nodes of this type in the preceding groups; NULL for white
@@ -144,8 +144,8 @@ EBPO_MUST_USE ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebp
 void ebpo_level_ranks_free(ebpo_level_ranks *ranks);
 
 /* The nodes of levels in memory, from the root down to some level. The caller owns the arrays. Gray
- * nodes without children in these levels are pruned, and so are all gray nodes of the last level.
- */
+ * nodes without children in these levels are pruned; all gray nodes of the last level are also
+ * pruned. */
 typedef struct ebpo_level_nodes {
     const ebpo_level *level;       /* [level_count] */
     const ebpo_level_ranks *ranks; /* [level_count] */
@@ -158,7 +158,8 @@ ebpo_node ebpo_level_root(const ebpo_level_nodes *nodes);
  * only if the level has winding numbers for this type. */
 ebpo_node ebpo_level_child(const ebpo_level_nodes *nodes, const ebpo_node *gray, unsigned octant);
 
-/* Returns the codes of the planes that a gray node adds, or that are stored for a leaf. */
+/* Returns the codes of the planes that a gray node adds to its parent's envelope, or the codes that
+ * are stored for a leaf. Returns NULL if the node has no planes. */
 const uint32_t *ebpo_level_planes(const ebpo_level_nodes *nodes, const ebpo_node *node,
                                   unsigned *count);
 
@@ -171,16 +172,17 @@ extern const ebpo_node_source ebpo_level_source;
 
 /* --- a decoded tree as a table of children ---
  *
- * The table has four bytes for each node, the node's entry, which refers to the node's children by
- * index. It is used for many successive queries, because the search for a point's node is a loop of
- * one line. An entry has two bits for its kind and 30 bits for its value. */
+ * The table has an entry of four bytes for each node. The entry of a gray node refers to the node's
+ * children by index. The table is used for many successive queries, because the search for a
+ * point's node is a loop of one line. An entry has two bits for its kind and 30 bits for its value.
+ */
 typedef enum ebpo_entry_kind {
     EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: index of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: index of the group of its eight children */
-    /* in the top of a tree: root of a subtree that is loaded on demand, or a pruned node (whose
-     * children are not in the file); value: index of the subtree. In a subtree: a pruned node;
-     * value: its index among gray nodes */
+    /* In the top of a tree (the levels that stay in memory): the root of a subtree that is loaded
+     * on demand, or a pruned node (whose children are not in the file); value: index of the
+     * subtree. In a subtree: a pruned node; value: index of this node among the gray nodes. */
     EBPO_ENTRY_SUBTREE_ROOT = 3
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };
@@ -243,10 +245,10 @@ typedef struct ebpo_node_table {
     uint64_t disc_count;
 } ebpo_node_table;
 
-/* Returns the bits of the grid for a table with this number of groups; 0: no grid. */
+/* Returns ebpo_node_table.grid_bits for a table with this number of groups; 0: no grid. */
 int ebpo_node_grid_bits(uint64_t groups);
-/* Makes the grid, of at most about twice as many cells as there are groups. The grid is optional:
- * when memory is short, the table has none. */
+/* Makes the grid, with at most eight cells for each group. The grid is optional: when memory is
+ * short, the table has no grid. */
 void ebpo_node_table_make_grid(ebpo_node_table *table);
 void ebpo_node_table_free(ebpo_node_table *table);
 
@@ -256,7 +258,8 @@ static inline uint32_t ebpo_table_child(const ebpo_node_table *table, uint32_t g
     return table->group[ebpo_entry_value(gray)][octant];
 }
 
-/* --- descent to cell `at` of `fine_level`, which is within the root --- */
+/* --- descent towards a cell: `at` is the cell's position in the level `fine_level`; the cell must
+ * be within the root's cell --- */
 
 /* The state of a descent. */
 typedef struct ebpo_descent {
@@ -282,14 +285,14 @@ static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int 
         return (ebpo_descent){ table->root, table->root_level };
     uint64_t cell = ebpo_grid_cell(table, fine_level, at);
     uint32_t entry = table->grid[cell];
-    /* most gray nodes in the grid are at the level of its cells; for these, grid_depth, which is in
-     * another cache line, is not read */
+    /* A gray node in the grid is always at the level of the grid's cells. So grid_depth, which is
+     * in another cache line, is not read for gray nodes. */
     bool deep = ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY;
     int depth = deep ? table->grid_bits : table->grid_depth[cell];
     return (ebpo_descent){ entry, table->root_level + depth };
 }
 
-/* Moves one level down; returns false at the deepest node. */
+/* Moves one level down. Returns false if the node has no children in the table. */
 static inline bool ebpo_descent_step(ebpo_descent *d, const ebpo_node_table *table, int fine_level,
                                      const uint32_t at[3])
 {
@@ -300,8 +303,8 @@ static inline bool ebpo_descent_step(ebpo_descent *d, const ebpo_node_table *tab
     return true;
 }
 
-/* Prefetches the children's entries into the processor's cache for a later step; returns false at
- * the deepest node. */
+/* Prefetches the children's entries into the processor's cache for a later step. Returns false if
+ * the node has no children in the table. */
 static inline bool ebpo_descent_prefetch(const ebpo_descent *d, const ebpo_node_table *table)
 {
     if (ebpo_entry_kind_of(d->entry) != EBPO_ENTRY_GRAY)
@@ -317,7 +320,7 @@ static inline ebpo_cell ebpo_descent_cell(const ebpo_descent *d, int fine_level,
     return ebpo_cell_ancestor((ebpo_cell){ fine_level, { at[0], at[1], at[2] } }, d->level);
 }
 
-/* Descends to the deepest node. */
+/* Descends to the deepest node in the table that contains the cell. */
 static inline ebpo_descent ebpo_descend(const ebpo_node_table *table, int fine_level,
                                         const uint32_t at[3])
 {
