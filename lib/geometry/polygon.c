@@ -2,12 +2,13 @@
  *
  * A polygon is projected along the axis on which its normal is largest. A convex polygon becomes a
  * fan; every other polygon is cut ear by ear, with exact tests. The ear at a corner is the triangle
- * of this corner and its two neighbours; it may be cut off if no other corner blocks it (is in the
- * way). A corner is tested again only when its neighbours have changed, or when the corner that
- * blocked its ear was cut off. A tree of boxes finds blocking corners. So outlines of 100,000
- * corners and more are cut in about n log n steps. Outlines that cross themselves get the triangles
- * of least area in space, as closed chains around holes do. Sources: Meisters, "Polygons have
- * ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
+ * of this corner and its two neighbours. It may be cut off if no other corner blocks it, that is,
+ * is in the way. A corner is tested again only when its neighbours have changed, or when the corner
+ * that blocked its ear was cut off. A tree of boxes finds blocking corners. So an outline of n
+ * corners is cut in about n log n steps, also for 100,000 corners and more. An outline that crosses
+ * itself gets the triangles of least area in space. So does a chain, that is, the closed boundary
+ * of a hole. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in
+ * the boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,8 +31,8 @@ static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_
     return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-/* Returns the extra cost of a chord that is an existing edge of the mesh: more than the area of any
- * triangulation. */
+/* Returns the extra cost of a chord that is an existing edge of the mesh. This cost is more than
+ * the area of any triangulation. */
 static double chain_penalty(const ebpo_chain *c)
 {
     double length = 0;
@@ -44,8 +45,9 @@ static double chain_penalty(const ebpo_chain *c)
 
 /* ---- least area, by dynamic programming over sub-chains i .. j ---- */
 
-/* Computes for each sub-chain [i * n + j] the least cost of its triangulation, and the third corner
- * of the triangle at the chord i - j. */
+/* For each sub-chain from point i to point j, computes the least cost of its triangulation, and the
+ * third corner of the triangle at the chord between i and j. The index of a sub-chain in both
+ * tables is i * n + j. */
 static void fill_tables(const ebpo_chain *c, double *cost, uint16_t *apex)
 {
     uint64_t n = c->n;
@@ -98,7 +100,7 @@ static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
     return ok;
 }
 
-/* ---- long chains: smallest ears first, ears that bend outward last ---- */
+/* ---- long chains: cuts the smallest ears first, and ears that bend outward last ---- */
 
 typedef struct chain_ear {
     double area;
@@ -114,7 +116,7 @@ typedef struct cutting {
     uint32_t *before, *after; /* [n] previous and next point of the remaining chain */
     uint32_t *version;        /* [n] number of changes of the ear at each point */
     double normal[3];         /* area vector of the chain */
-    chain_ear *heap;          /* [count] ears, also outdated ones; the least ear is first */
+    chain_ear *heap;          /* [count] ears, including outdated ears; the least ear is first */
     uint64_t count;
 } cutting;
 
@@ -218,14 +220,17 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 #define NONE UINT32_MAX
 
-/* The corners that block an ear. */
+/* Decides which corners block an ear. */
 typedef enum ear_rule {
-    /* A corner in the closed triangle that is not at the position of a corner of the triangle. */
+    /* A corner blocks the ear if it is in the closed triangle, but not at the position of a corner
+     * of the triangle. */
     EBPO_EARS_CLOSED,
 
-    /* For outlines that touch themselves (slits, bridges to holes, pinched corners): a corner
-     * within the triangle or on its new side; also a corner on another side from which the outline
-     * goes into the triangle. If no ear is left, spikes without area are cut off. */
+    /* For outlines that touch themselves (slits, bridges to holes, pinched corners). A corner
+     * blocks the ear if it is within the triangle or on the side that cutting would add to the
+     * outline. A corner on one of the two other sides blocks the ear if an edge of the outline
+     * leads from this corner into the triangle. If no ear is left, spikes without area are cut off.
+     */
     EBPO_EARS_TOUCHING
 } ear_rule;
 
@@ -237,7 +242,7 @@ typedef enum ears_result {
 
 enum {
     WORD = 64,
-    LEVELS = 6,  /* levels of bits: 2^32 corners */
+    LEVELS = 6,  /* levels of bits, enough for 2^32 corners */
     BLOCK = 8,   /* corners of a leaf of the tree */
     SCANNED = 64 /* outlines up to this length have no tree */
 };
@@ -252,7 +257,8 @@ typedef struct outline {
     uint32_t n, remaining; /* number of corners, and number of corners that are not cut off */
     uint64_t work;         /* number of steps */
 
-    uint32_t *next, *previous; /* next is NONE for a corner that is cut off */
+    uint32_t *next,
+        *previous; /* neighbours in the remaining outline; next is NONE if the corner is cut off */
 
     /* [LEVELS][words] level 0: a bit for each corner whose ear is to be tested; each other level: a
      * bit for each word of the level below that is not 0 */
@@ -264,19 +270,20 @@ typedef struct outline {
      * ears it blocks */
     uint32_t *blocker, *first_blocked, *next_blocked, *previous_blocked;
 
-    /* [2 * leaves] boxes around runs of corners, from index 1, and the number of corners in each
-     * box that are not cut off */
+    /* [2 * leaves] A tree of boxes around runs of corners. The root has the index 1; the children
+     * of box i have the indices 2 * i and 2 * i + 1. corners: number of corners in each box that
+     * are not cut off */
     box *boxes;
     uint32_t *corners;
     uint32_t leaves; /* a power of two; 0: no tree */
 } outline;
 
-/* The tested triangle a b c, and the state at its corner b. */
+/* The tested ear, a triangle a b c whose tip is the corner b. */
 typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
-    bool along_a, along_c; /* another edge runs from b's position towards a (or towards c) */
+    bool along_a, along_c; /* true: another edge runs from b's position towards a (towards c) */
 } tested_ear;
 
 /* Returns 1 if the corners a, b, c turn counter-clockwise, -1 if clockwise, otherwise 0. */
@@ -312,7 +319,7 @@ static void clear_bit(outline *o, uint64_t i)
     }
 }
 
-/* Returns the first set bit from i on, or NONE. */
+/* Returns the lowest set bit of level 0 that is at least i, or NONE. */
 static uint32_t find_bit(const outline *o, uint64_t i)
 {
     for (int l = 0; l < o->levels && i / WORD < o->words[l]; l++, i = i / WORD + 1) {
@@ -434,8 +441,8 @@ static void record_edges_along(const outline *o, tested_ear *e, uint32_t i)
     }
 }
 
-/* Returns true if the edge to `to`, from a corner on the ear's border (where side[k] is 0), enters
- * the ear. */
+/* Returns true if an edge enters the ear. The edge leads to corner `to` from a corner on the ear's
+ * border. side[k] is 0 if this corner is on side k of the ear. */
 static bool edge_enters(const outline *o, const tested_ear *e, const int side[3], uint32_t to)
 {
     for (int k = 0; k < 3; k++)
@@ -554,8 +561,8 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
     return winding;
 }
 
-/* Returns true if the ear is not inside the outline. Such an ear is a bend of a passage without
- * width, whose two sides run along each other. */
+/* Returns true if the ear is not inside the outline. Such an ear occurs where a passage without
+ * width bends: there, two parts of the outline run along each other. */
 static bool is_outside(outline *o, const tested_ear *e)
 {
     double q[2];
@@ -573,7 +580,7 @@ static bool is_spike(const outline *o, uint32_t b)
            is_along(o->at[b], o->at[a], o->at[c]);
 }
 
-/* Returns the first tip of a spike, from corner b on, or NONE. */
+/* Returns the first corner, from b on, that is the tip of a spike, or NONE. */
 static uint32_t find_spike(outline *o, uint32_t b)
 {
     for (uint32_t i = 0; i < o->remaining; i++, b = o->next[b]) {
@@ -655,12 +662,12 @@ static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 
 /* ---- scratch ---- */
 
-/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when the number
- * does not fit into 64 bits. */
+/* Returns the bytes of scratch memory for n corners. The memory needs the alignment of malloc.
+ * Returns 0 when the number does not fit into 64 bits. */
 static uint64_t ears_scratch_bytes(uint64_t n)
 {
-    /* each corner has six numbers, at most 4 / BLOCK boxes and counts, and bits in less than one
-     * byte */
+    /* Each corner needs six numbers, at most 4 / BLOCK boxes and counts, and less than one byte of
+     * bits. */
     const uint64_t corner_bytes =
         6 * sizeof(uint32_t) + 4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
     uint64_t bytes;
@@ -695,9 +702,9 @@ static void place_arrays(outline *o, void *scratch)
     o->corners = place_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->corners);
 }
 
-/* Writes n - 2 triangles of corner indices for the outline at[n], n >= 4, that runs
- * counter-clockwise; the output is valid only with EBPO_EARS_CUT. The result depends only on the
- * corners. Pure; may be called by any thread. */
+/* Writes n - 2 triangles of corner indices. `at`: the n >= 4 corners of an outline that runs
+ * counter-clockwise. The output is valid only if the result is EBPO_EARS_CUT. It depends only on
+ * the corners. Any thread may call this function. */
 static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], uint32_t n,
                                ear_rule rule, uint64_t limit, void *scratch)
 {
@@ -718,9 +725,9 @@ static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], u
 
 /* ==== polygons in space ==== */
 
-/* Maximum number of steps for an outline that touches itself. If more are needed, the outline is
- * treated as one that crosses itself. This happens if thousands of corners are at one position,
- * because all these corners are compared with each other. */
+/* Maximum number of steps for an outline that touches itself. If more steps are needed, the outline
+ * is treated like an outline that crosses itself. This happens if thousands of corners are at one
+ * position, because all these corners are compared with each other. */
 #define TOUCHING_WORK (UINT64_C(1) << 28)
 
 /* A polygon and its projection. */
@@ -777,8 +784,8 @@ static bool find_scale(polygon *p)
     return true;
 }
 
-/* Computes the normal by Newell's sum: half of the projected areas. Coordinates are relative to the
- * first corner, so that fewer digits are lost. */
+/* Computes the normal by Newell's sum. Its components are half of the areas of the projections
+ * along the axes. Coordinates are relative to the first corner, so that fewer digits are lost. */
 static void newell_normal(const polygon *p, double normal[3])
 {
     normal[0] = normal[1] = normal[2] = 0;
@@ -854,8 +861,9 @@ static bool has_area(const polygon *p, const uint32_t t[3])
     return !ebpo_zero_area(p->corner[t[0]], p->corner[t[1]], p->corner[t[2]]);
 }
 
-/* Classifies the polygon by its triangles of least area: all may turn counter-clockwise, so that
- * the outline does not cross itself, or all may have no area. */
+/* Classifies the polygon by its triangles of least area. If all these triangles turn
+ * counter-clockwise, the outline does not cross itself. If no triangle has area, the polygon is
+ * degenerate. */
 static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3])
 {
     bool turned = !p->projected, empty = true;
@@ -868,8 +876,8 @@ static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3]
     return empty ? EBPO_POLYGON_DEGENERATE : turned ? EBPO_POLYGON_GUESSED : EBPO_POLYGON_CONCAVE;
 }
 
-/* Computes the triangulation with the least area; for long outlines, computes a triangulation by
- * the smallest ears. */
+/* Computes the triangulation with the least area. Outlines of more than EBPO_POLYGON_OPTIMAL
+ * corners are cut by the smallest ears instead. */
 static ebpo_polygon_kind guess_triangles(const polygon *p, uint32_t (*triangle)[3])
 {
     double(*point)[3] = ebpo_alloc(p->n, sizeof *point);

@@ -23,13 +23,13 @@ static inline void ebpo_face_cross(const double a[3], const double b[3], const d
 /* A chain of n >= 3 points in order. */
 typedef struct ebpo_chain {
     uint32_t n;
-    /* maximum length for the triangulation of least area, which takes O(n^3) steps; longer chains
-     * are cut ear by ear in O(n log n) steps */
+    /* greatest n for the triangulation of least area, which takes O(n^3) steps; longer chains are
+     * cut ear by ear in O(n log n) steps */
     uint32_t optimal;
     const double (*point)[3];
-    /* NULL, or [n][n]: 1 if the mesh already has an edge between the two points, because a new
-     * triangle could make this edge non-manifold. Such edges are avoided where possible. Used only
-     * for n <= optimal */
+    /* NULL, or [n][n]: 1 if the mesh already has an edge between the two points. A new triangle
+     * could make this edge non-manifold, so the triangulation avoids such edges where possible.
+     * Used only if n <= optimal */
     const uint8_t *taken;
     ebpo_workspace *workspace; /* for long chains, or NULL */
 } ebpo_chain;
@@ -45,21 +45,22 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
  * The polygon is projected along the axis on which its normal (Newell's sum) is largest. A convex
  * polygon becomes a fan from its first corner. Every other polygon is cut ear by ear. Turns and
  * point-in-ear tests use the exact ebpo_orient2d. Ears are first cut by the rule for outlines that
- * do not touch themselves and, if that fails, by the rule for outlines that do. Then all triangles
- * turn as the polygon does or have no area, so each point is covered as often as the outline winds
- * around it: once in a polygon with slits, with bridges to holes, or pinched at corners.
+ * do not touch themselves. If this fails, ears are cut by the rule for outlines that touch
+ * themselves. Then all triangles turn as the polygon does or have no area. So each point is covered
+ * as often as the outline winds around it: once in a polygon with slits, with bridges to holes, or
+ * pinched at corners.
  *
  * Outlines whose projection crosses itself (including folded quads) have no such triangles. Their
- * triangles are a guess, and callers count such polygons: up to EBPO_POLYGON_OPTIMAL corners the
- * triangles of least area in space, with more corners the triangles that result from cutting the
- * smallest ears first. The result depends only on the corners. Sources: Meisters, "Polygons have
- * ears", 1975; for the least area: Barequet and Sharir, "Filling gaps in the boundary of a
- * polyhedron", 1995. */
+ * triangles are a guess, and callers count such polygons. Polygons of up to EBPO_POLYGON_OPTIMAL
+ * corners get the triangles of least area in space; for polygons of more corners, the smallest ears
+ * are cut first. The result depends only on the corners. Sources: Meisters, "Polygons have ears",
+ * 1975; for the least area: Barequet and Sharir, "Filling gaps in the boundary of a polyhedron",
+ * 1995. */
 
 typedef enum ebpo_polygon_kind {
     EBPO_POLYGON_CONVEX, /* cut as a fan; every polygon of three corners is of this kind */
-    /* no reflex corners, but corners on straight sides: cut ear by ear, so that no triangle has all
-     * corners on one side */
+    /* no reflex corners, but some corners are within straight sides; cut ear by ear, so that no
+     * triangle has all its corners on one side of the polygon */
     EBPO_POLYGON_FLAT,
     EBPO_POLYGON_CONCAVE, /* cut ear by ear; the outline may touch itself */
     EBPO_POLYGON_GUESSED, /* the outline crosses itself: triangles of least area */
@@ -71,19 +72,19 @@ typedef enum ebpo_polygon_kind {
 } ebpo_polygon_kind;
 
 /* Maximum number of steps for one polygon, each of a few tests of coordinates. Outlines of 100,000
- * corners need far fewer steps, unless tens of thousands of corners are on one line or at one
+ * corners need far fewer steps, except if tens of thousands of corners are on one line or at one
  * position. */
 #define EBPO_POLYGON_WORK (UINT64_C(1) << 31)
 
 /* Greatest number of corners for the triangles of least area. */
 enum { EBPO_POLYGON_OPTIMAL = 64 };
 
-/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when the number
- * does not fit into 64 bits. */
+/* Returns the bytes of scratch memory for n corners. The memory needs the alignment of malloc.
+ * Returns 0 when the number does not fit into 64 bits. */
 uint64_t ebpo_polygon_scratch_bytes(uint64_t n);
 
 /* Writes n - 2 triangles of corner indices (0 .. n - 1) with the polygon's orientation. n >= 3.
- * Pure; may be called by any thread. */
+ * `scratch`: memory of ebpo_polygon_scratch_bytes(n) bytes. Any thread may call this function. */
 ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3],
                                            uint32_t n, void *scratch);
 

@@ -1,11 +1,12 @@
-/* Cuts convex polytopes in the coordinates of a cell from the unit cube by half-spaces.
+/* Cuts convex polytopes from the unit cube by half-spaces. In these coordinates, the unit cube is
+ * the cell of a node.
  *
  * Half-spaces are stored as plane codes of 32 bits, which decode to integers, so that no reader
  * rounds. Polytopes have rounded vertices: they are used for volumes, for drawing and for the
  * choice of planes. Containment never depends on polytopes. Clipping works on the vertex loops of
- * the faces (BP 2008, section 3.4.3) and refuses a cut if rounding would make the loops invalid. So
- * a polytope may be too large, but is never too small. An envelope is the cell of a node, cut by
- * the planes of its ancestors and by its own planes. */
+ * the faces (BP 2008, section 3.4.3). If rounding would make the loops invalid, clipping leaves the
+ * polytope as it is. So a polytope may be too large, but is never too small. An envelope is the
+ * cell of a node, cut by the planes of its ancestors and by its own planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -61,8 +62,8 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
     double least = 0;
     for (int i = 0; i < 3; i++)
         least += n[i] < 0 ? n[i] : 0;
-    /* The values are below 2^21 and have relative errors of a few 2^-53, so 1e-8 steps exceed the
-     * error. */
+    /* The values are below 2^21 and have relative errors of a few 2^-53. So the error is less than
+     * 1e-8 steps. */
     double q = ceil((support - least) * ((double)EBPO_OFFSET_STEPS / EBPO_NORMAL_NORM) + 1e-8) - 1;
     if (!(q < EBPO_OFFSET_STEPS - 1))
         return -1;
@@ -112,8 +113,8 @@ double ebpo_polytope_volume(const ebpo_polytope *p)
     return sum / 6;
 }
 
-/* Computes the point of the edge a-b on the plane from which a and b have the signed distances da
- * and db. */
+/* Computes the point where the edge from a to b crosses a plane. `da`, `db`: signed distances of a
+ * and b from the plane. */
 static void interpolate_crossing(const double a[3], double da, const double b[3], double db,
                                  double out[3])
 {
@@ -130,13 +131,14 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
     return volume * (1 - remaining * remaining * remaining);
 }
 
-/* The part of a polytope beyond a plane, as pyramids from the farthest vertex: faces with this
- * vertex have a pyramid of no volume, and each other face is a fan of triangles. The cut is a
- * polygon whose area is computed from its edges in any order. */
+/* The part of a polytope beyond a plane. Its volume is the sum of pyramids whose tip is the
+ * farthest vertex. The bases are the cut, and the parts of the faces beyond the plane. The base of
+ * a face is a fan of triangles; a face with the farthest vertex has a pyramid of no volume. The cut
+ * is a polygon, whose area is computed from its edges in any order. */
 typedef struct beyond {
     const ebpo_polytope *p;
     double dist[EBPO_POLYTOPE_VERTICES]; /* signed distance of each vertex; positive: beyond */
-    double fans;                         /* six times the volume of the fans' pyramids */
+    double fans;                         /* six times the volume of the pyramids on the faces */
     double area[3];                      /* twice the area of the cut, as a vector */
     double origin[3];                    /* a point of the cut, valid if `started` */
     int farthest;                        /* vertex with the greatest distance */
@@ -165,8 +167,9 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
         c->area[k] += n[k];
 }
 
-/* Adds a corner of a face's part beyond the plane to the fan of the face. kept: number of corners
- * so far; first, last: the first and the latest corner, relative to the farthest vertex. */
+/* Takes the part of a face beyond the plane, and adds a corner of this part to its fan of
+ * triangles. *kept: number of corners so far. first, last: the first and the latest corner,
+ * relative to the farthest vertex. */
 static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
 {
     double v[3], n[3];
@@ -181,7 +184,8 @@ static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3],
     ++*kept;
 }
 
-/* Adds the part of a face beyond the plane, and the face's edge of the cut. */
+/* Adds the pyramid on the part of face `f` beyond the plane, and the edge that this face has in
+ * common with the cut. */
 static void face_beyond(beyond *c, int f)
 {
     const ebpo_polytope *p = c->p;
@@ -244,18 +248,19 @@ typedef struct cut {
                                             positive: removed */
     uint16_t number[EBPO_POLYTOPE_VERTICES]; /* indices of kept vertices in `out` */
     bool on[EBPO_POLYTOPE_VERTICES]; /* true if the vertex of `out` is on the cutting plane */
-    /* cut edges: their vertices in `in`, and the new vertex in `out` */
+    /* edges that the plane crosses. edge.in, edge.out: the kept and the removed vertex, as indices
+     * in the polytope `in`; number: index of the new vertex in the polytope `out` */
     struct {
         uint16_t in, out, number;
     } edge[EBPO_POLYTOPE_FACES];
     int edges;
-    /* edges of kept loops that are on the plane */
+    /* rim edges: edges of kept loops that are on the plane */
     struct {
         uint16_t from, to;
     } rim[EBPO_POLYTOPE_CORNERS];
     int rims;
     bool full; /* the capacity of `out` is exceeded */
-    /* vertices of `in` are on the plane, so rim edges may have kept faces on both sides */
+    /* true: some vertex of `in` is on the plane, so a rim edge may have kept faces on both sides */
     bool touched;
 } cut;
 
@@ -293,7 +298,8 @@ static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
     return number;
 }
 
-/* Adds a corner to the loop that begins at loop_start, unless it equals the previous corner. */
+/* Adds a corner to the loop that begins at loop_start. Omits the corner if it equals the previous
+ * corner. */
 static void add_corner(cut *c, int loop_start, uint16_t v)
 {
     ebpo_polytope *o = c->out;
@@ -353,9 +359,9 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Adds the face on the cutting plane, the cap. A rim edge that is used in both directions is
- * between two kept faces. The other rim edges, in reverse direction, bound the cap. Returns false
- * if they do not form one closed loop. */
+/* Adds the face on the cutting plane, the cap. A rim edge is an edge of a kept face on this plane.
+ * A rim edge that occurs in both directions is between two kept faces. The other rim edges, in
+ * reverse direction, bound the cap. Returns false if these edges do not form one closed loop. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];

@@ -5,11 +5,11 @@
  *   bits 10-19  v
  *   bits 20-31  q
  *
- * With U = u - 511, V = v - 511 in [-511, 511]: the normal n is the point (U, V) of the octahedral
- * map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014),
- * with integer components of 1-norm 511. Let xi be a point in cell coordinates (0 to 1 on each
- * axis), and m the sum of the negative components of n, which is the least value of n . xi over the
- * cell. The half-space is
+ * Let U = u - 511 and V = v - 511, both in [-511, 511]. The normal n is the point (U, V) of the
+ * octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit
+ * Vectors", 2014). Its components are integers, and the sum of their absolute values is 511. Let xi
+ * be a point in cell coordinates (0 to 1 on each axis), and m the sum of the negative components of
+ * n, which is the least value of n . xi over the cell. The half-space is
  *
  *   4096 * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094
  *
@@ -27,7 +27,9 @@
 
 enum { EBPO_NORMAL_NORM = 511, EBPO_OFFSET_STEPS = 4096 };
 
-/* Same as the public ebpo_plane_decode (file.h), for layers that must not include file.h. */
+/* Decodes a plane code to the integers n and d of the half-space 4096 * (n . xi) <= d. Returns
+ * false if the code is invalid. The public function ebpo_plane_decode (ebpo/file.h) calls this
+ * function. */
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
 
 /* Computes the normal part (bits 0-19) of the code nearest to a direction in cell coordinates, of
@@ -35,8 +37,9 @@ bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
  * direction of a face's normal is the normal multiplied by the cell's size, axis by axis. */
 bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal);
 
-/* Returns the least q whose half-space keeps every point with n . xi <= support, or -1 if there is
- * no such q. `support` is in units of n . xi. Rounding never makes the half-space smaller. */
+/* Returns the least q whose half-space contains every point of the cell with n . xi <= support, or
+ * -1 if there is no such q. `support` is in units of n . xi. Rounding never makes the half-space
+ * smaller. */
 int ebpo_plane_code_offset(const int32_t n[3], double support);
 
 static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
@@ -45,8 +48,8 @@ static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
 }
 
 /* Returns the d of the half-space 4096 * (n . xi) <= d in the coordinates of the child `octant`,
- * where xi_parent = (xi_child + octant) / 2. The result is exact; d grows by less than one bit for
- * each level. */
+ * where xi_parent = (xi_child + octant) / 2. The result is exact. With each level, d gets at most
+ * about one bit more. */
 static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigned octant)
 {
     int64_t shift = 0;
@@ -61,13 +64,13 @@ static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigne
  * depends on polytopes, only on the decoded half-spaces. Source: BP 2008, section 3.4.3 (clipping
  * of the box), here applied to vertex loops. */
 
-/* Capacity for a cube cut by the 255 planes that a node may have, of which no more than three
- * intersect in a point. */
+/* Capacity for a cube that is cut by 255 planes (the most planes of a node), if no more than three
+ * planes intersect in one point. */
 enum { EBPO_POLYTOPE_VERTICES = 528, EBPO_POLYTOPE_FACES = 264, EBPO_POLYTOPE_CORNERS = 1584 };
 
-/* Face loops run counter-clockwise seen from outside. The tag of a face identifies its half-space:
- * -1 - (2 * axis + side) for the faces of the first cube, else the tag given to ebpo_polytope_clip.
- */
+/* Face loops run counter-clockwise seen from outside. The tag of a face identifies its half-space.
+ * It is -1 - (2 * axis + side) for the faces of the unit cube, and otherwise the tag that the
+ * caller of ebpo_polytope_clip gave. */
 typedef struct ebpo_polytope {
     int vertex_count, face_count, corner_count;
     double vertex[EBPO_POLYTOPE_VERTICES][3];
@@ -79,32 +82,34 @@ typedef struct ebpo_polytope {
 typedef enum ebpo_clip {
     EBPO_CLIP_NONE, /* nothing was removed */
     EBPO_CLIP_CUT,
-    /* almost nothing would remain, or the capacity is exceeded, or rounding would make the loops
-       invalid: the polytope is unchanged (too large, never too small) */
+    /* The polytope is unchanged (too large, never too small), because almost nothing would remain,
+     * the capacity is exceeded, or rounding would make the loops invalid. */
     EBPO_CLIP_REFUSED
 } ebpo_clip;
 
 /* Makes the unit cube. */
 void ebpo_polytope_cube(ebpo_polytope *p);
 
-/* Keeps n . x <= d. |n| should be about 1 (tolerance 1e-10 in cell units). */
+/* Cuts the polytope: keeps the points with n . x <= d. |n| should be about 1, because vertices
+ * within a distance of 1e-10 count as on the plane. `tag`: tag of the new face. */
 ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag);
 
 /* Sets *out to the part of p in the octant, scaled to the unit cube. Returns false when this part
- * is (numerically) empty; then *out is a box that contains it. `out` may not be `p`. Faces between
- * siblings get the tags of the cube. */
+ * is empty up to rounding; then *out is a box that contains it. `out` may not be `p`. The new
+ * faces, where siblings adjoin, get the tags of the unit cube. */
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out);
 
 /* Sets *out to the part of p in one half along `axis` (side 0: lower, 1: upper), scaled to the unit
- * cube. ebpo_polytope_child halves along z, then y, then x. When the part is (numerically) empty,
- * returns false and the whole cube. */
+ * cube. ebpo_polytope_child halves along z, then y, then x. When the part is empty up to rounding,
+ * returns false and sets *out to the whole cube. */
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out);
 
 /* Copies only the used part of the struct. */
 void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
-/* For each vertex, sets the bits 2 * axis + side of the cube's faces on which the vertex is. The
- * result does not depend on the rounding of vertices. */
+/* For each vertex, sets bit 2 * axis + side for each face of the unit cube on which the vertex is.
+ * The result comes from the tags of the faces, so it does not depend on the rounding of vertices.
+ */
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES]);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);
@@ -114,10 +119,10 @@ double ebpo_polytope_volume(const ebpo_polytope *p);
 double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume,
                              double least);
 
-/* Returns an upper bound of the volume beyond a plane, for a convex body with this volume, this
- * width along the plane's normal and this height beyond the plane. Among convex bodies of volume V
- * and width H the cap of height h is largest for the cone with its base on the far side, V (1 - (1
- * - h/H)^3). */
+/* Returns an upper bound of the volume of the part of a convex body beyond a plane. `volume`: V, of
+ * the whole body. `width`: H, extent of the body along the plane's normal. `height`: h, extent of
+ * the part beyond the plane. Among all such bodies, a cone whose base is beyond the plane has the
+ * largest part: V (1 - (1 - h/H)^3). */
 double ebpo_polytope_cap_bound(double volume, double width, double height);
 
 /* --- polytopes cut by plane codes --- */
@@ -139,7 +144,7 @@ typedef struct ebpo_half_space {
     int64_t d;
 } ebpo_half_space;
 
-enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* plane counts are bytes */
+enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* a node has at most 255 planes */
 
 /* The half-spaces that bound a node's envelope within its cell: the planes of its ancestors and its
  * own planes, as exact integers in the coordinates of its cell. Half-spaces that keep the whole
@@ -149,7 +154,7 @@ typedef struct ebpo_half_spaces {
     ebpo_half_space at[EBPO_HALF_SPACES_MAX];
 } ebpo_half_spaces;
 
-/* Adds planes of the current cell. */
+/* Adds the half-spaces of plane codes of the current cell. */
 void ebpo_half_spaces_add(ebpo_half_spaces *spaces, const uint32_t *codes, uint64_t count);
 
 /* Converts the half-spaces from the coordinates of the cell to the coordinates of its child. */

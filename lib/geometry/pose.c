@@ -1,8 +1,9 @@
 /* Evaluates poses: rotations as quaternions and matrices, and the coordinates of posed vertices.
  *
- * A pose is checked once. Its matrix may differ from a rotation by rounding only. Posed coordinates
- * are doubles, and each operation is rounded once. All decisions about two models are exact on
- * these doubles. Bounds: docs/develop/collision.md, "Posed coordinates". */
+ * A pose is checked once. Its matrix may differ from a rotation only by rounding. Posed coordinates
+ * are the coordinates of a vertex after the pose was applied. They are doubles, and each operation
+ * is rounded once. All decisions about two models are exact for these doubles. Bounds:
+ * docs/develop/collision.md, "Posed coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -80,7 +81,8 @@ static bool all_finite(const double *x, int n)
     return finite;
 }
 
-/* Returns the greatest component of |R^T R - 1|, plus rounding; infinite on overflow. */
+/* Returns the greatest absolute component of R^T R minus the unit matrix, where R is the matrix
+ * `r`, plus a bound of the rounding. Returns infinity on overflow. */
 static double error_bound_of(const double r[3][3])
 {
     double most = 0;

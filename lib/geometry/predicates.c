@@ -1,9 +1,10 @@
 /* Computes orientation predicates and signs of sums of products, exact for all finite doubles.
  *
- * Each predicate tries these stages, the fastest first, until one gives a certain sign: signs of
- * factors, a floating-point filter, exact arithmetic on doubles (expansions) if exponents are in
- * range, and integers of any size. Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic
- * and Fast Robust Geometric Predicates", 1997; docs/develop/design.md. */
+ * Each predicate tries stages, the fastest first, until one stage gives a certain sign. The stages
+ * are: signs of factors; a floating-point filter, that is, a computation with an error bound; exact
+ * arithmetic on doubles (expansions), if exponents are in range; and integers of any size. Sources:
+ * Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates",
+ * 1997; docs/develop/design.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -44,7 +45,8 @@ static int common_exponent(const double *x, int n)
     return least;
 }
 
-/* Computes out = x / 2^unit, which is an integer for the chosen unit. */
+/* Computes out = x / 2^unit. The result must be an integer, so `unit` is at most unit_exponent(x).
+ */
 static void set_integer(mpz_t out, double x, int unit)
 {
     if (x == 0) {
@@ -56,7 +58,7 @@ static void set_integer(mpz_t out, double x, int unit)
     mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - 53 - unit));
 }
 
-/* Computes out[i] = (x[i + 1] - x[0]) / a common positive power of two, i = 0 .. n-2. */
+/* Computes out[i] = (x[i + 1] - x[0]) / 2^unit for i = 0 .. n - 2, with the same unit for all i. */
 static void set_differences(mpz_t *out, const double *x, int n)
 {
     mpz_t base;
@@ -154,8 +156,9 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
  * underflows. */
 
 /* A difference is a pair: the head is the rounded difference, the tail its rounding error. The
- * determinant of the heads differs from the exact determinant by at most 3 eps times the
- * permanent (the sum of the absolute values of the products); 3 is rounded up to 4. */
+ * determinant of the heads differs from the exact determinant by at most 3 eps times the permanent,
+ * where eps is 2^-53, and the permanent is the sum of the absolute values of all products.
+ * heads_error has the factor 4 instead of 3 for terms of higher order. */
 static const double heads_error = 4 * 0x1p-53;
 
 static bool in_range(const double *x, int n, double least, double largest)
@@ -201,7 +204,8 @@ static double power_below(double x)
     return x;
 }
 
-/* Scales a row to integers below 2^41 by a power of two. Returns false if a value has more bits. */
+/* Multiplies a row by a power of two, so that its values become integers below 2^41. Returns false
+ * if a value has more bits. */
 static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
 {
     double largest = fmax(fabs(row[0].head), fmax(fabs(row[1].head), fabs(row[2].head)));
@@ -218,8 +222,9 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
 }
 
 /* Computes the sign of the determinant of differences that are exact and have few bits, such as
- * those of float or integer input. As scaled integers, the differences are below 2^41, so that
- * minors are below 2^83 and the determinant below 2^126. Returns false for other differences. */
+ * differences of floats or of small integers. As scaled integers, the differences are below 2^41,
+ * so that minors are below 2^83 and the determinant below 2^126. Returns false for other
+ * differences. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     int64_t z[3][3];
@@ -244,7 +249,8 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 #endif
 
-/* Computes out = the determinant; out has capacity for 192 components. Returns their number. */
+/* Computes out = the determinant. `out` has capacity for 192 components. Returns the number of
+ * components. */
 static int expand_determinant(double *out, ebpo_difference m[3][3])
 {
     double minor[16], term[3][64], two[128];
@@ -273,8 +279,8 @@ static double error_of_heads(ebpo_pair m[3][3])
 
 /* Returns a lower bound of the absolute value of the expansion e, for n <= 24. (The determinant of
  * the heads has at most 24 components.) Components do not overlap, so the sum of their absolute
- * values is below twice the absolute value of the last component. The error of adding the
- * components is less than n eps times this sum. */
+ * values is below twice the absolute value of the last component. The rounding error of `sum` is
+ * less than n * 2^-53 times this sum of absolute values. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;
@@ -332,7 +338,8 @@ int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c
 
 int ebpo_sign_of_products_expansion(const double *factor, int n)
 {
-    /* Factors are multiples of 2^-500, products and their errors multiples of 2^-1000. */
+    /* In this range, factors are multiples of 2^-500, so products and their rounding errors are
+     * multiples of 2^-1000 and do not underflow. */
     if (n > 8 || !in_range(factor, 2 * n, 0x1p-447, 0x1p480))
         return EBPO_SIGN_UNKNOWN;
     double sum[2][16], product[2];
@@ -348,13 +355,13 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
 
 /* --- predicates: a filter, then the exact stages --- */
 
-/* An error bound is a factor times eps times the computed permanent, plus a term with `slack`.
- * The factor is large enough to cover the rounding errors of the permanent too. The term with
- * `slack` covers underflow in the products. An overflow makes the bound infinite or NaN, so that
- * no comparison succeeds. */
+/* An error bound is a factor times eps times the computed permanent, plus a term with `slack`. The
+ * factor is large enough to cover the rounding errors of the permanent too. The term with `slack`
+ * covers underflow in the products. An overflow makes the bound infinite or NaN; then no comparison
+ * with this bound succeeds. */
 static const double eps = 0x1p-53;
-/* Much larger than the sum of all underflow errors (2^-1075 each), and a normal number, because
- * arithmetic on denormal numbers is slow. */
+/* This number is much larger than the sum of all underflow errors (2^-1075 each). It is not a
+ * denormal, because arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
 static inline int sign_of(double x) { return (x > 0) - (x < 0); }
@@ -385,8 +392,8 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
 }
 
-/* Computes the determinant of the differences b - a, c - a, d - a (one row for each axis) in
- * floating point. Returns its sign, or EBPO_SIGN_UNKNOWN if the sign is not certain. */
+/* Computes the determinant of the columns b - a, c - a, d - a in floating point. m[k] is the row of
+ * axis k. Returns its sign, or EBPO_SIGN_UNKNOWN if the sign is not certain. */
 static int orient3d_filter(double m[3][3])
 {
     double det = 0, permanent = 0, third = 0;

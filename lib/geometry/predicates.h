@@ -1,9 +1,9 @@
-/* Exact predicates over doubles: the sign is correct for all finite numbers, with every compiler
- * and its flags. A floating-point filter gives nearly all results. If the filter does not decide,
- * exact arithmetic on doubles (expansions) or on integers of any size (GMP) decides. The filter
- * detects overflow and underflow, and does not decide in these cases. All functions are pure and
- * thread-safe. Source of the filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and
- * Fast Robust Geometric Predicates", 1997. */
+/* Exact predicates over doubles: the sign is correct for all finite numbers, whatever the compiler
+ * and its flags. A filter, that is, a floating-point computation with an error bound, gives nearly
+ * all results. If the filter does not decide, exact arithmetic on doubles (expansions) or on
+ * integers of any size (GMP) decides. The filter detects overflow and underflow, and does not
+ * decide in these cases. All functions are pure and thread-safe. Source of the filters: Shewchuk,
+ * "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997. */
 #ifndef EBPO_GEOMETRY_PREDICATES_H
 #define EBPO_GEOMETRY_PREDICATES_H
 
@@ -26,8 +26,8 @@ int ebpo_normal_sign(int axis, const double a[3], const double b[3], const doubl
 /* Returns true when a, b, c are collinear or equal, so that they form a face without area. */
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
 
-/* Returns the exact sign of the sum of n products factor[2i] * factor[2i+1]; the function is fast
- * for up to 8 products. */
+/* Returns the exact sign of the sum of n products factor[2 * i] * factor[2 * i + 1]. The function
+ * is fast for up to 8 products. */
 int ebpo_sign_of_products(const double *factor, int n);
 
 /* Computes signed crossings of the face (a, b, c) with an axis-parallel segment, for winding
@@ -41,7 +41,7 @@ int ebpo_sign_of_products(const double *factor, int n);
  * face without area counts as no crossing.
  *
  * Returns the change of the winding number from `from` to the end: +1 when the segment enters (goes
- * against the normal of the counter-clockwise face), -1 when it leaves, 0 when there is no
+ * against the normal of the counter-clockwise face), -1 when the segment leaves, 0 when there is no
  * crossing. */
 int ebpo_axis_crossing(const double from[3], double to, int axis, const double a[3],
                        const double b[3], const double c[3]);
@@ -56,19 +56,20 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
 enum { EBPO_SIGN_UNKNOWN = 2 };
 
 /* These functions use exact arithmetic on doubles. They take tens to hundreds of nanoseconds, and
- * allocate nothing. They return the results of the functions without "_expansion" in their names,
+ * allocate nothing. They return the same results as the functions without "_expansion" in the name,
  * or EBPO_SIGN_UNKNOWN. */
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
                             const double d[3]);
 int ebpo_sign_of_products_expansion(const double *factor, int n);
 
-/* Returns the exact sign of the determinant of three columns of differences, m[axis][column]; the
- * coordinates must be in the range of ebpo_orient3d_expansion. */
+/* Returns the exact sign of the determinant of three columns, m[axis][column]. Each element is a
+ * difference of two coordinates, with its rounding error. The coordinates must be in the range of
+ * ebpo_orient3d_expansion. */
 int ebpo_determinant_expansion(ebpo_pair m[3][3]);
 
-/* These functions use integers of any size. They return the results of the functions without
- * "_exact" in their names. Each call allocates through GMP, which ends the program when memory is
+/* These functions use integers of any size. They return the same results as the functions without
+ * "_exact" in the name. Each call allocates through GMP, which ends the program when memory is
  * short (a few kilobytes suffice). */
 int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3], const double d[3]);

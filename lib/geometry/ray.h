@@ -13,13 +13,13 @@ typedef struct ebpo_segment {
 
 typedef struct ebpo_ray_intersection {
     bool intersects; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
-    /* 1: the ray passes through the triangle's interior against the normal (enters); -1: with the
-     * normal (leaves); 0: it intersects an edge or corner, is within the plane, or the triangle has
-     * no area */
+    /* 1: the ray passes through the triangle's interior against the normal (enters); -1: the ray
+     * passes through the interior with the normal (leaves); 0: the ray intersects an edge or
+     * corner, the ray is within the plane, or the triangle has no area */
     int side;
-    /* direction of the line relative to the normal, also if it intersects an edge or corner. 1:
-     * against the normal; -1: with the normal; 0: the line is within the plane, or the triangle has
-     * no area */
+    /* direction of the line relative to the normal; also set if the line intersects an edge or
+     * corner. 1: against the normal; -1: with the normal; 0: the line is within the plane, or the
+     * triangle has no area */
     int facing;
     double t; /* t of the first common point, correctly rounded */
 } ebpo_ray_intersection;
@@ -38,8 +38,9 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
                        ebpo_ray_intersection *out);
 
-/* Returns the exact sign of t(a) - t(b), for two triangles that the ray intersects (first common
- * points) according to ebpo_ray_triangle. */
+/* Returns the exact sign of t(a) - t(b), where t is the parameter of the first common point with a
+ * triangle. The ray must intersect both triangles, and at_a and at_b must be the results of
+ * ebpo_ray_triangle. */
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
                      const ebpo_ray_intersection *at_a, const double b[3][3],
                      const ebpo_ray_intersection *at_b);

@@ -2,11 +2,12 @@
  * slow. It is the last stage of ray_triangle.c.
  *
  * Corners relative to the origin are converted to integers e_i in one unit, and the direction to
- * integers d in another unit. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line
- * intersects the plane at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it intersects the triangle
- * when no two of the s_i have different signs. When the denominator is 0 the line is parallel to
- * the triangle or the triangle has no area: then they can have common points only if all s_i are 0
- * and the line and the triangle are in one plane. */
+ * integers d in another unit. For the edge from corner j to corner k, opposite corner i, let s_i =
+ * d . (e_j x e_k). The line intersects the plane at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2). The
+ * line intersects the triangle if no s_i is positive or no s_i is negative. If the denominator is
+ * 0, the line is parallel to the triangle, or the triangle has no area. Then the line and the
+ * triangle can have common points only if all s_i are 0. In this case, the line and the triangle
+ * are in one plane. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -21,11 +22,11 @@
 typedef struct integer_scene {
     mpz_t corner[3][3]; /* e_i */
     mpz_t direction[3];
-    int shift; /* t is the parameter in the units of corners and direction, times 2^shift */
+    int shift; /* t is 2^shift times the parameter that is computed from the integers */
 } integer_scene;
 
-/* The intersection of the line and the triangle, in the units of integer_scene: an interval of the
- * parameter. */
+/* The intersection of the line and the triangle: an interval of the parameter. The ends are
+ * computed from the integers of integer_scene, and clip_stretch converts them to the unit of t. */
 typedef struct stretch {
     bool any; /* false: no common point, and the other members are unused */
     int side, facing;
@@ -34,7 +35,7 @@ typedef struct stretch {
 
 /* --- integers --- */
 
-/* Lowers *unit to an exponent e for which each of x[n] is an integer times 2^e. */
+/* Lowers *unit so that each of the n numbers x is an integer times 2^unit. */
 static void lower_unit(int *unit, const double *x, int n)
 {
     for (int i = 0; i < n; i++) {
@@ -143,8 +144,8 @@ static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denomina
     mpq_clear(t);
 }
 
-/* Computes out[i]: signed distance of corner i from the line, up to a common factor, for corners in
- * one plane with the line. */
+/* Computes out[i]: the signed distance of corner i from the line, times a factor that is the same
+ * for all corners. The line and the triangle must be in one plane. */
 static void offsets_from_line(const integer_scene *s, mpz_t out[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -155,8 +156,8 @@ static void offsets_from_line(const integer_scene *s, mpz_t out[3])
     }
 }
 
-/* Adds the crossing of the edge from corner i to corner j with the line, at (e_i w_j - e_j w_i) /
- * (w_j - w_i) = t d, where w are the offsets from the line. */
+/* Adds the crossing of the line with the edge from corner i to corner j. The crossing is at t d =
+ * (e_i w_j - e_j w_i) / (w_j - w_i), where w are the corners' offsets from the line. */
 static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz_t w[3], int i,
                               int j)
 {
@@ -221,7 +222,7 @@ static void scale_parameter(mpq_t t, int shift)
         mpq_div_2exp(t, t, (mp_bitcnt_t)-shift);
 }
 
-/* Converts the stretch to the unit of t, and restricts it to 0 <= t <= t_max. */
+/* Converts the interval to the unit of t, and restricts it to 0 <= t <= t_max. */
 static void clip_stretch(stretch *st, int shift, double t_max)
 {
     if (!st->any)

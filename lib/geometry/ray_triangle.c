@@ -2,16 +2,17 @@
  *
  * There are several stages, of which the fastest is tried first. The first stage computes the side
  * of each edge on which the line passes, in floating-point arithmetic with error bounds. The second
- * stage computes the numerator and the denominator of t in double-double arithmetic
- * (double_double_kernels.c), which gives nearly all bits of t. Expansions are used if the result is
- * not certain, and rational numbers (ray_exact.c) if exponents are out of the range of expansions.
+ * stage computes t in double-double arithmetic (double_double_kernels.c), which gives nearly all
+ * bits of t. Here t is the ray's parameter at the triangle's plane, a fraction. If the result is
+ * not certain, expansions are used. If exponents are out of the range of expansions, rational
+ * numbers are used (ray_exact.c).
  *
- * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
- * (e_i x e_j). If two edges have different signs, the line misses the triangle. This is also true
- * for triangles that have no area or whose plane contains d, because the three signs are those of
- * one planar figure, the triangle projected along d. If the three signs are equal, the line passes
- * through the interior. In all other cases the line touches an edge or a corner, or a sign is not
- * certain. */
+ * Let e_i = corner i - origin, and d the direction. The sign of d . (e_i x e_j) is the side of the
+ * edge from corner i to corner j on which the line passes. If one edge has the sign 1 and another
+ * edge the sign -1, the line misses the triangle. This is also true for triangles that have no area
+ * or whose plane contains d, because the signs are those of the triangle projected along d. If the
+ * three signs are equal and not 0, the line passes through the interior. In all other cases the
+ * line touches an edge or a corner, or a sign is not certain. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -25,11 +26,12 @@
 #include "geometry/ray.h"
 #include "geometry/double_double_kernels.h"
 
-/* Replaces the sign of the determinant of direction, corner i and corner i + 1 (relative to the
- * origin) if this sign is not certain. */
+/* Stands for a sign that is not certain: of the determinant of direction, corner i and corner i + 1
+ * (relative to the origin). */
 enum { SIDE_OPEN = 2 };
 
-/* Returns true if the exact a is certainly less than the exact b. Both arguments are rounded. */
+/* Takes two rounded values. Returns true if the exact value of `a` is certainly less than the exact
+ * value of `b`. */
 static inline bool certainly_less(double a, double b)
 {
     return b - a > 0x1p-50 * (__builtin_fabs(a) + __builtin_fabs(b));
@@ -42,13 +44,14 @@ static inline void set_miss(ebpo_ray_intersection *out)
 
 /* --- expansions: t as a fraction, exact without allocation --- */
 
-/* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
- * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. The
- * comparison of two hits needs products of six numbers, so these numbers must be from 2^-97 to
- * 2^150; they are multiples of 2^-150. Functions return false or EBPO_SIGN_UNKNOWN for numbers
- * outside of these ranges. */
+/* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225. Products of four such
+ * numbers, the differences of these products, and all rounding errors are multiples of 2^-900 and
+ * below 2^910. The comparison of two intersections needs products of six numbers. For this, the
+ * numbers must be from 2^-97 to 2^150, so that they are multiples of 2^-150. Functions return false
+ * or EBPO_SIGN_UNKNOWN for numbers outside of these ranges. */
 
-/* numerator / denominator; the denominator is not 0. */
+/* The value numerator / denominator, of two expansions with n and m components. The denominator is
+ * not 0. */
 typedef struct fraction_of_expansions {
     int n, m;
     double numerator[192], denominator[96];
@@ -109,8 +112,9 @@ static void compress_fraction(fraction_of_expansions *f)
     f->m = ebpo_expansion_compress(f->denominator, f->m);
 }
 
-/* Returns the neighbour to which the fraction is closer, or the even neighbour if the fraction is
- * in the middle. */
+/* Returns the element of `neighbour` that is nearer to the fraction, or, if the fraction is in the
+ * middle, the element whose last bit is 0. `neighbour`: two adjacent doubles around the fraction.
+ */
 static double nearest_neighbour(const fraction_of_expansions *f, const double neighbour[2])
 {
     double low[192], high[192], middle[384], rest[576], half = (neighbour[1] - neighbour[0]) / 2;
@@ -125,8 +129,8 @@ static double nearest_neighbour(const fraction_of_expansions *f, const double ne
     return sign > 0 || (sign == 0 && bits % 2) ? neighbour[1] : neighbour[0];
 }
 
-/* Sets *t to the fraction, which is positive, correctly rounded. The fraction may get fewer
- * components, with the same value. */
+/* Sets *t to the fraction, correctly rounded. The fraction must be positive. Compresses *f, without
+ * changing its value. Returns false if the value is out of range. */
 static bool fraction_value(fraction_of_expansions *f, double *t)
 {
     double out[2];
@@ -201,8 +205,8 @@ static ebpo_difference difference_of_double(double x)
     return ebpo_difference_of((ebpo_pair){ x, 0 });
 }
 
-/* Computes out[i] = component k of corner i x direction, with n[i] components. Returns false when
- * all are 0. */
+/* Computes out[i]: coordinate k of the cross product of corner i and the direction, as an expansion
+ * of n[i] components. Returns false when all three values are 0. */
 static bool offsets_along(const scene *s, int k, double out[3][16], int n[3])
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -223,8 +227,9 @@ static void add_corner(crossings *c, const scene *s, int i)
     f->denominator[0] = s->direction[s->axis];
 }
 
-/* Adds the crossing of the edge from corner i to j with the line, at (e_i w_j - e_j w_i) / (w_j -
- * w_i) = t d, where w are the offsets from the line. */
+/* Adds the crossing of the line with the edge from corner i to corner j. The crossing is at t d =
+ * (e_i w_j - e_j w_i) / (w_j - w_i), where e are the corners relative to the origin, and w are the
+ * corners' offsets from the line. */
 static void add_crossing(crossings *c, const scene *s, double w[3][16], const int *n, int i, int j)
 {
     fraction_of_expansions *f = &c->at[c->count++];
@@ -260,8 +265,8 @@ static void find_crossings(crossings *c, const ebpo_segment *ray, const double t
     }
 }
 
-/* Intersects a ray whose line is in the plane of the triangle, or in one plane with a triangle
- * without area. The input must satisfy ray_in_range. Returns false if expansions cannot decide. */
+/* Intersects a ray whose line is in one plane with the triangle. The triangle may have no area. The
+ * input must satisfy ray_in_range. Returns false if expansions cannot decide. */
 static bool intersect_within_plane(const ebpo_segment *ray, const double triangle[3][3],
                                    ebpo_ray_intersection *out)
 {
@@ -340,7 +345,7 @@ static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
     return c.count > 0;
 }
 
-/* Returns the sign of t(a) - t(b), as ebpo_ray_compare. */
+/* Returns the sign of t(a) - t(b), as ebpo_ray_compare does, or EBPO_SIGN_UNKNOWN. */
 static int compare_by_expansions(const ebpo_segment *ray, const double a[3][3],
                                  const double b[3][3])
 {
@@ -385,7 +390,7 @@ static bool make_fraction(parameter *p)
     return p->made;
 }
 
-/* Returns the sign of t; `denominator` is the sign of the denominator. */
+/* Returns the sign of t. `denominator`: sign of the denominator of t. */
 static int sign_of_t(parameter *p, int denominator)
 {
     int sign = bounded_sign(&p->at.numerator);
@@ -406,8 +411,8 @@ static bool value_of_t(parameter *p, double *t)
     return make_fraction(p) && fraction_value(&p->fraction, t);
 }
 
-/* Returns the sign of t - t_max, for t and t_max that are close to each other; `denominator` is the
- * sign of the denominator. */
+/* Returns the sign of t - t_max, for t and t_max that are close to each other. `denominator`: sign
+ * of the denominator of t. */
 static int beyond_end(parameter *p, int denominator)
 {
     double end = p->ray->t_max;
@@ -422,8 +427,9 @@ static int beyond_end(parameter *p, int denominator)
     return make_fraction(p) ? fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
 }
 
-/* Intersects the ray with a triangle that the line intersects. `side` has the meaning of the member
- * in ebpo_ray_intersection; `sign` is the sign of normal . direction. */
+/* Intersects the ray with a triangle that the ray's line intersects. `side` has the meaning of the
+ * member in ebpo_ray_intersection; `sign` is the sign of normal . direction. Returns false if the
+ * result is not certain. */
 static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3], int sign,
                             int side, ebpo_ray_intersection *out)
 {
@@ -452,7 +458,7 @@ static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3]
 /* Frequent cases are recognised first: a corner at the origin (t = 0), a corner on the line, and an
  * edge through the origin. */
 
-/* Returns true if a x b = 0, exactly, for numbers in range. */
+/* Returns true if a x b is exactly 0. The numbers must be in the range of ray_in_range. */
 static bool are_parallel(const double a[3], const double b[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -469,7 +475,7 @@ typedef struct corner {
     const double *at; /* position in the model */
     ebpo_pair x[3];
     double head[3];
-    bool exact; /* the position relative to the origin has no rounding errors */
+    bool exact; /* true: the tails of `x` are 0, so `head` is exact */
 } corner;
 
 static corner corner_at(const ebpo_segment *ray, const double p[3])
@@ -488,8 +494,9 @@ static inline bool is_origin(const corner *c)
     return c->head[0] == 0 && c->head[1] == 0 && c->head[2] == 0;
 }
 
-/* Returns the exact sign of d . (a x b). Uses b - a instead of b, because fewer digits are lost if
- * the edge is short compared with its distance from the origin. */
+/* Returns the exact sign of d . (a x b). The kernel computes d . (a x (b - a)), which has the same
+ * value, because fewer digits are lost if the edge is short compared with its distance from the
+ * origin. */
 static int close_edge_side(const double d[3], const corner *a, const corner *b)
 {
     ebpo_pair m[3][3];
@@ -514,7 +521,8 @@ static inline bool on_line(const double d[3], const corner *c)
     return c->exact && are_parallel(d, c->head);
 }
 
-/* Decides the signs that are SIDE_OPEN, exactly. sign[i]: side of the edge from e[i]. */
+/* Replaces each sign that is SIDE_OPEN by the exact sign. sign[i]: side of the edge from e[i] to
+ * the next corner. */
 static void close_sides(const double d[3], const corner e[3], int sign[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -565,8 +573,9 @@ static bool has_corner(const double triangle[3][3], const double p[3])
     return has;
 }
 
-/* Returns true when the ray, which intersects both triangles, certainly intersects both in a shared
- * corner or edge, and therefore at the same t. `across`: the ray is in neither triangle's plane. */
+/* Takes two triangles that the ray intersects. Returns true when the ray certainly intersects both
+ * in a shared corner or edge, and therefore at the same t. `across`: true if the ray is in neither
+ * triangle's plane. */
 static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
                               bool across)
 {
@@ -587,16 +596,16 @@ static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], con
 
 /* --- the filter --- */
 
-/* Error bounds are as in predicates.c: they are valid with the computed permanent (the sum of
- * absolute values), the slack covers underflow, and an overflow makes the bound infinite or NaN, so
- * that no comparison succeeds. */
+/* An error bound is a factor times eps times the computed permanent (the sum of the absolute values
+ * of all products), plus a term with `slack`, which covers underflow. An overflow makes the bound
+ * infinite or NaN; then no comparison with this bound succeeds. */
 static const double eps = 0x1p-53;
-/* Much larger than the sum of all underflow errors (2^-1075 each), and a normal number, because
- * arithmetic on denormals is slow. */
+/* This number is much larger than the sum of all underflow errors (2^-1075 each). It is not a
+ * denormal, because arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
-/* Returns the sign of d . (a x b), or SIDE_OPEN. a and b are rounded differences; weight: 1 + |d0|
- * + |d1| + |d2|. */
+/* Returns the sign of d . (a x b), or SIDE_OPEN if the sign is not certain. `a`, `b`: corners minus
+ * origin, rounded. `weight`: 1 + |d[0]| + |d[1]| + |d[2]|. */
 static inline int filtered_edge_side(const double d[3], double weight, const double a[3],
                                      const double b[3])
 {
@@ -610,8 +619,8 @@ static inline int filtered_edge_side(const double d[3], double weight, const dou
     return det > bound ? 1 : det < -bound ? -1 : SIDE_OPEN;
 }
 
-/* Returns true when the coordinates on one axis show that ray and triangle are disjoint. The signs
- * of differences are always correct. */
+/* Returns true when the coordinates on one axis show that ray and triangle are disjoint. `e`:
+ * corners minus origin, rounded; their signs are always correct. */
 static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
 {
     for (int k = 0; k < 3; k++) {

@@ -1,25 +1,31 @@
 /* Computes half solid angles of triangles.
  *
+ * The half angle is the argument of a complex number (solid_angle.h). Its imaginary part is the
+ * determinant of A, B and C, the corners minus p; its real part is a sum of four terms.
+ *
  * Error in doubles, with u = 2^-53 and M = |A||B||C|. Each component of A, B, C has a relative
  * error of at most u. The determinant is a sum of 6 products whose absolute values sum up to at
- * most sqrt(3) M, each with 3 rounded factors, 2 products and at most 3 sums: 8 u sqrt(3) M < 14 u
- * M, to first order. A dot product has an error of at most 5 u times the product of the lengths,
- * and a length has a relative error of at most 4 u. So each of the four terms of the real part has
- * an error of at most 13 u M, and the three sums add 3 * 4 u M: together 64 u M. The errors of both
- * parts are together below 80 u M < 2^-46 M = E, with a factor of 1.6 for terms of second order and
- * the rounding of M. The argument of a number of absolute value H > 2 E, computed within 2^-48,
- * therefore differs by at most asin(E / H) < 1.1 E / H; the code uses 2 E / H + 2^-48.
+ * most sqrt(3) M. Each product has 3 rounded factors, 2 rounded multiplications and at most 3
+ * rounded additions. So the error of the determinant is at most 8 u sqrt(3) M < 14 u M, to first
+ * order. A dot product has an error of at most 5 u times the product of the lengths, and a length
+ * has a relative error of at most 4 u. So each of the four terms of the real part has an error of
+ * at most 13 u M, and the three additions have errors of at most 4 u M each. Together this is 64 u
+ * M. The errors of both parts are together below 80 u M. The code uses E = 2^-46 M, which is 1.6
+ * times as much, for terms of second order and the rounding of M. Let H > 2 E be the absolute value
+ * of the computed number. Its argument differs from the exact argument by at most asin(E / H) < 1.1
+ * E / H, and is computed within 2^-48. The code uses 2 E / H + 2^-48.
  *
  * Near the negative real axis the sign of the imaginary part decides between pi and -pi. If this
- * sign is uncertain, the exact orientation of the shifted point decides, and the bounds are cut at
- * pi.
+ * sign is uncertain, the exact orientation of the shifted point (predicates.h) decides, and the
+ * bounds are limited to pi or -pi.
  *
  * In 512 bits, A, B and C have relative errors of at most 2^-510, and the same sums give an error
  * of at most 80 * 2^-509 M; the code uses 2^-500 M.
  *
- * At a point on an edge a-b, with e = b - a, h = c - p and the shift d, the number is the limit
- *   -(|e|^2 (d.h) - (d.e)(h.e)) + i |e| (e.(d x h)), divided by its length. Its argument is the
- * angle, around the edge, from -d to h. */
+ * At a point p on the edge from a to b, let e = b - a, h = c - p, and d the direction of the shift.
+ * There, the complex number is the limit for a small shift: -(|e|^2 (d.h) - (d.e)(h.e)) + i |e|
+ * (e.(d x h)), divided by its absolute value. The argument is the angle around the edge from -d to
+ * h. */
 #include "core/strict_fp.h"
 
 #include "geometry/solid_angle.h"
@@ -31,8 +37,8 @@
 
 /* --- doubles --- */
 
-/* Returns atan(t) for t in [0, 1]. The argument is reduced to at most 1/8. The series has terms up
- * to t^17; the next term is below 2^-61. */
+/* Returns atan(t) for t in [0, 1]. Reduces the argument to an absolute value of at most 1/8. The
+ * series has terms up to t^17; the next term is below 2^-61. */
 static double small_argument(double t)
 {
     static const double angle[5] = { 0, 0x1.f5b75f92c80ddp-3, 0x1.dac670561bb4fp-2,
@@ -55,8 +61,8 @@ double ebpo_argument(double y, double x)
     return y < 0 ? -out : out;
 }
 
-/* Returns the sign of the half angle's sine for the shifted point; 0 for a triangle without area.
- */
+/* Returns the sign of the half angle's sine for the shifted point. Returns 0 for a triangle without
+ * area. */
 static int shifted_sign(const double p[3], const double a[3], const double b[3], const double c[3])
 {
     int sign = ebpo_orient3d(a, b, c, p);
@@ -65,7 +71,7 @@ static int shifted_sign(const double p[3], const double a[3], const double b[3],
     return -sign;
 }
 
-/* Returns the interval around the argument `angle`, cut at pi or -pi. sign: exact sign of the
+/* Returns the interval from |angle| - error to pi, multiplied by `sign`, the exact sign of the
  * argument. */
 static ebpo_bounded cut_at_pi(double angle, double error, int sign)
 {
@@ -145,9 +151,9 @@ static ebpo_big big_length(const big_vector *a)
     return ebpo_big_root(&square);
 }
 
-/* Completes the result. `sign`: exact sign of the imaginary part for the shifted point; `all`
- * bounds the terms of the real and of the imaginary part. Returns false if 512 bits do not suffice.
- */
+/* Sets out->error and out->angle. `sign`: exact sign of the imaginary part for the shifted point.
+ * `all`: bound of each term of the real and of the imaginary part. Returns false if 512 bits do not
+ * suffice. */
 static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
 {
     const ebpo_big *x = &out->turn.real, *y = &out->turn.imaginary;
@@ -164,7 +170,7 @@ static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
     return true;
 }
 
-/* Computes the limit for the shift of a point on the edge a-b. */
+/* Computes the half angle at a point p on the edge from a to b, as the limit for a small shift. */
 static bool angle_on_edge(const double p[3], const double a[3], const double b[3],
                           const double c[3], ebpo_exact_angle *out)
 {
