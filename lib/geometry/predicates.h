@@ -1,7 +1,7 @@
-/* Exact predicates over doubles: the sign is correct for all finite numbers, whatever the compiler
- * and its flags. A filter, that is, a floating-point computation with an error bound, gives nearly
- * all results. If the filter does not decide, exact arithmetic on doubles (expansions) or on
- * integers of any size (GMP) decides. The filter detects overflow and underflow, and does not
+/* Exact predicates over doubles: the sign is correct for all finite numbers, and does not depend on
+ * the compiler and its flags. A filter, that is, a floating-point computation with an error bound,
+ * gives nearly all results. If the filter does not decide, exact arithmetic on doubles (expansions)
+ * or on integers of any size (GMP) decides. The filter detects overflow and underflow, and does not
  * decide in these cases. All functions are pure and thread-safe. Source of the filters: Shewchuk,
  * "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997. */
 #ifndef EBPO_GEOMETRY_PREDICATES_H

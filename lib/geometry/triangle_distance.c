@@ -1,17 +1,24 @@
 /* Computes the distance of a point from a triangle: bounds, correctly rounded values, and exact
  * comparisons.
  *
- * The stages, the fastest first, are: bounds in doubles; signs of products with error bounds, for
- * points that are far from the triangle compared with its size; double-double arithmetic
- * (double_double_kernels.c) while its error bound decides the rounding (Ziv, "Fast evaluation of
- * elementary mathematical functions with correctly rounded last bit", 1991); and integers of any
- * size.
+ * There are four stages. The fastest stage is tried first:
  *
- * In all stages the nearest feature (corner, edge or interior) follows from the same signs, with
- * the corners taken relative to the point p. A corner is nearest when p is behind this corner along
- * both of its edges. An edge is nearest when p, projected to the plane, is between the edge's ends
- * and outside of the edge. The interior is nearest when the projection of p is inside of all edges.
- * Docs: docs/develop/bounds.md. */
+ * 1. Bounds in doubles.
+ *
+ * 2. Signs of products with error bounds, for points that are far from the triangle compared with
+ * its size.
+ *
+ * 3. Double-double arithmetic (double_double_kernels.c), if its error bound decides the rounding
+ * (Ziv, "Fast evaluation of elementary mathematical functions with correctly rounded last bit",
+ * 1991).
+ *
+ * 4. Integers of any size.
+ *
+ * In all stages the nearest feature (corner, edge or interior) follows from the signs of the same
+ * products. The corners in these products are relative to the point p. A corner is nearest when p
+ * is behind this corner along both of its edges. An edge is nearest when p, projected to the plane,
+ * is between the edge's ends and outside of the edge. The interior is nearest when the projection
+ * of p is inside of all edges. See docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -31,8 +38,8 @@ typedef struct bounded_number {
     double x, error;
 } bounded_number;
 
-/* `more` covers the rounding of the bounds themselves, `rounding` bounds the relative error of an
- * operation, and `lost` covers the underflow of denormal results. */
+/* `more`: factor that covers the rounding of the bounds themselves. `rounding`: bound of the
+ * relative error of an operation. `lost`: bound of the error when a result is a denormal. */
 static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
 
 static bounded_number bounded_multiply(bounded_number a, bounded_number b)
@@ -100,12 +107,12 @@ static int exponent_of(const double (*a)[3], int count, const double b[3])
 typedef struct far_triangle {
     bounded_number corner[3][3];      /* relative to p, in units of 2^exponent */
     bounded_number edge[3][3];        /* in units of 2^edge_exponent */
-    bounded_number along[3], back[3]; /* corner k . edge k; corner k + 1 . edge k */
+    bounded_number along[3], back[3]; /* along: corner k . edge k; back: corner k + 1 . edge k */
     int exponent, edge_exponent;
 } far_triangle;
 
-/* Computes the products. Returns false if two corners are equal; then this stage cannot decide
- * which of these corners is nearest. */
+/* Computes the members of *t. Returns false if two corners are equal, because then this stage
+ * cannot decide which of these corners is nearest. */
 static bool relate_far(const double p[3], const double triangle[3][3], far_triangle *t)
 {
     bool apart = true;
@@ -153,8 +160,8 @@ static double bounded_length(const bounded_number a[3])
     return sqrt(a[0].x * a[0].x + a[1].x * a[1].x + a[2].x * a[2].x);
 }
 
-/* Bounds the distance: the nearest corner is at most the triangle's size farther than the nearest
- * point. */
+/* Bounds the distance of p from the triangle. The distance of the nearest corner is an upper bound,
+ * and exceeds the distance of the nearest point by at most the triangle's size. */
 static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance_bounds *out)
 {
     double least = INFINITY, size = 0;
@@ -172,12 +179,12 @@ static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance
     out->feature = feature;
     out->lo = low > 0 ? fmax(nextafter(ldexp(low, t->exponent), -INFINITY), 0) : 0;
     out->hi = nextafter(ldexp(high, t->exponent), INFINITY);
-    /* a bound that overflows may be finite before rounding */
+    /* lo may have overflowed although the distance is finite */
     out->lo = fmin(out->lo, 0x1.fffffffffffffp1023);
 }
 
-/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. `out` may be NULL. It receives bounds of the
- * distance that differ by about the triangle's size. */
+/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. If `out` is not NULL and p is far from the
+ * triangle, sets *out to bounds of the distance that differ by about the triangle's size. */
 static ebpo_feature find_far_feature(const double p[3], const double triangle[3][3],
                                      ebpo_distance_bounds *out)
 {
@@ -208,7 +215,8 @@ static bool compare_far_corners(const double p[3], const double a[3], const doub
     return *sign || bounded_is_zero(d);
 }
 
-/* Replaces corners that do not belong to a feature by copies of corners that do. */
+/* Reduces the triangle t to a feature: replaces the corners outside the feature by copies of a
+ * corner of the feature. */
 static void keep_feature(double t[3][3], ebpo_feature feature)
 {
     double from[3], to[3];
@@ -224,8 +232,8 @@ static void keep_feature(double t[3][3], ebpo_feature feature)
 }
 
 /* Reduces the triangles a and b to their nearest features. If both features are in one plane
- * perpendicular to an axis, replaces p by its projection to this plane, and returns true. The order
- * of the distances of the features from the projection is the order of their distances from p. */
+ * perpendicular to an axis, replaces p by its projection to this plane, and returns true. The
+ * projection does not change which of the two features is nearer. */
 static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
                         ebpo_feature of_b)
 {
@@ -246,8 +254,9 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
 
 /* --- bounds in doubles --- */
 
-/* Bounds of rounding errors. u = 2^-53, r bounds the 1-norms of the corners relative to p, l bounds
- * the 1-norms of the edges, and l^2 the normal's length.
+/* Bounds of rounding errors. u is 2^-53. r bounds the 1-norms (sums of absolute coordinates) of the
+ * corners relative to p. l bounds the 1-norms of the edges, so l^2 bounds the length of the normal
+ * n.
  * - Relative corners and edges have relative errors of u.
  * - Products of a corner and an edge: 8 u r l.
  * - The normal: 8 u l^2 on each axis.
@@ -259,8 +268,8 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
  * The code uses at least twice these bounds. Numbers whose fourth powers overflow or underflow are
  * scaled first. */
 static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
-/* If r exceeds this multiple of the triangle's size, errors relative to the greatest product are
- * too large. */
+/* If r exceeds l times this factor, the error bounds above are too large compared with the
+ * products. */
 static const double far_ratio = 0x1p20;
 
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
@@ -304,7 +313,7 @@ static void multiply_relation(relation *r)
     }
 }
 
-/* Returns the distance of p from edge i. The nearest point is the corner plus a fraction of the
+/* Returns the distance of p from edge i. The nearest point is corner i plus a fraction t of the
  * edge. */
 static double edge_distance(const relation *r, int i)
 {
@@ -341,9 +350,12 @@ static double plane_distance(const relation *r, double *error)
     return fabs(ebpo_vec3_dot(r->normal, r->corner[0])) / length;
 }
 
-/* Bounds the distance. The plane is never farther than the triangle. If the tilt of the plane is
- * not known, the plane gives no bound. Then another bound is used: no point of the triangle is
- * farther from its edges than the triangle's height. */
+/* Bounds the distance of p from the triangle if the nearest feature is not certain. The distance
+ * from the edges is an upper bound. There are two lower bounds. The distance from the triangle's
+ * plane is a lower bound if the tilt of the computed plane is small. The distance from the edges,
+ * minus the triangle's height, is always a lower bound, because no point of the triangle is farther
+ * from the edges than this height. `plane`: distance from the plane. `error`: error of the distance
+ * from the edges. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {
     double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
@@ -383,7 +395,7 @@ static void bound_relation(const relation *r, ebpo_distance_bounds *out)
     out->hi = d + error;
 }
 
-/* Scales p and the triangle by a power of two 2^-e so that the largest coordinate is in 1/2 .. 1.
+/* Multiplies p and the triangle by 2^-e, so that the largest absolute coordinate is in [1/2, 1).
  * Returns e. */
 static int scale_all(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
 {
@@ -410,7 +422,7 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     relation r;
     relate_to_point(q, (const double(*)[3])t, &r);
     if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
-        /* The triangle is almost a point: only an upper bound is known. */
+        /* The triangle is almost a point, so this stage knows only an upper bound. */
         *out = (ebpo_distance_bounds){
             0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
         };
@@ -420,7 +432,7 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     multiply_relation(&r);
     bound_relation(&r, out);
     /* Scaling to larger numbers is exact. Scaling to smaller numbers may have lost parts below
-     * 2^-1074, for which the bounds are widened. */
+     * 2^-1074, so the bounds are widened. */
     out->feature = find_far_feature(p, triangle, NULL);
     out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
     out->lo = out->lo > 0 ? out->lo : 0;
@@ -444,8 +456,9 @@ void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3
 
 /* --- integers of any size: the squared distance is a fraction of integers in a common unit --- */
 
-/* The nearest point is p + offset / offset_denominator; the squared distance is square /
- * denominator. */
+/* The search for the nearest point, in integers. The nearest point is p + offset /
+ * offset_denominator. The squared distance is square / denominator. Coordinates are in units of
+ * 2^unit. */
 typedef struct nearest {
     int unit;
     ebpo_vectorz p, corner[3], edge[3], normal; /* corners relative to p */
@@ -490,7 +503,7 @@ static void set_points(nearest *n, const double p[3], const double triangle[3][3
     ebpo_vectorz_cross(&n->normal, &n->edge[0], &n->edge[1]);
 }
 
-/* Returns true, with the result, if the nearest point is in the interior. */
+/* If the nearest point is in the interior, sets the result and returns true. */
 static bool try_interior(nearest *n)
 {
     ebpo_vectorz_dot(n->denominator, &n->normal, &n->normal);
@@ -511,9 +524,10 @@ static bool try_interior(nearest *n)
     return true;
 }
 
-/* Replaces the current feature by a corner or edge that is nearer. If both are equally near, keeps
- * the feature with the lower number, so a corner before an edge. `first`: there is no current
- * feature. *taken: the feature was replaced. */
+/* Replaces the current nearest feature by `feature` if this corner or edge is nearer. If both are
+ * equally near, keeps the feature with the lower number, so a corner rather than an edge. `square`
+ * / `denominator`: squared distance of `feature`. `first`: true if there is no current feature.
+ * *taken: true if the feature was replaced. */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {
@@ -697,8 +711,9 @@ static bool rounds_certainly(const ebpo_measured *m, double *distance)
     return m->error < 0x1p-56 && least == most;
 }
 
-/* Computes the distance of a corner of a triangle that is far away. Numbers are scaled, so that
- * none overflows. Scaling may lose parts of small coordinates, below 2^-1000 of the distance. */
+/* Computes the distance if the nearest feature is a corner and the triangle is far away. Numbers
+ * are scaled, so that no number overflows. Scaling may lose parts of small coordinates; these parts
+ * are below 2^-1000 of the distance. */
 static bool corner_by_pairs(const double p[3], const double triangle[3][3],
                             const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
 {
@@ -718,8 +733,8 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     return true;
 }
 
-/* Computes the nearest point by double-double arithmetic. Returns false if it does not decide.
- * *known: the normal was requested and is set. */
+/* Computes the nearest point by double-double arithmetic. Returns false if this arithmetic is not
+ * accurate enough. *known: true if the normal needs no further computation. */
 static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, double *normal, bool *known,
                              ebpo_triangle_nearest *out)

@@ -1,5 +1,5 @@
-/* Computes the relation of two faces: apart, touching, crossing or coplanar. Exact for all finite
- * doubles.
+/* Computes the relation of two faces: apart, touching, crossing or coplanar. The result is exact
+ * for all finite doubles.
  *
  * If the planes of the faces intersect in a line, the corners of each face are reordered so that
  * the first corner is alone on its side of the other plane. Each face intersects the line in an
@@ -20,8 +20,8 @@
 
 /* --- faces and segments in one plane, projected along an axis --- */
 
-/* The projected corners of a face or segment, in order. A segment has two corners; both sides of
- * the segment are outer sides. */
+/* The projected corners of a face or segment, in order. A segment has two corners. Both sides of a
+ * segment count as outer sides. */
 typedef struct projection {
     double corner[3][2];
     int corners;
@@ -214,16 +214,17 @@ static bool all_on_one_side(const int side[3])
 
 static bool all_in_plane(const int side[3]) { return !(side[0] | side[1] | side[2]); }
 
-/* Returns true if corners are strictly on both sides of the plane; otherwise the face at most
- * touches the plane. */
+/* Returns true if corners are strictly on both sides of the plane. If not, the face at most touches
+ * the plane. */
 static bool on_both_sides(const int side[3])
 {
     bool above = side[0] > 0 || side[1] > 0 || side[2] > 0;
     return above && (side[0] < 0 || side[1] < 0 || side[2] < 0);
 }
 
-/* Returns the first of these corners that exists: the only corner on the positive side of the
- * plane, the only corner on the negative side, the only corner in the plane. */
+/* Returns the corner that is alone on its side of the plane. Tries in this order: the only corner
+ * on the positive side, the only corner on the negative side, the only corner in the plane. Returns
+ * the first corner that is found. */
 static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };
@@ -237,8 +238,8 @@ static int corner_alone(const int side[3])
 }
 
 /* Reorders the corners cyclically so that the corner that is alone on its side of the other face's
- * plane comes first. Returns true if this corner is below another corner; then the other face's
- * plane must be flipped. */
+ * plane comes first. Returns true if the plane of the other face must be flipped, so that this
+ * corner is on its positive side. side[i]: side of corner i. */
 static bool reorder_corners(const int side[3], int corner[3])
 {
     corner[0] = corner_alone(side);

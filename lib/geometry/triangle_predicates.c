@@ -1,13 +1,14 @@
 /* Computes predicates on a triangle from orientation predicates only, so that they are exact.
  *
- * Crossings of a segment along an axis: both ends are shifted by infinitely small amounts, so that
- * no case is degenerate (Edelsbrunner and Muecke, "Simulation of Simplicity", 1990).
+ * For crossings with a segment along an axis, both ends of the segment are shifted by infinitely
+ * small amounts. So no case is degenerate (Edelsbrunner and Muecke, "Simulation of Simplicity",
+ * 1990). predicates.h defines this shift.
  *
- * Boxes: a triangle and a box are disjoint exactly when they are separated along one of 13 axes:
- * the axes of the box, the triangle's normal, and the cross products of an axis of the box with an
- * edge of the triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine tests use
- * projections along an axis of the box. The projected box is a rectangle, and the test is whether
- * this rectangle is beyond an edge of the projected triangle. */
+ * A triangle and a box are disjoint if and only if one of 13 axes separates them (Gottschalk, Lin
+ * and Manocha 1996). These are the three axes of the box, the triangle's normal, and the nine cross
+ * products of an axis of the box with an edge of the triangle. The tests of the nine cross products
+ * use projections along an axis of the box. The projected box is a rectangle, and the test is
+ * whether this rectangle is beyond an edge of the projected triangle. */
 #include "core/strict_fp.h"
 
 #include "geometry/predicates.h"
@@ -31,10 +32,10 @@ bool ebpo_zero_area(const double a[3], const double b[3], const double c[3])
            ebpo_normal_sign(1, a, b, c) == 0;
 }
 
-/* Returns the side of the shifted point p relative to the line a-b, all projected along `axis`,
- * positive to the left; 0 only when a and b coincide in this projection. The shift changes the
- * orientation by (a_v - b_v) d_u + (b_u - a_u) d_v, where d_u and d_v are the shifts. The lower of
- * the axes u and v has the larger shift. */
+/* Returns the side of the shifted point p relative to the line from a to b, in the projection along
+ * `axis`: 1 to the left, -1 to the right. Returns 0 only when a and b coincide in this projection.
+ * The shift changes the orientation by (a_v - b_v) d_u + (b_u - a_u) d_v, where d_u and d_v are the
+ * shifts. The lower of the axes u and v has the larger shift. */
 static int shifted_side2d(int axis, const double a[3], const double b[3], const double p[3])
 {
     int sign = ebpo_normal_sign(axis, a, b, p);
@@ -47,8 +48,8 @@ static int shifted_side2d(int axis, const double a[3], const double b[3], const 
     return by_v != 0 ? by_v : by_u;
 }
 
-/* Returns the side of the shifted point p relative to the plane of a, b, c; the shift changes the
- * orientation by normal . (d0, d1, d2). */
+/* Returns the side of the shifted point p relative to the plane of a, b, c. The shift (d0, d1, d2)
+ * changes the orientation by normal . (d0, d1, d2). */
 static int shifted_side3d(const double a[3], const double b[3], const double c[3],
                           const double p[3])
 {
@@ -93,7 +94,7 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
     return -turn;
 }
 
-/* Returns true when p is on the closed segment a-b, which may be a point. */
+/* Returns true when p is on the closed segment from a to b, which may be a point. */
 static bool point_on_segment(const double p[3], const double a[3], const double b[3])
 {
     for (int k = 0; k < 3; k++)
@@ -121,7 +122,8 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
 
 /* --- triangles and boxes --- */
 
-/* The projections of the triangle and the box along one axis. */
+/* The projections of the triangle and the box along one axis. The projected box is the rectangle
+ * from min to max. */
 typedef struct shadow {
     double corner[3][2], min[2], max[2];
     int turn; /* sign of the projected area */
@@ -146,7 +148,8 @@ static shadow shadow_along(int axis, const double triangle[3][3], const double m
  * to b, without touching the line. */
 static bool rectangle_on_side(const shadow *s, const double a[2], const double b[2], int side)
 {
-    /* Tests the corner of the rectangle that is farthest to the other side. */
+    /* Tests only the corner of the rectangle that is farthest in the direction of the other side.
+     */
     bool far_x = side > 0 ? b[1] < a[1] : b[1] > a[1], far_y = side > 0 ? b[0] > a[0] : b[0] < a[0];
     const double corner[2] = { far_x ? s->min[0] : s->max[0], far_y ? s->min[1] : s->max[1] };
     return ebpo_orient2d(a, b, corner) == side;

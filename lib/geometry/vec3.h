@@ -48,8 +48,9 @@ static inline double ebpo_max3(double a, double b, double c)
     return high > c ? high : c;
 }
 
-/* Returns the length to a relative error of 2^-50 or an absolute error of 2^-1073, also where
- * squares overflow or underflow; INFINITY when the length itself overflows. */
+/* Returns the length with a relative error of at most 2^-50 or an absolute error of at most
+ * 2^-1073. The squares may overflow or underflow. Returns INFINITY when the length itself
+ * overflows. */
 static inline double ebpo_vec3_scaled_length(const double v[3])
 {
     double square = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];

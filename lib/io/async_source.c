@@ -1,13 +1,13 @@
 /* Provides sources of files whose bytes arrive asynchronously (ebpo/async.h). The bytes that the
  * caller supplies are stored in extents (ranges of the file), in order and without overlaps. A read
  * copies from extents. If bytes are missing, the read records its range as wanted and returns
- * EBPO_E_PENDING. The ranges of prefetch hints are also recorded, so the caller fetches all ranges
- * that are needed next together.
+ * EBPO_E_PENDING. A prefetch hint announces ranges that will be read soon. These ranges are also
+ * recorded as wanted, so the caller can fetch all ranges that are needed next in one round.
  *
  * An operation is a call that the caller repeats until all bytes are available. A clock counts
- * reads, supplied ranges and operations. An extent that was used since the oldest running operation
- * began is never removed. So, while an operation is repeated, available bytes never become missing
- * again, which limits the number of repetitions. */
+ * reads, supplied ranges and operations; its count serves as the time. An extent is never removed
+ * if it was used after the oldest running operation began. So, while an operation is repeated,
+ * available bytes never become missing again, which limits the number of repetitions. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -19,13 +19,15 @@
 #include "core/error.h"
 
 enum {
-    HEAD_BYTES = 131072,   /* the first bytes, which opening reads (EBPO_HTTP_HEAD for URLs) */
+    HEAD_BYTES = 131072,   /* the head: the first bytes of the file, which opening reads */
     RANGE_BYTES = 4 << 20, /* maximum size of a needed range */
-    /* smaller gaps between needed ranges are also fetched, which is faster than another request */
+    /* If the gap between two needed ranges is at most this, the gap is also fetched, because this
+     * is faster than another request. */
     GAP_BYTES = 16384,
     GAP_BYTES_OF_MANY = 32768, /* used instead of GAP_BYTES for more than MANY ranges */
     MANY = 256,
-    COMPACT_COUNT = 1 << 16 /* the wanted ranges are merged whenever this number was added */
+    COMPACT_COUNT =
+        1 << 16 /* the wanted ranges are merged whenever their number is a multiple of this */
 };
 
 /* Supplied bytes [begin, end) of the file. */
@@ -41,8 +43,8 @@ struct ebpo_async {
     uint64_t size;        /* bytes of the file */
     uint64_t memory;      /* limit of the bytes in extents */
     uint64_t held;        /* bytes in extents */
-    bool changed;         /* true: the file has changed, so that every call fails */
-    uint64_t clock;       /* see the head comment */
+    bool changed;         /* true: the file has changed; every further call fails */
+    uint64_t clock;       /* number of reads, supplied ranges and operations so far */
     extent *extents;      /* [extent_count] by offset */
     uint64_t extent_count, extent_capacity;
     ebpo_range *wanted; /* [wanted_count] ranges of pending reads and of hints, in any order */
@@ -51,12 +53,13 @@ struct ebpo_async {
     uint64_t needed_capacity;
     uint64_t *running; /* [running_count] times at which running operations began, ascending */
     uint64_t running_count, running_capacity;
-    uint64_t unlisted; /* number of running operations that are not listed, for lack of memory */
+    uint64_t unlisted; /* number of running operations that are not in `running`, because memory was
+                          short */
 };
 
-/* --- extents; the lock is held in the functions below, except where noted --- */
+/* --- extents; callers of the functions below hold the lock --- */
 
-/* Returns the first extent that ends after `at`. */
+/* Returns the index of the first extent that ends after the offset `at`. */
 static uint64_t find_extent(const ebpo_async *a, uint64_t at)
 {
     uint64_t low = 0, high = a->extent_count;
@@ -70,7 +73,8 @@ static uint64_t find_extent(const ebpo_async *a, uint64_t at)
     return low;
 }
 
-/* Returns the first missing part of [begin, end); an empty range at `end` if no byte is missing. */
+/* Returns the first missing part of the bytes [begin, end). If no byte is missing, returns an empty
+ * range at `end`. */
 static ebpo_range first_missing(const ebpo_async *a, uint64_t begin, uint64_t end)
 {
     uint64_t i = find_extent(a, begin);
@@ -88,7 +92,7 @@ static bool is_available(const ebpo_async *a, uint64_t begin, uint64_t end)
     return first_missing(a, begin, end).size == 0;
 }
 
-/* Copies available bytes. */
+/* Copies the bytes [begin, end), all of which are available, to `to`. */
 static void copy_bytes(ebpo_async *a, uint64_t begin, uint64_t end, uint8_t *to)
 {
     for (uint64_t i = find_extent(a, begin); begin < end; i++) {
@@ -146,9 +150,9 @@ static int compare_use(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Returns the time of last use up to which removable extents must be removed to meet the memory
- * limit. If removing all of them does not suffice, returns the time of the newest one. Returns 0 if
- * no extent can be removed. */
+/* Returns a time. To meet the memory limit, all removable extents whose last use is not after this
+ * time must be removed. If this does not suffice, returns the latest time of a removable extent.
+ * Returns 0 if no extent can be removed. */
 static uint64_t find_removal_time(const ebpo_async *a)
 {
     uint64_t count = 0, last = 0, excess = a->held - a->memory;
@@ -219,8 +223,8 @@ static bool record_wanted(ebpo_async *a, ebpo_range range)
     return true;
 }
 
-/* Adds the missing parts of [begin, end) to the needed ranges, divided into ranges of about equal
- * size and at most RANGE_BYTES. Returns false when memory is short. */
+/* Adds the missing parts of [begin, end) to the needed ranges. Divides a large part into ranges of
+ * about equal size and at most RANGE_BYTES. Returns false when memory is short. */
 static bool add_needed(ebpo_async *a, uint64_t begin, uint64_t end, uint64_t *count)
 {
     for (ebpo_range m = first_missing(a, begin, end); m.size;
@@ -273,7 +277,7 @@ static void async_prefetch(void *user, const ebpo_range *ranges, size_t count)
     for (size_t i = 0; i < count; i++)
         if (!is_available(a, ranges[i].offset, ranges[i].offset + ranges[i].size) &&
             !record_wanted(a, ranges[i]))
-            break; /* memory is short: the remaining ranges have no hint */
+            break; /* memory is short: the remaining hints are dropped */
     pthread_mutex_unlock(&a->lock);
 }
 
@@ -384,8 +388,8 @@ ebpo_status ebpo_async_needed(ebpo_async *a, const ebpo_range **ranges, size_t *
     return status;
 }
 
-/* Returns true if the version is the version of the file. The first version that is not "" becomes
- * the version of the file. */
+/* Returns true if `version` is NULL or the version of the file. The first version that is not ""
+ * becomes the version of the file. */
 static bool check_version(ebpo_async *a, const char *version)
 {
     if (!version || strcmp(version, a->version) == 0)
@@ -407,7 +411,7 @@ static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end, c
     for (ebpo_range m = first_missing(a, begin, end); m.size;
          m = first_missing(a, m.offset + m.size, end)) {
         if (m.offset < HEAD_BYTES && m.offset + m.size > HEAD_BYTES)
-            /* no extent crosses the end of the head, because only later bytes may be removed */
+            /* no extent crosses the end of the head, because bytes of the head are never removed */
             m.size = HEAD_BYTES - m.offset;
         if (!insert_extent(a, m.offset, m.offset + m.size, bytes + (m.offset - begin)))
             return ebpo_fail_memory(error, m.size);

@@ -158,8 +158,8 @@ ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 }
 
 /* Returns the number of bytes at the beginning of the file that the source already had when the
- * input was opened. ebpo_input_open adds these bytes to input->bytes, so reads of them add nothing.
- */
+ * input was opened. ebpo_input_open counts these bytes in input->bytes, so later reads do not count
+ * them again. */
 static uint64_t bytes_prefetched(const ebpo_input *input)
 {
     return input->source.prefetched < input->source.size ? input->source.prefetched
@@ -202,7 +202,8 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
-    if (status != EBPO_E_PENDING) { /* a pending read is repeated later, and counted then */
+    if (status !=
+        EBPO_E_PENDING) { /* a pending read will be repeated; only the last attempt is counted */
         atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
                                   memory_order_relaxed);
         atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
@@ -234,7 +235,7 @@ bool ebpo_is_url(const char *name)
     return strncasecmp(name, "http://", 7) == 0 || strncasecmp(name, "https://", 8) == 0;
 }
 
-/* Appends as much of the text as fits. Returns the new length. */
+/* Appends `text` to `out`, cut to the capacity. Returns the new length. */
 static size_t append_text(char *out, size_t used, size_t capacity, const char *text, size_t length)
 {
     size_t space = capacity - 1 - used, taken = length < space ? length : space;

@@ -37,15 +37,16 @@ void ebpo_input_close(ebpo_input *input);
 
 /* Reads bytes [offset, offset + size) into `data`. Returns EBPO_E_FORMAT if they are beyond the end
  * of the source, because only a damaged file leads to such an offset. Otherwise returns the status
- * of the source's function `read`; adds a message if this function has failed without a message. */
+ * of the source's function `read`, and adds a message if `read` fails without a message. */
 EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size,
                                           void *data, ebpo_error *error);
 
-/* Returns the descriptor of the file, which the input still owns. Returns -1 if the input does not
- * read a file, or reads a copy instead of the named file (ebpo_open_compat). */
+/* Returns the descriptor of the file; the input keeps owning the descriptor. Returns -1 if the
+ * input does not read a file, or reads a copy instead of the named file (ebpo_open_compat). */
 int ebpo_input_descriptor(const ebpo_input *input);
 
-/* Returns true if the source accepts prefetch hints, as sources for remote files do. */
+/* Returns true if the source accepts prefetch hints, which announce ranges that will be read soon.
+ * Sources for remote files accept them. */
 static inline bool ebpo_input_prefetches(const ebpo_input *input)
 {
     return input->source.prefetch != NULL;

@@ -1,7 +1,8 @@
 /* Locks the file at a path: makes a lock file in the same folder, and locks the lock file by flock.
- * The system releases this lock when the process ends. If another process has removed the lock file
- * before it is locked, a new lock file is made. Locks affect only programs that use this library,
- * and some file systems have no locks, so replacing a file also compares versions (publish.c). */
+ * The system releases this lock when the process ends. If another process removes the lock file
+ * between opening and locking, a new lock file is made. Locks affect only programs that use this
+ * library, and some file systems have no locks, so replacing a file also compares versions
+ * (publish.c). */
 #include "io/file_lock.h"
 
 #include <errno.h>
@@ -21,9 +22,9 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-/* Opens the lock file, and makes it if necessary. Opens it for writing, because locks over NFS
- * require this; opens it for reading if it belongs to another user. Returns -1 with errno on
- * failure; EACCES: the lock file cannot be made or read. */
+/* Opens the lock file, and makes the file if necessary. Opens it for writing, because locks over
+ * NFS require this, or only for reading if the file belongs to another user. Returns -1 with errno
+ * on failure. EACCES: the lock file cannot be made or read. */
 static int open_lock_file(const char *path)
 {
     enum { FLAGS = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
@@ -44,7 +45,7 @@ static bool is_lock_file(int fd)
 }
 
 /* Returns true if the descriptor's file still has the name `path`. The previous holder of the lock
- * removes the name. */
+ * may have removed the name. */
 static bool has_its_name(int fd, const char *path)
 {
     struct stat opened, named;

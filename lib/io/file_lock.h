@@ -26,10 +26,10 @@ typedef struct ebpo_file_lock {
 #define EBPO_FILE_LOCK_SAVING 10.0
 
 /* Waits up to `seconds` for the lock of the file at `path`, which need not exist. Reports the stage
- * "waiting" to `progress`, which may be NULL. Also returns EBPO_OK, with fd = -1, where locking is
- * not possible: on file systems without locks, in folders without write permission, or where the
- * lock file's name belongs to a file that is not empty. EBPO_E_IO: another program still has the
- * lock. EBPO_E_CANCELLED: `progress` has stopped the call. EBPO_E_MEMORY. */
+ * "waiting" to `progress`, which may be NULL. If locking is not possible, returns EBPO_OK and sets
+ * lock->fd to -1. This happens if the file system has no locks, if the folder has no write
+ * permission, or if a file with the lock file's name is not empty. EBPO_E_IO: another program still
+ * has the lock. EBPO_E_CANCELLED: `progress` has stopped the call. EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path,
                                               double seconds, const ebpo_progress *progress,
                                               ebpo_error *error);

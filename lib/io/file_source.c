@@ -1,7 +1,7 @@
 /* Reads complete files (meshes, images, scenes) into memory or a workspace. A file that changes
- * while it is read is rejected. The size and the times of the file show a change; if the times are
- * not reliable, the bytes are compared. A file whose name comes from another file is opened only
- * below a given folder, with one system call (openat2) if available. Files of other kinds are
+ * while it is read is rejected. The size and the times of the file show a change. If the times are
+ * not reliable, the bytes are compared. If the name of a file comes from another file, it is opened
+ * only below a given folder, with one system call (openat2) if available. Files of other kinds are
  * recognised by their first bytes, and the message gives a remedy. */
 #include <errno.h>
 #include <fcntl.h>
@@ -29,8 +29,8 @@ enum {
     FRESH_NS = 100000000  /* see is_fresh */
 };
 
-/* Returns true if the last change was less than 0.1 s ago, or is in the future. A later change
- * may then have the same file time, because file times have steps of some milliseconds. */
+/* Returns true if the last change was less than 0.1 s ago, or has a time in the future. Then a
+ * further change may get the same file time, because file times have steps of some milliseconds. */
 static bool is_fresh(const struct stat *st)
 {
     struct timespec now;
@@ -133,7 +133,7 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
                              "reading", error);
 }
 
-/* Compares the file's current content with the loaded bytes. *equal: true if they are equal. */
+/* Compares the file's current content with the loaded bytes, and sets *equal to the result. */
 static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *equal,
                                  ebpo_error *error)
 {
@@ -217,8 +217,8 @@ ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)
 
 enum { FLAGS = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY };
 
-/* Opens a file with openat2. *fd: descriptor, or -1 with errno. Returns false if the system does
- * not have this call, or a filter of system calls forbids it. */
+/* Opens the file `name` below the folder `top` with openat2. *fd: descriptor, or -1 with errno.
+ * Returns false if the system does not have this call, or a filter of system calls forbids it. */
 static bool open_at_once(int top, const char *name, int *fd)
 {
 #ifdef EBPO_HAVE_OPENAT2
@@ -231,8 +231,8 @@ static bool open_at_once(int top, const char *name, int *fd)
 #endif
 }
 
-/* Opens the folders of the path one after the other, then the file, without following links.
- * Returns a descriptor, or -1 with errno. Changes `name`. */
+/* Opens the folders of the path `name`, which begins in the folder `top`, one after the other. Then
+ * opens the file. Does not follow links. Returns a descriptor, or -1 with errno. Changes `name`. */
 static int open_folder_by_folder(int top, char *name)
 {
     char *remaining = NULL, *word = strtok_r(name, "/", &remaining), *next;
@@ -281,7 +281,7 @@ int ebpo_open_below(const char *folder, const char *name)
 /* Number of bytes that ebpo_bytes_are_text checks. */
 enum { CHECKED_BYTES = 512 };
 
-/* Kinds of files by their first bytes. */
+/* Kinds of files that are recognised by their first bytes. */
 static const struct {
     const char *bytes;
     size_t count;     /* number of these bytes */
@@ -331,7 +331,8 @@ static bool begins_with(const char *text, uint64_t size, const char *word)
     return size >= n && strncasecmp(text, word, n) == 0;
 }
 
-/* Recognises HTML and XML, also after white space. Returns a description and a remedy, or NULL. */
+/* Recognises HTML and XML; white space may precede them. Returns a description and a remedy, or
+ * NULL. */
 static const char *find_markup(const char *text, uint64_t size)
 {
     for (; size && (*text == ' ' || (*text >= '\t' && *text <= '\r')); size--)

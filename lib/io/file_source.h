@@ -17,8 +17,8 @@ typedef struct ebpo_whole_file {
     void *buffer;              /* allocated memory that holds `data`, or NULL */
     ebpo_workspace *workspace; /* workspace that contains `buffer`, or NULL */
     int fd;                    /* stays open, for ebpo_whole_file_unchanged */
-    /* times of the last change before opening. `fresh`: this change was so recent that a further
-     * change may get the same times */
+    /* times of the last change before opening. `fresh`: true if this change was so recent that a
+     * further change may get the same times */
     int64_t mtime_s, mtime_ns, ctime_s, ctime_ns;
     bool fresh;
 } ebpo_whole_file;
@@ -34,8 +34,8 @@ typedef struct ebpo_whole_file {
 EBPO_MUST_USE ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path,
                                                ebpo_error *error);
 
-/* Same as ebpo_whole_file_open for a descriptor, which is closed with the file, or on failure.
- * `path` is for messages. */
+/* Same as ebpo_whole_file_open, for an open descriptor. The descriptor is closed together with the
+ * file, or on failure. `path` is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, const char *path,
                                                ebpo_error *error);
 
@@ -51,10 +51,10 @@ EBPO_MUST_USE ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_works
 EBPO_MUST_USE ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void *to,
                                                uint64_t bytes, const char *path, ebpo_error *error);
 
-/* Returns EBPO_E_IO if the file has changed since opening: the bytes that were read may then be a
- * mixture of two versions. Compares the size and the time of the last change. If this time is not
- * reliable and the file is loaded, also compares the content with `data`. If another file is
- * renamed to `path`, this is no change, because `file` still reads the old file. */
+/* Returns EBPO_E_IO if the file has changed since opening, because the bytes that were read may be
+ * a mixture of two versions. Compares the size and the time of the last change. If this time is not
+ * reliable and the file is loaded, also compares the content with `data`. A file that is renamed to
+ * `path` does not count as a change, because `file` still reads the old file. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path,
                                                     ebpo_error *error);
 
