@@ -1,11 +1,12 @@
 /* Caches fetched parts of a file on a server, in memory and in a folder on disk. The ranges in
  * memory are in order and without overlaps. One request fetches a range, which stays in memory
- * while the limit allows. Ranges that were read least recently are dropped first; ranges with a
- * prefetch hint that are not read yet are dropped last. The cache folder, if the caller has named
- * one, contains blocks (parts of equal size) as files. A block's file has a SHA-256, and its name
- * contains a digest of URL and version. Blocks are written under temporary names, so any number of
- * processes may share the folder. When the folder's limit is reached, the blocks that were used
- * least recently are removed. Missing or damaged blocks are fetched from the server. */
+ * while the memory limit allows. A prefetch hint is a list of ranges that will be read soon. Ranges
+ * that were read least recently are dropped first. Ranges of a hint that are not read yet are
+ * dropped last. The cache folder, if the caller has named one, contains blocks (parts of equal
+ * size) as files. A block's file has a SHA-256, and its name contains a digest of URL and version.
+ * Blocks are written under temporary names, so any number of processes may share the folder. When
+ * the folder's limit is reached, the blocks that were used least recently are removed. Missing or
+ * damaged blocks are fetched from the server. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -36,13 +37,13 @@ enum {
 };
 static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block",
                                       TEMPORARY[] = ".ebpo-part-";
-/* an older temporary file was left by a process that has ended */
+/* a temporary file that is older than this was left by a process that has ended */
 static const double STALE_SECONDS = 3600;
 
 struct ebpo_disk {
-    int folder;            /* descriptor of the folder */
-    uint64_t limit;        /* maximum number of bytes of all blocks in the folder */
-    char key[65];          /* digest of URL and version: beginning of the blocks' names */
+    int folder;     /* descriptor of the folder */
+    uint64_t limit; /* maximum number of bytes of all blocks in the folder */
+    char key[65];   /* digest of URL and version; the names of the blocks' files begin with it */
     pthread_mutex_t lock;  /* protects `written` and `number` */
     uint64_t written;      /* bytes that were written since the last trim_folder */
     uint64_t number;       /* number of the next temporary file */
@@ -60,8 +61,8 @@ static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t
     ebpo_sha256_end(&sha, out);
 }
 
-/* Makes the key. The block size is part of the key only if it is not the default, so that blocks of
- * the default size keep the names that they had before other sizes existed. */
+/* Makes the key. The digest includes the block size only if this size is not the default. So blocks
+ * of the default size keep the names that they had before other sizes existed. */
 static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_http_version *v)
 {
     uint8_t size[8], of_block[8], out[32];
@@ -158,9 +159,9 @@ void ebpo_disk_held(const ebpo_disk *d, uint64_t *held, uint64_t *others)
     *others = d->others;
 }
 
-/* If the blocks take more than 7/8 of the limit, removes the least recently used blocks until they
- * take at most 3/4. Called whenever an eighth of the limit has been written, so that the blocks of
- * a single process stay below the limit. */
+/* If the blocks take more than 7/8 of the limit, removes the least recently used blocks until the
+ * rest takes at most 3/4 of the limit. Called whenever an eighth of the limit has been written, so
+ * that the blocks of a single process stay below the limit. */
 static void trim_folder(ebpo_disk *d)
 {
     uint64_t count, bytes;
@@ -200,7 +201,7 @@ static bool make_folder(const char *folder)
     memcpy(path, folder, length + 1);
     for (char *slash = strchr(path + 1, '/'); length && slash; slash = strchr(slash + 1, '/')) {
         *slash = 0;
-        (void)mkdir(path, 0777); /* if this fails, the next call reports it */
+        (void)mkdir(path, 0777); /* if this fails, the last mkdir fails too and reports the error */
         *slash = '/';
     }
     return mkdir(path, 0777) == 0 || errno == EEXIST;
@@ -212,7 +213,8 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     *out = NULL;
     int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !is_writable(fd)) {
-        /* false if too many files are open or memory is short: another folder does not help */
+        /* false if too many files are open or memory is short, because then another folder does not
+         * help */
         bool by_folder = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
         ebpo_status status =
             ebpo_fail_file(error, by_folder ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
@@ -348,8 +350,8 @@ static void put_block(ebpo_disk *d, uint64_t block, const void *data, size_t siz
 /* --- ranges in memory --- */
 
 enum {
-    /* smaller gaps between hinted ranges are also fetched, because this takes less time than
-     * another request */
+    /* If the gap between two hinted ranges is at most this, the gap is also fetched, because this
+     * takes less time than another request. */
     GAP_BYTES = 16384,
     MANY = 256, /* if a hint has more ranges, GAP_BYTES_OF_MANY is used instead */
     GAP_BYTES_OF_MANY = 32768,
@@ -358,31 +360,34 @@ enum {
 };
 
 typedef enum range_state {
-    RANGE_NOTED,    /* nothing is fetched or requested */
+    RANGE_NOTED,    /* the range is recorded, but nothing is fetched or requested yet */
     RANGE_LOADING,  /* a thread reads the range from disk */
     RANGE_COMING,   /* `request` is sent or done */
     RANGE_IN_MEMORY /* `data` has all bytes */
 } range_state;
 
 struct ebpo_cached_range {
-    uint64_t begin, end; /* bytes of the file */
+    uint64_t begin, end; /* the bytes [begin, end) of the file */
     uint64_t wanted;     /* hinted bytes that are not read yet */
     uint64_t last_hint;  /* number of the last prefetch hint that included the range */
-    uint64_t used;       /* time of the last read; see `clock` of ebpo_range_cache */
-    bool fresh;          /* the range counts the bytes of the current prefetch hint (add_wanted) */
+    uint64_t used;       /* time of the last read, by ebpo_range_cache.clock */
+    bool fresh; /* true while add_wanted must add the bytes of the current prefetch hint to `wanted`
+                 */
     range_state state;
     unsigned users; /* number of threads that need the range to stay in the list */
-    bool demanded;  /* a reader waits for the range, and returns the error of the request */
-    bool to_store;  /* the range is to be written to disk when it has been fetched */
-    /* the part of the range that is requested; blocks before and after it came from disk */
+    bool demanded; /* true: a reader waits for the range, and returns the error if the request fails
+                    */
+    bool to_store; /* true: after the fetch, the range must be written to disk */
+    /* the part of the range that is requested; the blocks before and after this part came from disk
+     */
     uint64_t fetch_begin, fetch_end;
     ebpo_request request;
     uint8_t *data; /* [end - begin] */
 };
 
-/* --- the list; lock held in the functions below, except where noted --- */
+/* --- the list; callers of the functions below hold the lock, except where noted --- */
 
-/* Returns the first range that ends after `at`. */
+/* Returns the index of the first range that ends after the offset `at`. */
 static uint64_t find_range(const ebpo_range_cache *p, uint64_t at)
 {
     uint64_t low = 0, high = p->count;
@@ -434,9 +439,9 @@ static bool insert_range(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64
     return true;
 }
 
-/* Inserts ranges for [begin, end) from index i on. The ranges are about equally large and have at
- * most EBPO_RANGE_BYTES bytes; inner boundaries are boundaries of blocks. Returns false when memory
- * is short. */
+/* Inserts ranges for the bytes [begin, end) into the list, from index i on. The ranges are about
+ * equally large and have at most EBPO_RANGE_BYTES bytes. The boundaries between these ranges are
+ * boundaries of blocks. Returns false when memory is short. */
 static bool insert_ranges(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     uint64_t number = (end - begin + EBPO_RANGE_BYTES - 1) / EBPO_RANGE_BYTES;
@@ -473,15 +478,16 @@ static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 
 /* --- fetching --- */
 
-/* Returns true if a range that ends at `end` contains the whole block that begins at `at`. The last
- * block of the file ends with the file. Only whole blocks are stored on disk. */
+/* Returns true if a whole block begins at `at` and is in a range that ends at `end`. The last block
+ * of the file ends with the file. Only whole blocks are stored on disk. */
 static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 {
     return at % p->block == 0 && (end - at >= p->block || end == p->size);
 }
 
-/* Reads blocks of a range from disk, from both ends inwards. Releases the lock while it reads. Sets
- * fetch_begin and fetch_end to the part in the middle that must be requested. */
+/* Reads blocks of a range from disk: from its begin forwards, and from its end backwards, up to the
+ * first missing block. Releases the lock while it reads. Sets fetch_begin and fetch_end to the part
+ * in between, which must be requested. */
 static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
 {
     uint64_t begin = range->begin, end = range->end, loaded = 0;
@@ -517,9 +523,9 @@ static bool is_idle(const ebpo_cached_range *range)
             (range->state == RANGE_COMING && range->request.done));
 }
 
-/* Drops the range that was read least recently. If all ranges still have hinted bytes to read,
- * drops the range with the oldest hint, if this hint is old (STALE_AFTER). Returns false if no
- * range can be dropped. */
+/* Drops one range. Prefers the least recently read range among those without hinted bytes to read.
+ * If there is none, drops the range with the oldest hint, but only if STALE_AFTER later hints were
+ * given. Returns false if no range can be dropped. */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
@@ -540,15 +546,15 @@ static bool forget_one(ebpo_range_cache *p)
     return true;
 }
 
-/* Drops ranges until `bytes` more bytes are within the limit, as far as possible. */
+/* Drops ranges until `bytes` more bytes are within the limit, or no range can be dropped. */
 static void reserve_space(ebpo_range_cache *p, uint64_t bytes)
 {
     while (p->held + bytes > p->held_limit && forget_one(p))
         ;
 }
 
-/* Loads a range with the state RANGE_NOTED from disk, and requests the missing part. Returns false
- * when memory is short. */
+/* Loads a range with the state RANGE_NOTED from disk, and requests the part that is not on disk.
+ * Returns false when memory is short. */
 static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool urgent)
 {
     range->users++; /* so that reserve_space does not drop this range */
@@ -581,7 +587,7 @@ static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool ur
 }
 
 /* Ends this thread's use of a range, after it has read `read` bytes of the range. The data stay
- * until the memory is needed, unless the request has failed. */
+ * until the memory is needed. If the request has failed, drops the data at once. */
 static void release_range(ebpo_range_cache *p, ebpo_cached_range *range, uint64_t read)
 {
     range->users--;
@@ -598,7 +604,7 @@ static void release_range(ebpo_range_cache *p, ebpo_cached_range *range, uint64_
         remove_at(p, find_range(p, range->begin));
 }
 
-/* Requests the hinted ranges from an offset on, as far as the limit allows. */
+/* Requests the hinted ranges from an offset on, until the memory limit is reached. */
 static void read_ahead(ebpo_range_cache *p, uint64_t from)
 {
     for (uint64_t i = find_range(p, from); i < p->count; i = find_range(p, from)) {
@@ -623,8 +629,8 @@ static int by_offset(const void *a, const void *b)
     return x->offset < y->offset ? -1 : x->offset > y->offset;
 }
 
-/* Adds the bytes of a hinted range to `wanted` of the cached ranges that contain them and are
- * fresh. Other ranges have counted these bytes for an earlier hint. */
+/* Adds the bytes of a hinted range to `wanted` of the fresh cached ranges that contain these bytes.
+ * Cached ranges that are not fresh have counted the bytes for an earlier hint. */
 static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
 {
     uint64_t begin = hinted->offset, end = begin + hinted->size;
@@ -638,8 +644,8 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
     }
 }
 
-/* Makes cached ranges for the hinted ranges, which are sorted. Hinted ranges that are close
- * together become one cached range. */
+/* Makes cached ranges for the hinted ranges, which must be sorted by offset. Hinted ranges that are
+ * close together become one cached range. */
 static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
     uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
@@ -656,7 +662,8 @@ static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t 
     uint64_t first = find_range(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
-        /* all hinted bytes of the range were read before, and are needed again */
+        /* All hinted bytes of the range were read before. The new hint shows that they are needed
+         * again. */
         p->range[i]->fresh |= p->range[i]->wanted == 0;
     for (size_t i = 0; i < count; i++)
         add_wanted(p, &sorted[i]);
@@ -696,7 +703,7 @@ static void store_blocks(ebpo_range_cache *p, ebpo_cached_range *range)
     pthread_mutex_lock(&p->lock);
 }
 
-/* Returns true if a range has been fetched and is to be written to disk. */
+/* Returns true if a range has been fetched and must be written to disk. */
 static bool is_to_be_stored(const ebpo_cached_range *range)
 {
     return range->to_store && (range->state == RANGE_IN_MEMORY ||
@@ -704,8 +711,9 @@ static bool is_to_be_stored(const ebpo_cached_range *range)
                                 range->request.status == EBPO_OK));
 }
 
-/* Stores on disk one range that has been fetched but not read, so that its bytes are not lost when
- * the process ends. Returns false if there is no such range. Releases the lock while it writes. */
+/* Stores one fetched range on disk, also if it was not read yet, so that its bytes are not lost
+ * when the process ends. Returns false if no range must be stored. Releases the lock while it
+ * writes. */
 static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
@@ -720,8 +728,8 @@ static bool store_one(ebpo_range_cache *p)
     return false;
 }
 
-/* Waits until a range that this thread uses is in memory. If the request has failed while no reader
- * waited, requests the range again. */
+/* Waits until a range is in memory. The caller has counted itself in range->users. If the request
+ * has failed while no reader waited, requests the range again. */
 static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, ebpo_error *error)
 {
     while (range->state != RANGE_IN_MEMORY) {
@@ -754,13 +762,14 @@ static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, eb
     return EBPO_OK;
 }
 
-/* Reads bytes from *at on, as far as one range contains them, but not beyond `end`. Advances *at.
- */
+/* Reads bytes from *at up to `end`, but not beyond the end of the range that contains *at. Moves
+ * *at past the bytes that were read. */
 static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, uint8_t *data,
                               ebpo_error *error)
 {
     uint64_t i = find_range(p, *at);
-    if (i == p->count || p->range[i]->begin > *at) { /* the range was dropped in the meantime */
+    if (i == p->count ||
+        p->range[i]->begin > *at) { /* the range was dropped since cover_range made it */
         if (!cover_range(p, *at, end))
             return ebpo_fail_memory(error, end - *at);
         i = find_range(p, *at);
@@ -780,7 +789,7 @@ static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, u
     return status;
 }
 
-/* Requests the cached ranges of [begin, end) at the same time, as far as the limit allows. */
+/* Requests all cached ranges of [begin, end) together, until the memory limit is reached. */
 static void begin_read(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = find_range(p, begin); i < p->count && p->range[i]->begin < end;

@@ -17,8 +17,8 @@ enum {
 };
 _Static_assert(EBPO_HTTP_HEAD % EBPO_DISK_BLOCK == 0, "blocks would begin within the head");
 
-/* The blocks of a cache folder. Each block is a separate file with a checksum. The file's name
- * consists of the digest of URL and version, and the block's index. A block is written under a
+/* The blocks of a cache folder. Each block is a separate file with a checksum. The name of this
+ * file consists of a digest of URL and version, and the block's index. A block is written under a
  * temporary name and then renamed, so any number of processes may share the folder. A failure of
  * the folder is never an error: blocks that cannot be read or are damaged count as missing, and
  * failed writes are ignored. Any thread may call these functions. */
@@ -30,15 +30,15 @@ typedef struct ebpo_disk ebpo_disk;
 EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes,
                                          size_t block, const char *url,
                                          const ebpo_http_version *version, ebpo_error *error);
-/* Returns the number of bytes of the blocks that were in the folder when it was opened. *held: of
- * this version of this file; *others: of other files and versions. */
+/* Counts the bytes of the blocks that were in the folder when it was opened. *held: bytes of this
+ * version of this file. *others: bytes of other files and versions. */
 void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
-/* A cache of ranges reads a file's bytes in ranges, also before they are needed. One request
- * fetches a range. A range stays in memory while the limit allows. When ranges must be dropped, the
- * ranges that were read least recently are dropped first. Ranges with a prefetch hint that are not
- * read yet are dropped last. */
+/* A cache of ranges reads a file's bytes in ranges. A prefetch hint lists ranges that will be read
+ * soon, so that the cache requests them early. One request fetches a range. A range stays in memory
+ * while the memory limit allows. Ranges that were read least recently are dropped first. Ranges of
+ * a hint that are not read yet are dropped last. */
 
 enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request in bytes */
 
@@ -47,12 +47,12 @@ typedef struct ebpo_cached_range ebpo_cached_range;
 /* A cache of ranges. Any thread may call its functions. */
 typedef struct ebpo_range_cache {
     pthread_mutex_t lock;
-    pthread_cond_t done; /* a request or a load from disk has ended */
+    pthread_cond_t done; /* broadcast when a request or a load from disk has ended */
     ebpo_transfers *transfers;
-    ebpo_disk *disk;           /* NULL: no cache folder */
-    uint64_t block;            /* size of the disk's blocks */
-    uint64_t begin, size;      /* ranges are within [begin, size); `size`: size of the file */
-    uint64_t held_limit;       /* limit of `held`; for a waiting reader, `held` may exceed it */
+    ebpo_disk *disk;      /* NULL: no cache folder */
+    uint64_t block;       /* size of the disk's blocks */
+    uint64_t begin, size; /* ranges are within [begin, size); `size`: size of the file */
+    uint64_t held_limit;  /* limit of `held`; if a reader waits, `held` may exceed this limit */
     ebpo_cached_range **range; /* [count] by offset, without overlaps */
     uint64_t count, capacity;
     uint64_t held;       /* bytes of fetched and requested ranges */

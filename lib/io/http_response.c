@@ -1,8 +1,8 @@
 /* Parses the head of a server's response line by line, and compares the response with the request.
- * A response is a part of the file, or the whole file, or a reason to try again later; all other
- * responses are refused. Ranges, lengths, versions (entity tags or dates) and encodings must fit
- * the request. This file reads nothing from the network, so tests and fuzzers can pass any bytes.
- * Source: RFC 9110, sections 8.8, 14 and 15. */
+ * A response may send a part of the file or the whole file, or may ask to try again later. All
+ * other responses are refused. Ranges, lengths, versions (entity tags or dates) and encodings must
+ * match the request. This file reads nothing from the network, so tests and fuzzers can pass any
+ * bytes. Source: RFC 9110, sections 8.8, 14 and 15. */
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -179,9 +179,10 @@ static bool is_temporary(int code)
     return code == 408 || code == 429 || code == 500 || code == 502 || code == 503 || code == 504;
 }
 
-/* Compares the response with the pinned version. Returns the message about a change, or NULL.
- * `size`: the file's size in the response. Weak tags are compared like strong tags, because servers
- * and proxies add and drop the mark "W/" although the file is the same. */
+/* Compares the response with the pinned version, that is, the version that the first response had.
+ * Returns the message about a change, or NULL. `size`: the file's size in the response. Weak tags
+ * are compared like strong tags, because servers and proxies add and drop the mark "W/" although
+ * the file is the same. */
 static const char *what_changed(const ebpo_http_response *a, const ebpo_http_request *request,
                                 uint64_t size)
 {

@@ -24,10 +24,11 @@ typedef struct ebpo_http_version {
 /* The head of a response. */
 typedef struct ebpo_http_response {
     int code;        /* 0: no status line yet */
-    bool http2;      /* HTTP/2 or later, which detects a body that was cut off */
+    bool http2;      /* true: HTTP/2 or later; these versions detect a body that was cut off */
     bool has_range;  /* Content-Range has a range: bytes `begin` to `last` */
     bool has_total;  /* Content-Range has the file's size, `total` */
-    bool bad_range;  /* an invalid Content-Range, or two different ones */
+    bool bad_range;  /* the head has an invalid Content-Range, or two different fields Content-Range
+                      */
     bool has_length; /* Content-Length exists: `length` */
     bool chunked;    /* Transfer-Encoding: chunked */
     bool encoded;    /* Content-Encoding, other than identity */
@@ -41,7 +42,8 @@ typedef struct ebpo_http_response {
  * previous lines belong to a redirect or an interim response. */
 void ebpo_http_response_line(ebpo_http_response *response, const char *line, size_t size);
 
-/* Returns true for content types of text. Login and error pages have these types; models do not. */
+/* Returns true for content types of text. Login and error pages have such types, but models have
+ * other types. */
 bool ebpo_http_response_is_text(const char *type);
 
 /* How a response is to be used. */
@@ -55,8 +57,8 @@ typedef enum ebpo_verdict {
 /* The request with which a response is compared. */
 typedef struct ebpo_http_request {
     uint64_t begin, end; /* bytes [begin, end) */
-    /* version that the response must have. NULL: the first request, which determines the version;
-     * the file may end before `end` */
+    /* The version that the response must have. NULL: this is the first request, whose response
+     * determines the version; the file may end before `end`. */
     const ebpo_http_version *pinned;
     uint64_t whole_limit; /* greatest size of a file that is read without ranges */
     bool unversioned;     /* only sizes are compared */

@@ -1,7 +1,7 @@
 /* Provides the source for a URL. Opening checks and copies the options; its first request returns
  * the file's size, version and first bytes (the head). Reads use the cache of ranges
- * (http_cache.c). A server that does not support ranges sends the whole file, which then stays in
- * memory if it is not larger than a limit. */
+ * (http_cache.c). If the server does not support ranges, it sends the whole file. Then the whole
+ * file stays in memory; a file above a size limit is refused. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -240,8 +240,8 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return check_type(s, &r, error);
 }
 
-/* Reads the whole file with one request. Without ETag and Last-Modified this is necessary, because
- * two responses may belong to different versions. */
+/* Reads the whole file with one request. This is necessary if the server sends neither ETag nor
+ * Last-Modified, because then two responses may belong to different versions. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)

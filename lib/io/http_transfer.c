@@ -1,10 +1,11 @@
 /* Sends requests for byte ranges through libcurl, which one thread drives. Requests wait in a
- * queue, urgent requests first (a reader waits for them). At most EBPO_SLOTS_MAX requests run at
- * once, each in a slot with a reusable handle. A response is judged by its head (http_response.c)
- * before its body is accepted. If a body breaks off, the received bytes are kept, and the next
- * attempt requests the missing bytes, after a pause that grows with each attempt. At most five
- * redirects are followed, never from https to http, and the caller's credentials are not sent to
- * another server. The lock belongs to the caller (http_transfer.h). */
+ * queue. A request is urgent if a reader waits for it; urgent requests are first in the queue. At
+ * most EBPO_SLOTS_MAX requests run at once, each in a slot with a reusable handle of libcurl. A
+ * response is judged by its head (http_response.c) before its body is accepted. If a body breaks
+ * off, the received bytes are kept, and the next attempt requests the missing bytes, after a pause
+ * that grows with each attempt. At most five redirects are followed, never from https to http, and
+ * the caller's credentials are not sent to another server. The lock belongs to the caller
+ * (http_transfer.h). */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -22,14 +23,15 @@
 #include "io/http_response.h"
 #include "io/http_transfer.h"
 
-/* --- redirects: the target of a request, and whether the target is still on the original server
- * --- */
+/* --- redirects: finds out when a redirect leads to another server --- */
 
-/* Redirects of one attempt; all members are 0 if there was no redirect so far. */
+/* The redirects of one attempt to send a request. All members are 0 if there was no redirect so
+ * far. */
 typedef struct ebpo_redirect {
     CURLU *at;      /* the latest address; NULL: the original address */
     char *target;   /* target that the current head names, or NULL */
-    bool elsewhere; /* the scheme, host or port differs from the original, or is not known */
+    bool elsewhere; /* true: the latest scheme, host or port differs from the original, or is not
+                       known */
 } ebpo_redirect;
 
 /* Clears the redirects, for another attempt or at the end. */
@@ -57,8 +59,8 @@ static bool same_server(CURLU *a, CURLU *b)
            same_part(a, b, CURLUPART_PORT);
 }
 
-/* Moves r->at to the target. Returns false if the target is on another server than `url`, or if its
- * server is not known. */
+/* Moves r->at to r->target. Returns false if the target is on another server than `url`, or if the
+ * server of the target is not known. */
 static bool stays_on_server(ebpo_redirect *r, const char *url)
 {
     CURLU *first = curl_url();
@@ -124,8 +126,8 @@ typedef struct ebpo_slot {
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
-    /* stopped, stalled: the functions below have ended the transfer, not libcurl; stalled: because
-     * no bytes arrived */
+    /* has_verdict: `verdict` is set. stopped: a callback below has ended the transfer. stalled:
+     * check_stall has ended the transfer, because no bytes arrived */
     bool has_verdict, stopped, stalled;
     bool sent;    /* connected, and the request was sent */
     double moved; /* time when the last bytes arrived */
@@ -168,8 +170,8 @@ enum {
 /* --- callbacks of libcurl --- */
 
 /* Called by libcurl about ten times a second during a request. Returns 1 to stop the request if no
- * bytes have arrived for stall_timeout seconds, else 0. libcurl's own measure of speed is less
- * exact: an average over several seconds. */
+ * bytes have arrived for stall_timeout seconds, else 0. libcurl's own test for stalls is less
+ * exact, because it uses the average speed of several seconds. */
 static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
                        curl_off_t uploaded)
 {
@@ -211,7 +213,7 @@ static size_t receive_header(char *line, size_t size, size_t count, void *user)
     return 0;
 }
 
-/* Judges the response by its head; once for each attempt. */
+/* Judges the response by its head. Further calls for the same attempt do nothing. */
 static void judge_slot(ebpo_slot *s)
 {
     ebpo_http_request http_request = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
@@ -431,10 +433,10 @@ void ebpo_transfers_free(ebpo_transfers *t)
     free(t);
 }
 
-/* --- the queue; lock held --- */
+/* --- the queue; callers hold the lock --- */
 
-/* Adds a request to the queue: behind all urgent requests if it is urgent (has a deadline), else at
- * the end. */
+/* Adds a request to the queue. An urgent request (one with a deadline) is added behind all urgent
+ * requests, another request at the end. */
 static void enqueue_request(ebpo_transfers *t, ebpo_request *r)
 {
     ebpo_request **at = &t->queue;
@@ -520,7 +522,8 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
     return *by_server ? (double)retry_after : pause;
 }
 
-/* Prepares a slot for the next attempt of a request, which is for the bytes still missing. */
+/* Prepares a slot for the next attempt of a request. The attempt requests only the bytes that are
+ * still missing. */
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
     char range[64];
@@ -589,15 +592,15 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
         memcpy(r->version.etag, s->response.etag, sizeof r->version.etag);
         memcpy(r->version.modified, s->response.modified, sizeof r->version.modified);
     }
-    free(r->whole); /* from an earlier response that began to send the whole file */
+    free(r->whole); /* data of an earlier response that began to send the whole file */
     r->whole = NULL;
     r->whole_capacity = 0;
     r->got = s->begin - r->offset + s->taken;
     return r->got == r->size;
 }
 
-/* Returns the text of libcurl's error. libcurl reports a lack of memory also for a header line that
- * is too long. */
+/* Returns the text of libcurl's error. If a header line is too long, libcurl also reports a lack of
+ * memory. */
 static const char *error_text(const ebpo_slot *s, CURLcode code)
 {
     if (code == CURLE_OUT_OF_MEMORY && !s->received)
@@ -621,8 +624,8 @@ static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t 
         snprintf(out, capacity, "%s", trouble);
 }
 
-/* Returns true if bytes of another response may complete the request. Returns false if the file's
- * version is not known, because both responses might be of different versions. */
+/* Returns true if the bytes of a further response may complete the received bytes. Returns false if
+ * the file's version is not known, because the two responses might be of different versions. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
@@ -637,7 +640,8 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     if (code == CURLE_OK && s->has_verdict && s->verdict == EBPO_HTTP_PART && s->taken &&
         s->taken == s->response.last - s->response.begin + 1 && may_join(t, r) &&
         now < r->deadline) {
-        r->due = now; /* the server sends smaller parts than requested, which is no failure */
+        r->due = now; /* the server sent a smaller part than requested; this does not count as a
+                         failure */
         enqueue_request(t, r);
         return;
     }
@@ -713,9 +717,9 @@ static void cancel_queue(ebpo_transfers *t)
     }
 }
 
-/* Returns the number of slots that may be in use together when a request starts. The number is less
- * for large requests, because many of them would share the bandwidth, so that the first request
- * would end late. */
+/* Returns how many slots may be in use before this request may start no more. The number is lower
+ * for large requests: if many large requests shared the bandwidth, the first of them would end
+ * late. */
 static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
 {
     enum { LARGE_BYTES = 1 << 20, LARGE_AT_A_TIME = 6 };
@@ -723,9 +727,9 @@ static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
                                                                     : t->slot_count;
 }
 
-/* Lock held. Removes from the queue the next request that can start, and returns this request, or
- * NULL if there is none. Ends requests that have waited too long. Shortens *wait to the seconds
- * until the next request is due. */
+/* The caller holds the lock. Removes the next request that can start from the queue and returns it.
+ * Returns NULL if no request can start. Ends requests that have waited too long. Reduces *wait to
+ * the seconds until the next request is due or reaches its deadline. */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
 {
     for (ebpo_request **at = &t->queue; *at;) {
@@ -761,7 +765,8 @@ static ebpo_slot *free_slot(ebpo_transfers *t)
     return NULL;
 }
 
-/* Starts due requests. Returns false when the thread must end. *wait: as in next_due. */
+/* Starts the requests that are due. Returns false when the thread must end. Reduces *wait as
+ * next_due does. */
 static bool start_due(ebpo_transfers *t, double *wait)
 {
     ebpo_request *r;

@@ -17,7 +17,7 @@ typedef struct ebpo_request {
     /* true for the first request, when the file's size and version are not known: the file may be
      * shorter than the range, and the server may send the whole file */
     bool first;
-    /* Valid when done. */
+    /* The members from here to `type` are valid when `done` is true. */
     bool done;
     ebpo_status status;
     ebpo_error error;
@@ -32,7 +32,8 @@ typedef struct ebpo_request {
     struct ebpo_request *next; /* next request in the queue */
     unsigned failures;         /* number of failed attempts */
     double due;                /* time of the next attempt, in seconds of ebpo_seconds */
-    double deadline; /* end of the time limit; 0: no reader waits and nothing was sent yet */
+    double
+        deadline; /* end of the time limit; 0: no reader waits, and the request was not sent yet */
     uint64_t whole_capacity;
 } ebpo_request;
 
@@ -40,14 +41,14 @@ typedef struct ebpo_transfers ebpo_transfers;
 
 /* Creates a queue of requests, and starts the thread that sends them. `url`: with user and
  * password, if any. `shown`: the URL for messages. `options`, `url` and `shown` must outlive the
- * transfers. Functions marked "Lock held" are called with `lock` held. `done` is broadcast whenever
- * a request ends. */
+ * transfers. The comment "Lock held" means that the caller of the function must hold `lock`. `done`
+ * is broadcast whenever a request ends. */
 EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url,
                                               const char *shown, const ebpo_http_options *options,
                                               pthread_mutex_t *lock, pthread_cond_t *done,
                                               ebpo_error *error);
-/* Stops the thread and frees the transfers. Running requests are aborted, without being marked as
- * done. NULL is allowed. The lock must not be held. */
+/* Stops the thread and frees the transfers. Aborts running requests, and does not mark them as
+ * done. NULL is allowed. The caller must not hold the lock. */
 void ebpo_transfers_free(ebpo_transfers *transfers);
 
 /* Lock held. Queues a request. Urgent requests are sent before all others. */
@@ -55,7 +56,7 @@ void ebpo_transfers_add(ebpo_transfers *transfers, ebpo_request *request, bool u
 /* Lock held. Marks a request as waited for: the request becomes urgent, and its time limit begins.
  */
 void ebpo_transfers_urge(ebpo_transfers *transfers, ebpo_request *request);
-/* Lock held. Refuses responses with another version from now on. */
+/* Lock held. From now on, refuses responses with another version than `version`. */
 void ebpo_transfers_pin(ebpo_transfers *transfers, const ebpo_http_version *version);
 /* Lock held. Adds the numbers of requests, retries, connections and bytes to *stats. */
 void ebpo_transfers_add_stats(const ebpo_transfers *transfers, ebpo_http_stats *stats);

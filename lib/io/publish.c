@@ -1,8 +1,9 @@
 /* Replaces output files atomically: writes a temporary file in the same folder, syncs it, renames
- * it to the target, and syncs the folder. The target may be compared with the version that was
- * read, under the target's lock. If two outputs belong together and the second cannot be replaced,
- * the first is restored. A new file gets the owner, permissions and extended attributes of the file
- * that it replaces. The functions for the library's callers are at the end. */
+ * it to the target, and syncs the folder. If the output was made from an earlier version of the
+ * target, the target is compared with this version before the rename, under the target's lock. If
+ * two outputs belong together and the second output cannot be replaced, the first output is
+ * restored. A new file gets the owner, permissions and extended attributes of the file that it
+ * replaces. The functions for the library's callers are at the end. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -28,7 +29,7 @@
 /* --- properties that a new file gets from the replaced file --- */
 
 #ifdef EBPO_HAVE_XATTR
-/* Maximum number of bytes of all names, and of a value; no system allows more. */
+/* Maximum size in bytes of the list of names, and of one value. No system allows more. */
 enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
 static void copy_attribute(int from, int to, const char *name, void *value)
@@ -54,8 +55,8 @@ static void copy_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
 /* Gives the file the owner and group of the replaced file (`old`). Returns the mode to set. If the
- * system does not allow the change, the new file keeps the owner or group of this process, and the
- * mode lacks the bits that let a program act for its owner (set-user-ID). */
+ * system does not allow the change, the new file keeps the owner or group of this process. Then the
+ * mode lacks the bits set-user-ID, set-group-ID and sticky. */
 static mode_t copy_owner(int to, const struct stat *old)
 {
     struct stat new;
@@ -66,13 +67,15 @@ static mode_t copy_owner(int to, const struct stat *old)
          group = new.st_gid == old->st_gid || fchown(to, (uid_t)-1, old->st_gid) == 0;
     if (user && group)
         return mode;
-    /* permissions of the group must not apply to another group */
+    /* The old group's permissions must not apply to another group, so that group gets at most the
+     * permissions of all users. */
     return group ? mode & 0777 : mode & (0707 | (mode & 007) << 3);
 }
 
-/* Gives the open file the mode of the regular file at `path` and, as far as the system allows, its
- * owner and extended attributes (including access control lists). If there is no such file, sets
- * `mode`, unless it is -1. Returns false with errno if the mode cannot be set. */
+/* Gives the open file `fd` the mode of the regular file at `path`. If the system allows this, also
+ * copies the owner and the extended attributes (including access control lists). If there is no
+ * regular file at `path`, sets `mode`; -1: does not set the mode. Returns false with errno if the
+ * mode cannot be set. */
 static bool copy_facts(int fd, const char *path, int mode)
 {
     struct stat old;
@@ -143,7 +146,8 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
         if (publish->fd >= 0) {
-            /* shows other processes, which remove abandoned files, that this file is in use */
+            /* Other processes remove abandoned temporary files. The lock shows them that this file
+             * is in use. */
             (void)flock(publish->fd, LOCK_EX | LOCK_NB);
             return EBPO_OK;
         }
@@ -255,7 +259,7 @@ static bool close_writer(ebpo_publish *publish)
 /* Syncs and closes a file or folder. Returns false, with errno, if the sync fails. */
 static bool sync_and_close(int fd)
 {
-    /* EINVAL: a file system without sync of folders */
+    /* EINVAL: the file system cannot sync folders */
     bool good = fsync(fd) == 0 || errno == EINVAL;
     int saved = errno;
     close(fd);
@@ -270,8 +274,8 @@ static bool sync_folder(const char *path)
     return fd >= 0 && sync_and_close(fd);
 }
 
-/* Closes the temporary file, sets its mode, and syncs it. Opens it by its name, because a library
- * may have written through another descriptor. */
+/* Closes the temporary file, sets its mode, and syncs it. For this, opens the file again by its
+ * name, because a library may have written the file through another descriptor. */
 static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
 {
     errno = 0;
@@ -346,8 +350,8 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     return status;
 }
 
-/* Exchanges the names of the temporary file and the target, so that the temporary name is that of
- * the previous file. Returns false on failure, with errno; ENOENT: the target is missing. */
+/* Exchanges the names of the temporary file and the target. Then the previous file has the
+ * temporary name. Returns false on failure, with errno. ENOENT: the target is missing. */
 static bool exchange_files(const ebpo_publish *publish)
 {
 #ifdef EBPO_HAVE_RENAMEAT2

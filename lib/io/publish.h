@@ -54,32 +54,33 @@ typedef struct ebpo_publish {
     }
 
 /* Creates the temporary file. The commit replaces an existing regular file at `path`. The new file
- * then gets the mode of the replaced file and, where the system allows, its owner and extended
- * attributes, including the access control list; other hard links of the replaced file keep the old
- * content. Without an existing file, the mode is 0666 less the umask. EBPO_E_IO: `path` is a
- * folder, device or symbolic link, or its folder has no write permission. On failure, no temporary
- * file remains. Also removes temporary files that killed processes have left for the same target.
- * EBPO_E_LIMIT: the process already has EBPO_UNFINISHED_MAX outputs and locks (io/file_lock.h). */
+ * then gets the mode of the replaced file. If the system allows this, the new file also gets the
+ * owner and the extended attributes, including the access control list. Other hard links of the
+ * replaced file keep the old content. If no file exists at `path`, the mode is 0666 without the
+ * bits of the umask. EBPO_E_IO: `path` is a folder, device or symbolic link, or its folder has no
+ * write permission. On failure, no temporary file remains. Also removes temporary files that killed
+ * processes have left for the same target. EBPO_E_LIMIT: the process already has
+ * EBPO_UNFINISHED_MAX outputs and locks (io/file_lock.h). */
 EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
                                              ebpo_error *error);
 
 /* Sets the expected version of the target, for an output that was made from this version. The
  * commit replaces only this version, and fails with EBPO_E_IO if another program has replaced the
- * target. Comparing and renaming happen under the target's lock (io/file_lock.h), which the caller
- * has taken if `locked` is true. */
+ * target. The commit compares and renames under the target's lock (io/file_lock.h). `locked`: true
+ * if the caller already holds this lock. */
 void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expected, bool locked);
 
-/* Same as ebpo_publish_expect, if the output replaces the file that `input` reads; does nothing for
- * other outputs. If the input reads a copy of the named file, the expected version is the current
- * version of the file at the path. */
+/* If the output replaces the file that `input` reads, same as ebpo_publish_expect with the version
+ * of this file; otherwise does nothing. If the input reads a copy of the named file, the expected
+ * version is the current version of the file at the target's path. */
 void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input);
 
 /* Returns the absolute name of the temporary file, for libraries that open by name (truncating is
  * allowed). Valid until commit or abort. */
 const char *ebpo_publish_path(const ebpo_publish *publish);
 
-/* Returns a stream on the temporary file, opened at the first call; NULL when memory is short.
- * Commit and abort close it. */
+/* Returns a stream on the temporary file. The first call opens the stream; commit and abort close
+ * it. Returns NULL when memory is short. */
 FILE *ebpo_publish_stream(ebpo_publish *publish);
 
 /* Flushes and syncs the temporary file, and renames it to the target. A caller that has opened the
@@ -90,10 +91,10 @@ FILE *ebpo_publish_stream(ebpo_publish *publish);
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
 /* Same as ebpo_publish_commit for two files that belong together. On success, both files are
- * replaced; on failure, neither (unless only the sync of the folder failed). On file systems
- * without atomic exchange, the first file may be replaced although the second file cannot be. Two
- * programs that replace the same pair take turns, so the two files are always from the same
- * program. */
+ * replaced. On failure, no file is replaced, with two exceptions. If only the sync of a folder
+ * fails, both files are replaced. On file systems without atomic exchange, the first file may be
+ * replaced although the second file cannot be replaced. Two programs that replace the same pair
+ * take turns, so the two files are always from the same program. */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second,
                                                    ebpo_error *error);
 

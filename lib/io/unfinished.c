@@ -1,7 +1,7 @@
 /* Removes unfinished files. When a signal ends this process, its outputs and lock files are
  * removed. Their names are in static memory with atomic states, because a signal handler reads the
- * names. Temporary files and folders of killed processes are also removed: their names contain the
- * id of a process that has ended, and no process holds the files' locks. Files that cannot be
+ * names. Temporary files and folders of killed processes are also removed. Their names contain the
+ * id of a process that has ended, and no process holds a lock of such a file. Files that cannot be
  * examined or removed stay. This file also creates new folders atomically: a folder is made under
  * another name in the same parent folder, filled by the caller, and renamed. */
 #include <dirent.h>
@@ -67,8 +67,8 @@ void ebpo_unfinished_remove(void)
     errno = saved;
 }
 
-/* Returns the process id in the name ".NAME.PROCESS-NUMBER.tmp" of a temporary file of the output
- * `name`; 0: `file` is not such a name. */
+/* A temporary file of the output NAME has the name ".NAME.PROCESS-NUMBER.tmp". Returns the process
+ * id in the file name `file`, or 0 if it is not such a name for the output `name`. */
 static long process_of(const char *file, const char *name)
 {
     char *end;
@@ -112,8 +112,8 @@ void ebpo_remove_stale_files(const char *folder, const char *name)
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
 /* Returns a number that identifies this namespace of process ids (container) until the machine is
- * restarted. With this number, processes of other machines are not taken for ended processes of
- * this machine. Returns 0 if the number is not known. */
+ * restarted. A process id in a file name is valid only together with this number, because on
+ * another machine the process may still run. Returns 0 if the number is not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
@@ -128,8 +128,8 @@ static uint32_t system_number(void)
     return (uint32_t)(sum ^ sum >> 32);
 }
 
-/* Returns the length of the path without slashes at its end; cuts the last part of the path to
- * EBPO_TARGET_NAME_KEPT bytes. *name: offset of the last part. */
+/* Returns the length of the path `folder` without slashes at its end, and with at most
+ * EBPO_TARGET_NAME_KEPT bytes of its last part. *name: offset of the last part. */
 static size_t without_slashes(const char *folder, size_t *name)
 {
     size_t size = strlen(folder);
@@ -153,7 +153,8 @@ static char *making_name(const char *folder)
 }
 
 /* Renames the folder that mkdtemp has made: the folder's inode number replaces the random letters.
- * remove_one thus recognises another folder that later gets this name. */
+ * If another folder gets this name later, the inode number differs, so remove_one does not remove
+ * its content. */
 static void settle_making(char **made)
 {
     char *path;
@@ -170,9 +171,9 @@ static void settle_making(char **made)
     }
 }
 
-/* Returns the text after the process id in `file`, a name that settle_making has made. Returns NULL
- * for any other name, or if the process with this id exists. `name`: [kept] beginning of the name.
- * `system`: system_number(). */
+/* Returns the text after the process id in `file`, a name that settle_making has made for a folder.
+ * Returns NULL for other names, and if the process with this id exists. `name`: the beginning of
+ * the folder's name, of `kept` bytes. `system`: system_number(). */
 static const char *suffix_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
 {
     char *end;
@@ -197,9 +198,9 @@ static void empty_folder(int fd)
         close(fd);
 }
 
-/* Removes an unfinished folder of this user. Removes its files only if the name ends with the
- * folder's inode number; `suffix`: the end of the name. Another folder is removed only if it is
- * empty. */
+/* Removes an unfinished folder of this user. `suffix`: the end of the folder's name. If the suffix
+ * is the folder's inode number, removes the files in the folder first. Otherwise removes the folder
+ * only if it is empty. */
 static void remove_one(int parent, const char *file, const char *suffix)
 {
     struct stat facts;
@@ -217,8 +218,9 @@ static void remove_one(int parent, const char *file, const char *suffix)
         (void)unlinkat(parent, file, AT_REMOVEDIR);
 }
 
-/* Removes abandoned unfinished folders for `folder` with their content: folders of this user, made
- * by processes of this system that have ended. Files that cannot be examined or removed stay. */
+/* Removes the unfinished folders of the output `folder` that are abandoned, with their content. A
+ * folder is abandoned if this user owns it, and a process of this system that has ended made it.
+ * Files that cannot be examined or removed stay. */
 static void remove_stale_folders(const char *folder)
 {
     int saved = errno;
