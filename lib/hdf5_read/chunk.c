@@ -1,11 +1,11 @@
-/* Encodes and decodes chunks as HDF5 stores them. The table `codecs` has a row for each pipeline
- * (the HDF5 filters of an array): the filters, and the functions that encode and decode. The row
- * also says whether values are shuffled before compression, and whether a fletcher32 checksum
- * follows. A writer gives a new array the filters of the row; a reader recognises the pipeline by
- * these filters. A new codec needs a number in chunk.h, a row, and its functions in a separate
- * file, such as zstd_codec.c. Deflate needs only two calls of zlib, which are in this file. The
- * output is bit for bit the output of libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"),
- * format-spec/README.md, section 4. */
+/* Encodes and decodes chunks as HDF5 stores them. A pipeline is the list of the HDF5 filters of an
+ * array. The table `codecs` has a row for each pipeline, with its filters and the functions that
+ * encode and decode. Two flags of the row say if values are shuffled before compression, and if a
+ * fletcher32 checksum follows. A writer gives a new array the filters of the row; a reader
+ * recognises the pipeline by these filters. A new codec needs a number in chunk.h, a row, and its
+ * functions in a separate file, such as zstd_codec.c. Deflate needs only two calls of zlib, which
+ * are in this file. The output is bit for bit the output of libhdf5's own filters. Source: docs of
+ * HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
 #include <string.h>
 #include <zlib.h>
 
@@ -62,7 +62,8 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     uint32_t low = 0, high = 0;
     size_t words = bytes / 2;
     while (words) {
-        /* the sums of at most 360 words fit 32 bits; then they are folded to 16 bits */
+        /* The two sums over at most 360 words fit 32 bits. After each run, they are folded to 16
+         * bits. */
         size_t run = words > 360 ? 360 : words;
         words -= run;
         for (; run; run--, data += 2) {
@@ -197,8 +198,8 @@ bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned eleme
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder) { ebpo_zstd_coder_clear(coder); }
 
-/* Returns the blocks of a zstd frame for shuffled elements: one block for each *byte plane*. Byte
- * plane k has the k-th bytes of all elements. The end of the last block is not stored. */
+/* Returns the blocks of a zstd frame for shuffled elements: one block for each byte plane. Byte
+ * plane k has byte k of every element. The result omits the end of the last block. */
 static ebpo_chunk_blocks blocks_of_byte_planes(size_t raw_bytes, size_t element_size)
 {
     enum {
@@ -214,7 +215,7 @@ static ebpo_chunk_blocks blocks_of_byte_planes(size_t raw_bytes, size_t element_
 }
 
 /* Returns the blocks of a zstd frame for streams: one block for each stream that is not empty.
- * Stream i ends at ends[i]. The end of the last block is not stored. */
+ * Stream i ends at ends[i]. The result omits the end of the last block. */
 static ebpo_chunk_blocks blocks_of_streams(size_t raw_bytes, const size_t *ends, int count)
 {
     ebpo_chunk_blocks b = { .count = 0 };

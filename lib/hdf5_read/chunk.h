@@ -1,6 +1,6 @@
-/* Encodes and decodes chunks of arrays as HDF5 stores them (shuffle, compression, checksum), bit
- * for bit as libhdf5's own filters do. Also declares the shape of an array, and the location of a
- * chunk in its file. */
+/* Encodes and decodes chunks of arrays as HDF5 stores them, with shuffle, compression and checksum.
+ * The bytes are those that libhdf5's own filters write. Also declares the shape of an array, and
+ * the location of a chunk in its file. */
 #ifndef EBPO_HDF5_READ_CHUNK_H
 #define EBPO_HDF5_READ_CHUNK_H
 
@@ -41,9 +41,9 @@ typedef struct ebpo_pipeline_facts {
 } ebpo_pipeline_facts;
 
 const ebpo_pipeline_facts *ebpo_pipeline_facts_of(ebpo_pipeline pipeline);
-/* Finds the pipeline of these filters; returns false if there is none. For elements of one byte,
- * the filters may include shuffle, as h5repack shuffles all arrays; shuffle does not change such
- * elements. */
+/* Finds the pipeline of these filters. Returns false if no pipeline has these filters. For elements
+ * of one byte, the filters may include shuffle, because h5repack shuffles all arrays. Shuffle does
+ * not change such elements. */
 bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned element_size,
                               ebpo_pipeline *pipeline);
 
@@ -59,14 +59,14 @@ EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeli
 
 /* Same as ebpo_chunk_encode, for elements of one byte that form `count` consecutive streams, and a
  * last part after them. Stream i ends at ends[i] (ascending; streams may be empty), and the last
- * part ends at raw_bytes. zstd compresses each stream and the last part separately. */
+ * part ends at raw_bytes. zstd compresses each stream and the last part as a separate block. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_encode_streams(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                                     int level, const uint8_t *raw, size_t raw_bytes,
                                                     const size_t *ends, int count, uint8_t *out,
                                                     size_t *out_bytes);
 
-/* Decodes into exactly raw_bytes bytes. Safe for any stored bytes: returns EBPO_E_FORMAT if they
- * are damaged, and *why is then a static string with the reason. */
+/* Decodes into exactly raw_bytes bytes. Safe for any stored bytes. If the stored bytes are damaged,
+ * returns EBPO_E_FORMAT and sets *why to a static string with the reason. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                             size_t element_size, const uint8_t *stored,
                                             size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
@@ -78,8 +78,8 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
 /* Reverses ebpo_shuffle. */
 void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 
-/* Returns HDF5's fletcher32 checksum of big-endian 16-bit words: two sums modulo 65535, where a
- * positive multiple of 65535 becomes 65535, not 0. */
+/* Returns HDF5's fletcher32 checksum of big-endian 16-bit words. It consists of two sums modulo
+ * 65535. A sum that is a positive multiple of 65535 becomes 65535, not 0. */
 uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes);
 
 /* The shape of an integer array: [rows] if cols is 0, else [rows][cols]. Each chunk has chunk_rows

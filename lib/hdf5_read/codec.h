@@ -7,8 +7,9 @@
 
 enum {
     EBPO_CHUNK_BYTES_MAX = 65536, /* bytes of one chunk before compression */
-    EBPO_ZSTD_LEVEL = 3,          /* default level for small chunks; headers state this level */
-    EBPO_DEFLATE_LEVEL = 6        /* default level */
+    EBPO_ZSTD_LEVEL =
+        3, /* default level for small chunks; the HDF5 headers of arrays state this level */
+    EBPO_DEFLATE_LEVEL = 6 /* default level */
 };
 
 /* Compression state and scratch memory of one thread. Initialise it with zeros, and call
@@ -20,14 +21,15 @@ typedef struct ebpo_chunk_coder {
 
 /* Returns the greatest size of an encoded chunk of raw_bytes bytes, with any filters. The format
  * fixes this bound, so that it does not change with the versions of zlib and zstd. The bounds of
- * zlib and zstd are lower: at most a 256th and 68 bytes more than the data. */
+ * zlib and zstd are lower: at most 68 bytes and a 256th of the data more than the data. */
 static inline size_t ebpo_chunk_bound(size_t raw_bytes)
 {
     return raw_bytes + raw_bytes / 256 + 1024;
 }
 
-/* The ends of the blocks of a chunk's zstd frame, without the last block's end. There is one block
- * for each byte of an element (at most 8), or one block for each stream. */
+/* The ends of the blocks of a chunk's zstd frame, without the end of the last block. There is one
+ * block for each byte position of an element (at most 8), or one block for each stream (chunk.h).
+ */
 typedef struct ebpo_chunk_blocks {
     size_t end[8];
     int count;
@@ -44,10 +46,11 @@ EBPO_MUST_USE ebpo_status ebpo_zstd_decode(ebpo_chunk_coder *coder, const uint8_
 void ebpo_zstd_coder_clear(ebpo_chunk_coder *coder);
 
 /* Checks a frame for two kinds of errors that zstd does not report. Returns the error's text or
- * NULL. First, a bit is set that must be 0 (RFC 8878), but that most versions of zstd ignore: bit 4
- * of the frame's descriptor, or one of the two lowest bits of the modes of a section of sequences.
- * Second, a block repeats its byte only once; zstd writes a raw byte instead. Also returns NULL if
- * the frame cannot be parsed, because decoding reports this error. */
+ * NULL. The first error is a set bit that must be 0 by RFC 8878, but that most versions of zstd
+ * ignore. This is bit 4 of the frame's descriptor, or one of the two lowest bits of the modes of a
+ * section of sequences. The second error is an RLE block of one byte, because zstd writes a raw
+ * block instead. Also returns NULL if the frame cannot be parsed, because decoding reports this
+ * error. */
 const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes);
 
 /* Returns true if a frame has a checksum of its content. A frame without a checksum is rejected,

@@ -1,8 +1,9 @@
-/* Encodes and decodes numbers by the codings of format-spec/README.md, section 9: differences to
- * the previous value (modulo 2^32 or 2^64, in zigzag code), corners of faces relative to the number
- * of vertices that were used so far, and integers of fewer bytes. Encoding and decoding are exact
- * inverses for every bit pattern; floats are coded as integers of the same order. Files are
- * little-endian. */
+/* Encodes and decodes numbers by the codings of format-spec/README.md, section 9. There are three
+ * kinds. The first kind stores differences to the previous value (modulo 2^32 or 2^64), in zigzag
+ * code: 0, -1, 1, -2 become 0, 1, 2, 3. The second kind stores corners of faces relative to the
+ * number of vertices that were used so far. The third kind stores integers with fewer bytes.
+ * Encoding and decoding are exact inverses for every bit pattern. Floats are coded as integers of
+ * the same order. Files are little-endian. */
 #include "hdf5_read/coding.h"
 
 #include <string.h>
@@ -171,8 +172,8 @@ static uint64_t sortable_bits(uint64_t bits, size_t size)
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);
 }
 
-/* Returns the zigzag code of a difference of `size` bytes: the difference's highest bit is its
- * sign. */
+/* Returns the zigzag code of a difference. Only the lowest `size` bytes of the difference are used,
+ * and their highest bit is the sign. */
 static uint64_t zigzag_of(uint64_t difference, size_t size)
 {
     unsigned unused = 64 - 8 * (unsigned)size;

@@ -1,9 +1,10 @@
-/* Implements the coding "gates" of format-spec/gates.md. Faces follow each other across edges: each
- * face is written as its gate (an edge of an earlier face) and its third vertex. An edge of an
- * earlier face is open if the face on its other side has not been written yet. The gate is one of
- * the newest open edges. Open edges are kept in a short list, the newest last. Encoder and decoder
- * keep the same list, so the decoder restores all codes; it rejects bytes that do not represent
- * faces. Time is proportional to the number of faces. */
+/* Implements the coding "gates" of format-spec/gates.md. The code of a corner is its vertex
+ * relative to the newest vertex (coding.h). Most faces share an edge with an earlier face. This
+ * edge is the gate of the face, and the face is written as its gate and its third vertex. An edge
+ * of an earlier face is open if the face on its other side has not been written yet. The gate is
+ * one of the newest open edges. Open edges are kept in a short list, the newest last. Encoder and
+ * decoder keep the same list, so the decoder restores all codes. The decoder rejects bytes that do
+ * not represent faces. Time is proportional to the number of faces. */
 #include "hdf5_read/face_gates.h"
 
 #include <string.h>
@@ -23,16 +24,17 @@ enum {
     IS_LEFT,   /* end of the newest open edge that starts at b */
     IS_RIGHT,  /* start of the newest open edge that ends at a */
     BY_NUMBER, /* a number follows in the stream `low` */
-    AT_OPEN    /* AT_OPEN + n: start of an open edge; n = 0 is the newest edge */
+    AT_OPEN    /* AT_OPEN + n: start of an open edge; n counts from the newest edge, n = 0 */
 };
-/* The first byte of a vertex number, in the stream `low`. Below LOW_END: the number. Below
- * TWO_BYTES_END: a second byte follows in the stream `more`. TWO_BYTES_END: four bytes follow in
- * `more`. */
+/* Meaning of the first byte of a vertex number, which is in the stream `low`. A byte below LOW_END
+ * is the number. With a byte from LOW_END to TWO_BYTES_END - 1, a second byte follows in the stream
+ * `more`. With the byte TWO_BYTES_END, four bytes follow in `more`. */
 enum { LOW_END = 224, TWO_BYTES_END = 240 };
 enum { AS_CODES = 1 }; /* first byte of a chunk that has the codes of corners instead of gates */
 
-/* Open edges, newest last: (a, b) means that the face on the other side of the edge has a side from
- * a to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32, as in codes. */
+/* Open edges, newest last. (a, b) means that the face on the other side of the edge, if it exists,
+ * has a side from a to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32,
+ * as in codes. */
 typedef struct open_edges {
     uint64_t edge[SPACE]; /* see edge_of */
     uint32_t begin, end;  /* range of the open edges in `edge` */
@@ -97,8 +99,8 @@ static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
     return any;
 }
 
-/* Processes the side of a face from a to b: closes the open edge (a, b) if it is among the NEAR
- * newest edges; otherwise opens the reverse edge. */
+/* Processes the side of a face from a to b. If the open edge (a, b) is among the NEAR newest edges,
+ * closes this edge. Otherwise opens the reverse edge (b, a). */
 static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
 {
     uint64_t wanted = edge_of(a, b);
@@ -120,9 +122,9 @@ static void open_all(open_edges *o, const uint32_t *face)
         push_edge(o, edge_of(face[(k + 1) % 3], face[k]));
 }
 
-/* Updates the open edges after face (a, b, c). Its gate (a, b) is already closed. `kind`: kind of
- * c. `at`: for IS_LEFT and IS_RIGHT, position of the open edge that gave c; closes this edge too.
- */
+/* Updates the open edges after the face (a, b, c). The gate (a, b) of this face is already closed.
+ * `kind`: kind of the vertex c. `at`: for IS_LEFT and IS_RIGHT, the position of the open edge that
+ * gave c; this edge is also closed. */
 static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
                        uint32_t c)
 {
@@ -141,9 +143,10 @@ static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, ui
 
 /* ---- writing ---- */
 
-/* State of encoding. Streams: `gate`: for each face, position of the gate, counted from the end of
- * the list, or 0 without a gate. `third`: for each face with a gate, 3 * kind of the third vertex +
- * the corner where the gate begins. `low`, `more`: bytes of vertex numbers. */
+/* State of encoding. The output has four streams. `gate` has a byte for each face: the position of
+ * the gate, counted from the end of the list, or 0 if the face has no gate. `third` has a byte for
+ * each face with a gate: 3 * kind of the third vertex + index of the corner where the gate begins.
+ * `low` and `more` have the bytes of vertex numbers. */
 typedef struct writing {
     uint8_t *gate, *third, *low, *more; /* next byte of each stream */
     open_edges open;
@@ -218,8 +221,8 @@ static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
     go_through(o, kind, at, a, b, c);
 }
 
-/* Writes the codes of corners instead of gates: AS_CODES, then byte 0 of all codes, then byte 1 of
- * all codes, and so on. */
+/* Writes the codes of corners instead of gates. The output is AS_CODES, then byte 0 of all codes,
+ * then byte 1 of all codes, and so on. */
 static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
                         size_t ends[EBPO_GATES_ENDS])
 {
@@ -230,9 +233,9 @@ static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
         ends[i] = 1 + (i + 1) * plane;
 }
 
-/* Moves the streams together, and sets their ends. The streams were written at positions where they
- * cannot overlap: rows times 0, 1, 2 and 5 (`third` takes at most one byte for each face, `low` at
- * most three). */
+/* Removes the gaps between the streams, and sets the ends of the streams. Before, the streams begin
+ * at 0, rows, 2 * rows and 5 * rows. There they cannot overlap, because `third` takes at most one
+ * byte for each face, and `low` at most three. */
 static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
                          size_t ends[EBPO_GATES_ENDS])
 {
@@ -248,7 +251,7 @@ static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
 void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
                        size_t ends[EBPO_GATES_ENDS])
 {
-    enum { MORE_OF_FACE = 12 }; /* maximum bytes of a face in `more`: three numbers */
+    enum { MORE_OF_FACE = 12 }; /* maximum bytes of a face in `more`: three numbers of four bytes */
     size_t bytes = (size_t)rows * EBPO_GATES_COLS;
     writing w = { out, out + rows, out + 2 * (size_t)rows, out + 5 * (size_t)rows, { .end = 0 } };
     start_edges(&w.open);
@@ -299,8 +302,8 @@ static bool get_vertex(reading *r, uint32_t seen, uint32_t *vertex)
     return true;
 }
 
-/* Reads the third vertex of a face with the gate (a, b). Returns false if the kind is not possible.
- */
+/* Finds the third vertex of a face with the gate (a, b). Reads its number if necessary. Returns
+ * false if `kind` is not possible here, or if the number cannot be read. */
 static bool get_third(reading *r, uint32_t kind, uint32_t a, uint32_t b, uint32_t *at, uint32_t *c)
 {
     const open_edges *o = &r->open;
@@ -353,7 +356,8 @@ static bool read_without_gate(reading *r, uint32_t *face)
     return true;
 }
 
-/* Writes the codes of a face. Returns the number of vertices seen after the face. */
+/* Writes the codes of a face. `seen`: number of new vertices before the face. Returns this number
+ * after the face. */
 static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
 {
     for (int k = 0; k < 3; k++) {
@@ -364,8 +368,9 @@ static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
     return seen;
 }
 
-/* Finds the beginnings of the streams. The stream `gate` has the number of faces without a gate.
- * This number determines the length of `third` and, with the kinds in `third`, that of `low`. */
+/* Finds the beginnings of the streams. The zeros in the stream `gate` give the number of faces
+ * without a gate. This number determines the length of `third`. This number and the kinds in
+ * `third` determine the length of `low`. */
 static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
 {
     size_t without_gate = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;

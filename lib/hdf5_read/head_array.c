@@ -1,7 +1,7 @@
 /* Reads the descriptions of arrays: checks their shapes against the format, and finds their chunks.
- * Three of HDF5's kinds of chunk index are read: a single chunk, an implicit index, and a fixed
- * array with pages. Each chunk must be within the file, and not larger than its filters can make
- * it. Source: HDF5 File Format Specification 3.0, sections IV.A.2.i and VII;
+ * HDF5 has several kinds of chunk index. This file reads three of them: a single chunk, an implicit
+ * index, and a fixed array with pages. Each chunk must be within the file, and not larger than its
+ * filters can make it. Source: HDF5 File Format Specification 3.0, sections IV.A.2.i and VII;
  * format-spec/hdf5-messages.md. */
 #include <inttypes.h>
 #include <stdio.h>
@@ -16,11 +16,11 @@
 
 typedef enum ebpo_head_index {
     EBPO_INDEX_SINGLE = 1, /* one chunk */
-    EBPO_INDEX_IMPLICIT,   /* consecutive chunks without filters: no table is needed */
+    EBPO_INDEX_IMPLICIT,   /* consecutive chunks without filters, which need no table */
     EBPO_INDEX_FIXED       /* a table of fixed size */
 } ebpo_head_index;
 
-/* How an array is stored, from its layout message. */
+/* How an array is stored, as its layout message states. */
 typedef struct ebpo_head_layout {
     unsigned rank;     /* number of dimensions of the chunks */
     uint64_t chunk[3]; /* size of a chunk; the last number is the size of an element */
@@ -28,22 +28,24 @@ typedef struct ebpo_head_layout {
     unsigned page_bits;    /* FIXED: a page has 2^page_bits chunks */
     bool single_filtered;  /* SINGLE: the chunk has filters, and the next two members are set */
     uint64_t single_bytes; /* stored size of the chunk */
-    uint32_t single_mask;  /* bits of the filters that the chunk lacks */
-    /* address of the chunk (SINGLE), the chunks (IMPLICIT) or the table (FIXED); EBPO_NO_ADDRESS:
-     * nothing was written */
+    uint32_t single_mask;  /* a bit for each filter that was not applied to the chunk */
+    /* address of the chunk (SINGLE), of the first chunk (IMPLICIT) or of the table (FIXED);
+     * EBPO_NO_ADDRESS: nothing was written */
     uint64_t address;
 } ebpo_head_layout;
 
-/* The chunks to be found. */
+/* The chunks of an array, while they are located. Members marked "out" are results. */
 typedef struct ebpo_head_chunks {
     const ebpo_head_layout *layout;
     bool filtered; /* the array has filters */
-    /* number of chunks; bytes of a chunk before its filters; greatest size of a chunk after them */
+    /* count: number of chunks. whole: bytes of a chunk before its filters are applied. bound:
+     * greatest size of a chunk after the filters */
     uint64_t count, whole, bound;
     uint64_t end;                   /* end of the file, in bytes */
     ebpo_chunk_location *locations; /* out: `count` offsets and sizes */
     uint64_t stored;                /* out: bytes of all chunks */
-    uint64_t at; /* out: index of the invalid chunk; UINT64_MAX: no single chunk is invalid */
+    uint64_t
+        at; /* out: index of the invalid chunk; UINT64_MAX: the error is not in a single chunk */
 } ebpo_head_chunks;
 
 static const char missing[] = "the chunk is missing",
@@ -53,7 +55,8 @@ static const char missing[] = "the chunk is missing",
                   damaged[] = "the array's chunk index is damaged: the checksum differs",
                   beyond[] = "the array's chunk index is beyond the end of the file";
 
-/* Reads a layout of version 4 with chunks, from the flags on. Returns what read_layout returns. */
+/* Reads the rest of a layout message of version 4 for an array in chunks, beginning with the flags.
+ * Returns the same as read_layout. */
 static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *foreign)
 {
     enum { SINGLE_FILTERED = 2 };
@@ -102,8 +105,9 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
     return "the array's chunks are listed in a tree without checksums";
 }
 
-/* Checks and stores the offset and size of chunk i. `mask`: bits of the filters that the chunk
- * lacks. Like the functions read_... and check_... below, returns an error text or NULL. */
+/* Checks and stores the offset and size of chunk i. `mask`: a bit for each filter that was not
+ * applied to the chunk. Like the functions read_... and check_... below, returns an error text or
+ * NULL. */
 static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
                                 uint32_t mask)
 {
@@ -141,7 +145,7 @@ static const char *read_implicit(ebpo_head_chunks *t)
     const ebpo_head_layout *l = t->layout;
     const char *wrong = t->filtered ? contradicts : NULL;
     for (uint64_t i = 0; i < t->count && !wrong; i++) {
-        uint64_t begin = EBPO_NO_ADDRESS; /* stays so if the sum exceeds 64 bits */
+        uint64_t begin = EBPO_NO_ADDRESS; /* keeps this value if the sum exceeds 64 bits */
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;
@@ -185,8 +189,9 @@ static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks 
                : contradicts;
 }
 
-/* Reads the entries of `count` chunks from chunk `first` on. `at`: address of `before` bytes, which
- * precede the entries; the checksum after the entries also covers these bytes. */
+/* Reads the entries of `count` chunks from chunk `first` on. The entries follow `before` other
+ * bytes, which begin at the address `at`. The checksum after the entries also covers these bytes.
+ */
 static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                 uint64_t at, uint64_t before, uint64_t first, uint64_t count)
 {
@@ -208,8 +213,8 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
     return wrong;
 }
 
-/* Checks that all pages of a fixed array were written: a bit for each page is set. `prefix`: size
- * of the block up to the end of these bits. */
+/* Checks that all pages of a fixed array were written. The block has a bit for each page, which is
+ * set if the page was written. `prefix`: size of the block up to the end of these bits. */
 static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                uint64_t prefix, uint64_t pages)
 {
@@ -277,8 +282,8 @@ static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
 
 enum { COLS_MAX = 160 }; /* maximum number of columns of an array */
 
-/* Finds the pipeline of these filters. The parameter of shuffle must be element_size. Returns false
- * if the format does not allow these filters. */
+/* Finds the pipeline of these filters. Returns false if the format does not allow them. The
+ * parameter of the filter shuffle must be element_size. */
 static bool find_pipeline(const ebpo_head_filters *f, unsigned element_size,
                           ebpo_pipeline *pipeline)
 {
@@ -304,8 +309,8 @@ static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows
     return rows == full || (rule == EBPO_HEAD_ROWS_POWER && power && rows < full);
 }
 
-/* Returns the only message of a type, or NULL. Sets *wrong if the message occurs twice or is
- * shared; a missing message is no error. */
+/* Returns the only message of a type, or NULL. Sets *wrong if the message occurs twice or is shared
+ * (stored in another object). If there is no such message, does not set *wrong. */
 static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type,
                                          ebpo_head_refusal *wrong)
 {
@@ -336,7 +341,8 @@ static ebpo_head_refusal fail_foreign(const char *what)
     return (ebpo_head_refusal){ what, true };
 }
 
-/* Reads the type and the dimensions of an array. The result has no reason (`what`) on success. */
+/* Reads the type and the dimensions of an array. On success, the member `what` of the result is
+ * NULL. */
 static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape)
 {
     ebpo_head_refusal wrong = { NULL, false };
@@ -363,8 +369,8 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
     return wrong;
 }
 
-/* Reads the layout and the filters; sets the rows of chunks and the pipeline of `shape`. The result
- * has no reason (`what`) on success. */
+/* Reads the layout and the filters. Sets shape->chunk_rows and shape->pipeline. On success, the
+ * member `what` of the result is NULL. */
 static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows rule,
                                       ebpo_shape *shape, ebpo_head_layout *layout)
 {

@@ -1,9 +1,9 @@
 /* Reads the bytes of an open head (the HDF5 headers of a file, head.h) in few reads, and keeps the
- * first failure. The first bytes of the file have all headers and are fetched at once. HDF5's chunk
- * indexes of arrays with more than one chunk are also read at once. All other bytes are read
- * through a window. Bytes beyond the end of the file are not read. After a failure of the input,
- * nothing is read. The error that is reported is the input's error if the input failed, or else the
- * reason why the reader refuses the file. */
+ * first failure. One read fetches the first bytes of the file, which have all headers. Another read
+ * fetches all chunk indexes, which HDF5 has for arrays of more than one chunk. All other bytes are
+ * read through a window. Bytes beyond the end of the file are not read. After a failure of the
+ * input, nothing is read. The error that is reported is the input's error if the input failed, or
+ * else the reason why the reader refuses the file. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -39,8 +39,8 @@ void ebpo_head_bytes_close(ebpo_head_bytes *b)
     *b = (ebpo_head_bytes){ .status = EBPO_OK };
 }
 
-/* Returns the bytes [at, at + size) of the file. `buffer` contains the range `held` of the file.
- * Returns NULL if this range does not contain the bytes. */
+/* Returns the bytes [at, at + size) of the file from a buffer. `buffer` contains the range `held`
+ * of the file. Returns NULL if this range does not contain all these bytes. */
 static const uint8_t *bytes_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
                                    uint64_t size)
 {
@@ -68,8 +68,9 @@ static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 }
 
 /* Returns the range of the window to read for an offset. Windows begin at multiples of half their
- * size, so that reading back and forth around an offset does not move the window. A window before
- * the chunk indexes ends where they begin, because they are read separately. */
+ * size, so that reading back and forth around an offset does not move the window. A window that
+ * begins before the chunk indexes ends where the indexes begin, because the indexes are read
+ * separately. */
 static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = b->input->source.size;

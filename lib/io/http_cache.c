@@ -3,10 +3,10 @@
  * while the memory limit allows. A prefetch hint is a list of ranges that will be read soon. Ranges
  * that were read least recently are dropped first. Ranges of a hint that are not read yet are
  * dropped last. The cache folder, if the caller has named one, contains blocks (parts of equal
- * size) as files. A block's file has a SHA-256, and its name contains a digest of URL and version.
- * Blocks are written under temporary names, so any number of processes may share the folder. When
- * the folder's limit is reached, the blocks that were used least recently are removed. Missing or
- * damaged blocks are fetched from the server. */
+ * size) as files. The file of a block contains a SHA-256, and the name of this file contains a
+ * digest of URL and version. Blocks are written under temporary names, so any number of processes
+ * may share the folder. When the folder's limit is reached, the blocks that were used least
+ * recently are removed. Missing or damaged blocks are fetched from the server. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
