@@ -43,7 +43,7 @@ void ebpo_numbers_decode(const uint8_t *file, uint64_t rows, uint32_t *numbers);
 /* Encode and decode columns. `values`: [rows][cols] unsigned integers of `size` bytes (1, 2, 4 or
  * 8), in the machine's byte order. `file` has the columns one after another. Each value is coded as
  * the difference to the previous value of its column (to 0 for the first value), modulo 2^(8 *
- * size), in zigzag code. `floats`: true: the values are floats or doubles, which are first
+ * size), in zigzag code. If `floats` is true, the values are floats or doubles; these are first
  * converted to integers of the same order. */
 void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
                          uint8_t *file);

@@ -2,8 +2,8 @@
  * first failure. One read fetches the first bytes of the file, which have all headers. Another read
  * fetches all chunk indexes, which HDF5 has for arrays of more than one chunk. All other bytes are
  * read through a window. Bytes beyond the end of the file are not read. After a failure of the
- * input, nothing is read. The error that is reported is the input's error if the input failed, or
- * else the reason why the reader refuses the file. */
+ * input, nothing is read. If the input failed, ebpo_head_fail reports the input's error. Otherwise
+ * it reports the reason why the reader refuses the file. */
 #include <stdlib.h>
 #include <string.h>
 

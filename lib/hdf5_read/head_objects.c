@@ -1,6 +1,6 @@
 /* Reads headers of HDF5 objects (groups and arrays), and attributes. A header consists of blocks
  * with checksums. The blocks contain messages, which describe types, dimensions, filters and
- * attributes. The headers that were used last stay in memory. Counts and sizes are bounded before
+ * attributes. The most recently used headers stay in memory. Counts and sizes are bounded before
  * memory is allocated for them, and each checksum is compared. Functions that return false have
  * recorded the reason (ebpo_refuse). Source: HDF5 File Format Specification 3.0, section IV.A. */
 #include "core/strict_fp.h"
@@ -27,22 +27,23 @@ static const char *const beyond_end = "the object's header is beyond the end of 
 
 bool ebpo_head_sound(const uint8_t *block, uint64_t size)
 {
-    /* a fuzzing build does not compare checksums, and does not compute them either, because a
-     * fuzzer would spend most of its time on them */
+    /* A fuzzing build does not compare checksums. It does not even compute them, because the fuzzer
+     * would spend most of its time on checksums. */
     return size >= 4 &&
            (!EBPO_CHECKSUMS_COMPARED || !ebpo_sum_differs(ebpo_load32(block + size - 4),
                                                           ebpo_lookup3(block, (size_t)size - 4)));
 }
 
-/* Records a lack of memory as the input's failure. Returns false. */
+/* Records a lack of memory as a failure of the input. Returns false. */
 static bool record_memory(ebpo_head_state *s, uint64_t bytes)
 {
     s->bytes.status = ebpo_fail_memory(&s->bytes.error, bytes);
     return false;
 }
 
-/* Returns true if a group's links (`links` is true) or an object's attributes are in the object's
- * header, not in B-trees and heaps, which only libhdf5 reads. */
+/* Returns true if the links of a group (`links` is true) or the attributes of an object (`links` is
+ * false) are in the object's header. Returns false if they are in B-trees and heaps, which only
+ * libhdf5 reads. */
 static bool is_compact(ebpo_head_state *s, ebpo_head_cursor c, bool links)
 {
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
@@ -69,8 +70,8 @@ static bool add_message(ebpo_head_state *s, ebpo_head_header *h, const ebpo_head
     return true;
 }
 
-/* Lists the messages of one block; `from`: offset of the block in the header's bytes; `gap`: bytes
- * of the creation order in each message. */
+/* Lists the messages of one block. `from`: offset of the block in the header's bytes. `gap`: number
+ * of bytes that each message has for its creation order. */
 static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from, unsigned gap)
 {
     ebpo_head_cursor c = { h->bytes + from, h->bytes + h->byte_count, false };
@@ -88,8 +89,8 @@ static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from
     return true;
 }
 
-/* Reads a block, which has `before` bytes, then messages of `size` bytes, and then four bytes of
- * checksum. `gap`: as in list_messages. */
+/* Reads a block at the address `at`. It has `before` bytes, then messages of `size` bytes, and then
+ * four bytes of checksum. `gap`: see list_messages. */
 static bool read_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uint64_t before,
                        uint64_t size, unsigned gap)
 {
@@ -109,7 +110,7 @@ static bool read_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uin
     return list_messages(s, h, from, gap);
 }
 
-/* Reads the first block of a header. *gap: as in list_messages. */
+/* Reads the first block of a header. Sets *gap for list_messages. */
 static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *gap)
 {
     enum { PREFIX_MAX = 34 };
@@ -198,7 +199,8 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
     return true;
 }
 
-/* Empties and returns the slot that was used least recently; its memory is reused. */
+/* Empties and returns the least recently used slot. The next header reuses the memory of this slot.
+ */
 static ebpo_head_header *free_slot(ebpo_head_state *s)
 {
     ebpo_head_header *h = &s->slot[0];
@@ -232,18 +234,19 @@ void ebpo_head_headers_free(ebpo_head_state *s)
     }
 }
 
-/* Returns true if the message describes a little-endian IEEE double. `bits`: the class's bit field.
- */
+/* Returns true if a datatype message describes a little-endian IEEE double. `bits`: the message's
+ * bit field. */
 static bool is_double(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
-    /* description of an IEEE double: bit offset, bits, position and size of the exponent, position
-     * and size of the mantissa, bias */
+    /* description of an IEEE double: bit offset, number of bits, position and size of the exponent,
+     * position and size of the mantissa, bias of the exponent */
     static const uint8_t ieee[12] = { 0, 0, 64, 0, 52, 11, 0, 52, 255, 3, 0, 0 };
     const uint8_t *at = ebpo_cursor_take(c, sizeof ieee);
     return at && size == 8 && bits == 0x3f20 && memcmp(at, ieee, sizeof ieee) == 0;
 }
 
-/* Returns true if the message describes a little-endian integer that uses all bits of its bytes. */
+/* Returns true if a datatype message describes a little-endian integer that uses all bits of its
+ * bytes. */
 static bool is_integer(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
     enum { SIGNED = 8 };
@@ -270,8 +273,8 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c)
     return type;
 }
 
-/* Reads dimensions. Also reads version 1, because programs with HDF5's default settings write it
- * when they add an attribute to a file. */
+/* Reads dimensions. Also reads messages of version 1, because programs with HDF5's default settings
+ * write this version when they add an attribute to a file. */
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c)
 {
     enum { HAS_MAX = 1, PLAIN = 1, RANK_MAX = 32 };
@@ -306,7 +309,7 @@ ebpo_head_filters ebpo_head_read_filters(ebpo_head_cursor c)
     unsigned count = ebpo_cursor_u8(&c);
     for (unsigned i = 0; i < count && i < EBPO_HEAD_FILTERS; i++) {
         unsigned id = ebpo_cursor_u16(&c), name = id >= NAMED_FROM ? ebpo_cursor_u16(&c) : 0;
-        ebpo_cursor_u16(&c); /* the flag "optional" is ignored: all filters are needed */
+        ebpo_cursor_u16(&c); /* ignores the flag "optional", because all filters are needed */
         unsigned values = ebpo_cursor_u16(&c);
         ebpo_cursor_take(&c, name);
         ebpo_head_cursor parameters = ebpo_cursor_part(&c, 4 * (size_t)values);
@@ -334,8 +337,8 @@ static ebpo_status attribute_fails(const ebpo_head *head, const char *path, cons
     return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, place, -1, "%s", what);
 }
 
-/* Returns the next part of a message, which has `size` bytes. In messages of version 1, padding up
- * to a multiple of eight bytes follows. */
+/* Returns the next part of a message. The part has `size` bytes. In messages of version 1, padding
+ * follows, up to a multiple of eight bytes. */
 static ebpo_head_cursor part_of(ebpo_head_cursor *c, unsigned version, unsigned size)
 {
     ebpo_head_cursor part = ebpo_cursor_part(c, size);
@@ -344,7 +347,7 @@ static ebpo_head_cursor part_of(ebpo_head_cursor *c, unsigned version, unsigned 
     return part;
 }
 
-/* Reads a message as an attribute; returns true if it has this name. */
+/* Reads an attribute message into *a. Returns true if the attribute has this name. */
 static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
 {
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
@@ -369,8 +372,8 @@ static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
     return true;
 }
 
-/* Finds an attribute. Returns EBPO_E_ABSENT if the object has none of this name. `values`: required
- * number of values of the attribute. */
+/* Finds an attribute. Returns EBPO_E_ABSENT if the object has no attribute of this name. `values`:
+ * required number of values. */
 static ebpo_status find_attribute(ebpo_head *head, ebpo_head_object object, const char *path,
                                   const char *name, uint64_t values, attribute *out,
                                   ebpo_error *error)
@@ -411,8 +414,8 @@ ebpo_status ebpo_head_get_text(ebpo_head *head, ebpo_head_object object, const c
                            error);
 }
 
-/* Reads an attribute's values, which have `type` and eight bytes each. `count`: number of values;
- * 0: one. `what`: message if the attribute has another type. */
+/* Reads the values of an attribute. Each value has `type`, which must have eight bytes. `count`:
+ * number of values; 0 means one value. `what`: message if the attribute has another type. */
 static ebpo_status get_numbers(ebpo_head *head, ebpo_head_object object, const char *path,
                                const char *name, ebpo_head_type type, uint64_t *values,
                                unsigned count, const char *what, ebpo_error *error)

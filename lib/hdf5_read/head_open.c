@@ -35,8 +35,8 @@ static bool has_signature(ebpo_head_state *s)
 }
 
 /* Reads the superblock, which locates the root group and states the end of the file. Returns false
- * if the superblock is refused (s->refusal has the reason), or if it is damaged or not HDF5
- * (s->refusal has no reason). */
+ * if the superblock is refused; then s->refusal has the reason. Also returns false if the
+ * superblock is damaged or the file is not HDF5; then s->refusal has no reason. */
 static bool read_superblock(ebpo_head *head)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
@@ -86,7 +86,7 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     static const char unknown[] = "not a whole HDF5 file; check whether the file was truncated by "
                                   "copying, or is another kind "
                                   "of file";
-    /* message that names the file's type if it is a known type, such as a compressed file; or NULL
+    /* text of a message if the file is of another known kind, such as a compressed file; else NULL
      */
     const char *other_kind = ebpo_wrong_kind_of_file(s->bytes.first, s->bytes.first_bytes);
     if (other_kind && !s->refusal.what && !has_signature(s))
@@ -114,7 +114,7 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
 void ebpo_head_keep_ranges(ebpo_head *head)
 {
     head->state->keeps = true;
-    /* forget the headers in memory, so that they are read again and their ranges are recorded */
+    /* empties all slots, so that headers are read again and their ranges are recorded */
     for (int i = 0; i < EBPO_HEAD_SLOTS; i++)
         head->state->slot[i].used = 0;
 }
@@ -174,7 +174,7 @@ ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_ob
             return EBPO_HEAD_OTHER;
         unsigned found = follow_name(h, path, length, object);
         path += length;
-        if (found == 0) /* ABSENT: only the last name of the path is missing */
+        if (found == 0) /* returns ABSENT only if the last name of the path is missing */
             return *path ? EBPO_HEAD_OTHER : EBPO_HEAD_ABSENT;
         if (found > 1)
             ebpo_refuse(s, "the name occurs twice in its group");

@@ -1,7 +1,7 @@
-/* Declares the parts of an open head (the HDF5 headers of a file), private to lib/hdf5_read: its
- * bytes, a cursor in bytes, headers of objects, and types, dimensions and filters. The library's
- * writer puts headers at the start of the file, and the chunk indexes of all arrays with more than
- * one chunk into one range after the first levels. */
+/* Declares the parts of an open head (the HDF5 headers of a file): its bytes, a cursor in bytes,
+ * headers of objects, and types, dimensions and filters. This header is private to lib/hdf5_read.
+ * The library's writer puts headers at the start of the file. It puts the chunk indexes of all
+ * arrays with more than one chunk into one range after the first levels. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -18,11 +18,12 @@
 /* The bytes of an open head, which are read in few reads. */
 typedef struct ebpo_head_bytes {
     ebpo_input *input;
-    /* the file's first bytes, and a range at another offset (the window); NULL until needed */
+    /* first: the file's first bytes. window: a range at another offset; NULL until needed */
     uint8_t *first, *window;
     uint8_t *table; /* the bytes of `index`; NULL until needed */
     uint8_t *large; /* a range that is too large for the window; NULL until needed */
-    /* size of `first`; offset and size of the window; size of `large` */
+    /* first_bytes: size of `first`. window_at, window_bytes: offset and size of the window.
+     * large_capacity: size of `large` */
     uint64_t first_bytes, window_at, window_bytes, large_capacity;
     ebpo_range index; /* range of the chunk indexes (ebpo_head_hint_index), or empty */
     /* status of the input's first failure, after which nothing more is read */
@@ -30,7 +31,7 @@ typedef struct ebpo_head_bytes {
     ebpo_error error;
 } ebpo_head_bytes;
 
-/* Fetches the first bytes. Call ebpo_head_bytes_close also after an error. */
+/* Fetches the first bytes. Call ebpo_head_bytes_close even if this function fails. */
 EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_input *input,
                                                ebpo_error *error);
 void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
@@ -40,12 +41,12 @@ void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
  * file, or could not be read (bytes->status). */
 const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *bytes, uint64_t at, uint64_t size);
 
-#define EBPO_NO_ADDRESS UINT64_MAX /* in HDF5: an address that is not defined */
+#define EBPO_NO_ADDRESS UINT64_MAX /* HDF5's value for an undefined address */
 
 /* A read position in untrusted bytes. Reads beyond the end return zeros and set `cut`. */
 typedef struct ebpo_head_cursor {
     const uint8_t *at, *end;
-    bool cut; /* a read went beyond the end */
+    bool cut; /* true: a read went beyond the end */
 } ebpo_head_cursor;
 
 static inline size_t ebpo_cursor_left(const ebpo_head_cursor *c)
@@ -116,7 +117,8 @@ enum {
 };
 
 typedef struct ebpo_head_message {
-    uint32_t offset, size; /* of the message's data, in the header's bytes */
+    uint32_t offset,
+        size; /* offset of the message's data in the header's bytes; size of the data */
     uint8_t type, flags;
 } ebpo_head_message;
 
@@ -145,8 +147,8 @@ typedef struct ebpo_head_state {
     ebpo_head_refusal refusal;              /* the last refusal */
     ebpo_range *kept;                       /* recorded ranges: ebpo_head_keep_ranges */
     uint64_t kept_count, kept_capacity;
-    bool keeps;          /* ranges are recorded */
-    bool kept_no_memory; /* there was no memory to record a range */
+    bool keeps;          /* true: ranges are recorded */
+    bool kept_no_memory; /* true: memory was short when a range was recorded */
 } ebpo_head_state;
 
 /* Records a range of the file that a header or index uses, if ebpo_head_keep_ranges was called. */
@@ -160,8 +162,8 @@ static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_
         s->kept_no_memory = true;
 }
 
-/* Record the reason of a refusal. Return false, which the caller can return. ebpo_refuse_foreign is
- * for valid HDF5 of other writers. */
+/* These functions record the reason of a refusal, and return false, so that the caller can return
+ * their result. ebpo_refuse_foreign is for valid HDF5 of other writers. */
 static inline bool ebpo_refuse(ebpo_head_state *s, const char *what)
 {
     s->refusal = (ebpo_head_refusal){ what, false };
@@ -177,8 +179,8 @@ static inline bool ebpo_refuse_foreign(ebpo_head_state *s, const char *what)
  * the checksum. */
 bool ebpo_head_sound(const uint8_t *block, uint64_t size);
 
-/* Returns the header at an address, valid until the next call. Returns NULL if the header is
- * refused, with the reason in s->refusal, or if reading failed. */
+/* Returns the header at an address. The header is valid until the next call. Returns NULL if the
+ * header is refused; then s->refusal has the reason. Also returns NULL if reading failed. */
 const ebpo_head_header *ebpo_head_header_at(ebpo_head_state *s, uint64_t address);
 void ebpo_head_headers_free(ebpo_head_state *s);
 
@@ -220,7 +222,7 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c);
 /* Dimensions of an array or attribute. */
 typedef struct ebpo_head_space {
     unsigned rank;    /* number of dimensions; UINT32_MAX: not readable */
-    bool fixed;       /* the dimensions cannot grow */
+    bool fixed;       /* true: the dimensions cannot grow */
     uint64_t size[2]; /* the first two dimensions */
     uint64_t values;  /* product of the dimensions; 0: no values, or the product exceeds 64 bits */
 } ebpo_head_space;
@@ -232,7 +234,8 @@ enum { EBPO_HEAD_FILTERS = 3 };
 typedef struct ebpo_head_filters {
     unsigned count; /* more than EBPO_HEAD_FILTERS: the format does not allow these filters */
     struct {
-        unsigned id, values, first; /* the filter, the number of its parameters, and the first */
+        unsigned id, values,
+            first; /* number of the filter; number of its parameters; first parameter */
     } filter[EBPO_HEAD_FILTERS];
 } ebpo_head_filters;
 

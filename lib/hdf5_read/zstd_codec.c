@@ -1,8 +1,9 @@
 /* Encodes and decodes chunks as zstd frames (RFC 8878). Each frame has its content's size and a
  * checksum. This file also checks the parts of a frame that neither zstd's decoder nor the checksum
- * checks, so that every changed bit is detected. Each block of a frame is a byte plane of shuffled
- * elements (the k-th bytes of all elements), or a stream of a coding: byte planes and streams have
- * different statistics, so each gets a separate table of codes. */
+ * checks, so that every changed bit is detected. A byte plane has byte k of all elements (shuffled
+ * elements consist of byte planes). Each block of a frame is a byte plane, or a stream of a coding.
+ * Byte planes and streams have different statistics, so each of them gets a separate table of
+ * codes. */
 #include <string.h>
 #include <zstd.h>
 
@@ -11,13 +12,13 @@
 
 /* --- parts that decoders do not check: RFC 8878, 3.1.1 --- */
 
-/* Types of blocks, and of literals. RLE: a byte that is repeated. */
+/* Types of blocks, and of literals. RLE: one byte and a number of repetitions. */
 enum { RAW, RLE, COMPRESSED, RESERVED };
-enum { DESCRIPTOR = 4 }; /* offset of the descriptor in a frame */
+enum { DESCRIPTOR = 4 }; /* offset in a frame of the frame header's descriptor byte */
 static const char unused_set[] = "an unused bit of the zstd frame is set";
 
-/* Returns the size of the literals of a compressed block, including their header; 0: the block ends
- * within this header. */
+/* Returns the size of the literals of a compressed block, including the header of the literals.
+ * Returns 0 if the block ends within this header. */
 static size_t literals_bytes(const uint8_t *block, size_t size)
 {
     unsigned kind = block[0] & 3, format = block[0] >> 2 & 3;
@@ -44,7 +45,8 @@ static size_t literals_bytes(const uint8_t *block, size_t size)
 static bool block_has_unused(const uint8_t *block, size_t size)
 {
     size_t at = size ? literals_bytes(block, size) : 0;
-    if (at == 0 || at >= size || block[at] == 0) /* 0: no sequences, and no modes */
+    if (at == 0 || at >= size ||
+        block[at] == 0) /* block[at] is 0: the block has no sequences, so no byte of modes */
         return false;
     at += block[at] < 128 ? 1 : block[at] < 255 ? 2 : 3;
     return at < size && block[at] & 3;
@@ -93,10 +95,10 @@ bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
 
 /* --- encoding --- */
 
-/* Begins a frame. If `level` is 0, chunks of at least LARGE bytes get other settings than zstd's
- * defaults: a higher level, and no short matches, because in the byte planes of low bytes, which
- * are noise, short matches take more bits than single bytes. Smaller chunks do not gain by these
- * settings, and are encoded as HDF5's filter encodes them. */
+/* Begins a frame. If `level` is 0, chunks of at least LARGE bytes get a higher level than zstd's
+ * default, and no short matches. The reason is that the byte planes of low bytes are noise, and in
+ * noise short matches take more bits than single bytes. Smaller chunks do not gain by these
+ * settings, so they get the settings of HDF5's filter. */
 static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
 {
     enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
@@ -121,7 +123,7 @@ static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_byte
         pending = ZSTD_compressStream2(zstd, &to, &from, i == b->count ? ZSTD_e_end : ZSTD_e_flush);
         at = end;
     }
-    return pending ? (size_t)-1 : to.pos; /* -1: an error, for ZSTD_isError */
+    return pending ? (size_t)-1 : to.pos; /* ZSTD_isError treats -1 as an error */
 }
 
 ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,

@@ -1,9 +1,9 @@
-/* Copies a file that another program has rewritten in another HDF5 layout. The copy has this
- * format's layout; it is made through libhdf5 in a separate process (separate_process.c). Chunks
- * whose filters and rows fit the format are copied as stored. For other layouts, filters and byte
- * orders, libhdf5 decodes the values. Arrays that do not fit the format are omitted, and the first
- * omitted array is reported. Depth and number of objects are bounded, because hard links may form
- * cycles. */
+/* Copies a file that another program has rewritten in another HDF5 layout. The copy has the layout
+ * of this format. libhdf5 makes the copy in a separate process (separate_process.c). Chunks whose
+ * filters and numbers of rows fit the format are copied as stored. For other layouts, filters and
+ * byte orders, libhdf5 decodes the values. Arrays that do not fit the format are omitted, and the
+ * first omitted array is reported. Depth and number of objects are bounded, because hard links may
+ * form cycles. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,13 +33,13 @@ typedef struct copying {
     hid_t from;
     ebpo_h5_out to;
     const char *from_path, *to_path, *shown;
-    bool from_goes; /* true: the name from_path is removed after opening */
+    bool from_goes; /* true: the file's name from_path is removed after opening */
     ebpo_h5_chunk_rows_fn chunk_rows;
     bool subtrees, kept;     /* arguments of chunk_rows (ebpo_h5_chunk_rows_fn) */
     ebpo_pipeline pipeline;  /* filters of all arrays of the copy */
     hid_t access;            /* access list of arrays, with a cache for large chunks */
     unsigned objects, depth; /* number of objects so far; depth of the current group */
-    ebpo_error omitted;      /* reason why the first omitted array was omitted */
+    ebpo_error omitted;      /* error that describes the first omitted array and the reason */
     ebpo_status status;
     ebpo_error *error;
 } copying;
@@ -78,7 +78,8 @@ static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *i
         return copy_fails(a->c, ebpo_text_ok(name) ? name : "",
                           "the file has too many objects and attributes");
     if (plain && H5Aread(attribute, type, value) >= 0) {
-        hid_t type_copy = H5Tcopy(type); /* a copy, in case the type belongs to another object */
+        hid_t type_copy =
+            H5Tcopy(type); /* a copy is necessary, because the type may belong to another object */
         ebpo_status status = ebpo_h5_put_attribute(&a->c->to, a->to, name, type_copy,
                                                    H5Scopy(space), -1, value, a->c->error);
         a->c->status = a->c->status == EBPO_OK ? status : a->c->status;
@@ -107,13 +108,13 @@ static void copy_attributes(copying *c, hid_t from, ebpo_h5_id to, const char *p
 typedef struct array_copy {
     hid_t set, plist; /* the array in the file, and its creation properties */
     const char *path;
-    ebpo_shape shape;       /* of the copy, after inspect_object */
+    ebpo_shape shape;       /* shape of the copy, valid after inspect_object */
     uint64_t stored_chunks; /* number of chunks in the file */
     bool as_stored;         /* true: chunks are copied as stored */
     hid_t type;             /* type for reading values */
 } array_copy;
 
-/* Records why an array is omitted, if it is the first omitted array. */
+/* Records why an array is omitted. Does nothing if an earlier array was omitted. */
 static void omit_array(copying *c, const char *path, const char *what)
 {
     if (!*c->omitted.message)
@@ -150,8 +151,8 @@ static bool has_filter(hid_t plist, int id)
     return false;
 }
 
-/* Returns true if libhdf5 has all filters of the array. Otherwise omits the array; the reason names
- * the missing filter. */
+/* Returns true if libhdf5 has all filters of the array. Otherwise omits the array, with a reason
+ * that names the missing filter, and returns false. */
 static bool can_decode(copying *c, const array_copy *a)
 {
     for (int i = 0; i < H5Pget_nfilters(a->plist); i++) {
@@ -206,8 +207,8 @@ static const char *find_values(array_copy *a)
     return NULL;
 }
 
-/* Finds the number of the array's chunks in the file. Sets shape.chunk_rows to their number of
- * rows, if chunks have all columns. */
+/* Finds the number of the array's chunks in the file. If each chunk has all columns, sets
+ * shape.chunk_rows to the number of rows of a chunk. */
 static void find_chunks(array_copy *a)
 {
     int rank = a->shape.cols ? 2 : 1;
@@ -256,8 +257,8 @@ static bool has_all_chunks(const array_copy *a)
     return exists;
 }
 
-/* Reads the chunk that begins with row `first` as stored. Returns false if the chunk must be
- * decoded instead. */
+/* Reads the chunk that begins with row `first`, without decoding it. Returns false if the chunk
+ * must be decoded instead. */
 static bool read_stored(const array_copy *a, uint64_t first, void *data, size_t bound,
                         size_t *bytes)
 {
@@ -286,8 +287,8 @@ static bool read_values(const array_copy *a, uint64_t first, uint64_t rows, void
     return good;
 }
 
-/* Reads the values of the copy's chunk that begins with row `first`, and encodes this chunk.
- * Returns false on failure. */
+/* Makes the copy's chunk that begins with row `first`: reads its values and encodes them. Returns
+ * false on failure. */
 static bool make_chunk(copying *c, const array_copy *a, uint64_t first, uint8_t *data,
                        size_t *bytes)
 {
@@ -331,9 +332,9 @@ static void copy_values(copying *c, const array_copy *a)
     free(data);
 }
 
-/* Makes a chunk directory in the copy. The array must exist, but the original directory describes
- * other chunks. So the new directory has one row, and lacks the attributes `file_bytes` and
- * `offset`: readers ignore a directory without these attributes. */
+/* Makes a chunk directory in the copy. The format requires this array, but the original directory
+ * describes the chunks of the original file. So the new directory has one row, and lacks the
+ * attributes `file_bytes` and `offset`. Readers ignore a directory without these attributes. */
 static void make_empty_directory(copying *c, const char *path)
 {
     static const uint64_t none[2];
@@ -381,9 +382,9 @@ static hsize_t rows_of(hid_t file, const char *path)
     return chunk[0];
 }
 
-/* Chooses the filters of the copy: those of /levels/00/types, which every file has, if the format
- * allows them. Sets c->kept to true if the chunks in the file have the rows that the format
- * requires. */
+/* Chooses the filters of the copy. These are the filters of the array /levels/00/types, which every
+ * file has, if the format allows these filters. Sets c->kept to true if the chunks in the file have
+ * the numbers of rows that the format requires. */
 static void inspect_file(copying *c)
 {
     array_copy a = { .set = H5Dopen2(c->from, "/levels/00/types", H5P_DEFAULT) };

@@ -1,7 +1,7 @@
 /* Declares how lib/hdf5_write uses libhdf5; private to this folder. Every call of libhdf5 is in a
- * scope: between ebpo_h5_enter and ebpo_h5_leave. A scope locks a mutex that all threads share,
- * because Debian's serial build of libhdf5 is not thread-safe. A scope also switches off HDF5's
- * error printing; ebpo_h5_leave restores the printing. */
+ * scope, that is, between ebpo_h5_enter and ebpo_h5_leave. A scope locks a mutex that all threads
+ * share, because Debian's serial build of libhdf5 is not thread-safe. A scope also switches off
+ * HDF5's error printing; ebpo_h5_leave restores the printing. */
 #ifndef EBPO_HDF5_WRITE_H5_PARTS_H
 #define EBPO_HDF5_WRITE_H5_PARTS_H
 
@@ -28,7 +28,7 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
 bool ebpo_h5_short_of_memory(void);
 
 /* Opens a file of another program for reading. If `lock` is true, fails while another program has
- * the file open for writing, because the data may then be a mixture of two versions; if the file
+ * the file open for writing, because the data may then be a mixture of two versions. If the file
  * system has no locks, opens the file without a lock. On failure, *file is -1. */
 EBPO_MUST_USE ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                                                hid_t *file, ebpo_error *error);
@@ -38,7 +38,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_open_to_read(const char *path, const char *sho
  */
 bool ebpo_h5_is_elsewhere(hid_t set);
 
-/* Returns the stored type for little-endian integers of `size` bytes; -1 for another size. */
+/* Returns HDF5's type for little-endian integers of `size` bytes (1, 2, 4 or 8), or -1 for another
+ * size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
 /* A sink: a virtual file driver, through which libhdf5 writes. A sink stores the first failed
@@ -48,8 +49,8 @@ typedef struct ebpo_h5_sink {
     hid_t id;                /* libhdf5's registration of the driver */
     int fd;                  /* descriptor of the file; -1: the bytes are in `memory` */
     uint8_t *memory;         /* [capacity] */
-    uint64_t capacity, size; /* size: of the file or of the used memory, in bytes */
-    /* status of the first failure */
+    uint64_t capacity, size; /* size: bytes of the file or of the used memory */
+    /* status and error of the first failure */
     ebpo_status status;
     ebpo_error error;
     char shown[]; /* for messages */
@@ -59,18 +60,20 @@ typedef struct ebpo_h5_sink {
  * called inside or outside a scope. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
                                             ebpo_error *error);
-/* Makes a file access property list use the sink; returns false if libhdf5 reports an error. Call
- * this function inside a scope. */
+/* Sets the sink as the driver of a file access property list. Returns false if libhdf5 reports an
+ * error. Call this function inside a scope. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl);
-/* Stores a failure, if it is the first one. */
+/* Stores a failure. Does nothing if an earlier failure is stored. */
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);
 /* Returns the stored failure, or EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error);
-/* Closes the sink's file after libhdf5 has closed the file, and frees the sink. Call this function
- * inside a scope. Returns the first failure, including a failure of this function. */
+/* Closes the sink's descriptor and frees the sink. Call this function after libhdf5 has closed the
+ * file. Call this function inside a scope. Returns the first failure, including a failure of this
+ * function. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error);
-/* Releases the file but keeps the sink: libhdf5 could not close its file, for lack of memory, and
- * may call the driver again at any time. */
+/* Closes the sink's descriptor or frees its bytes, but keeps the sink. This is for the case that
+ * libhdf5 could not close its file because memory was short: libhdf5 may then call the driver again
+ * at any time. */
 void ebpo_h5_sink_abandon(ebpo_h5_sink *sink);
 
 /* The functions below write objects for h5_write.c (this library's layout) and tables.c (files for
@@ -84,21 +87,21 @@ hid_t ebpo_h5_write_access(struct ebpo_h5_sink *sink, H5F_libver_t version);
 /* Returns EBPO_OK if libhdf5 has created out->file. */
 ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error);
 
-/* Returns EBPO_OK if a call of libhdf5 succeeded (`good`) and no write has failed so far. Otherwise
- * returns the failure of the first failed write or, if no write has failed, of the call. `what`:
- * the object that was written, for the message. Call this function right after the call of libhdf5,
- * because further calls erase libhdf5's reason. */
+/* Returns EBPO_OK if a call of libhdf5 succeeded (`good`) and no write has failed so far. If a
+ * write has failed, returns the failure of the first failed write. Otherwise returns the failure of
+ * the call. `what`: the object that was written, for the message. Call this function right after
+ * the call of libhdf5, because further calls erase libhdf5's reason. */
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error);
 
-/* Creates a group; closes the property list. If `good` is false (setting a property has failed),
- * this function fails. */
+/* Creates a group, and closes the property list `gcpl`. `good`: false if setting a property has
+ * failed; then this function fails. */
 ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gcpl, bool good,
                               ebpo_h5_id *id, ebpo_error *error);
-/* Creates a dataset; closes the space and the property list. `good`: as in ebpo_h5_put_group. */
+/* Creates a dataset, and closes the space and the property list. `good`: see ebpo_h5_put_group. */
 ebpo_status ebpo_h5_put_dataset(const ebpo_h5_out *out, const char *path, hid_t type, hid_t space,
                                 hid_t dcpl, bool good, ebpo_h5_id *id, ebpo_error *error);
-/* Writes an attribute, from values of the type `memory`, or of the stored type if `memory` is -1.
- * Closes the space. */
+/* Writes an attribute of the stored type `type`, and closes the space. `memory`: type of the values
+ * in memory; -1: the stored type. */
 ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const char *name,
                                   hid_t type, hid_t space, hid_t memory, const void *value,
                                   ebpo_error *error);
@@ -106,13 +109,14 @@ ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const ch
 void ebpo_h5_close_list(hid_t list);
 void ebpo_h5_close_space(hid_t space);
 
-/* The work of a separate process in which libhdf5 reads untrusted files. The process has no other
- * thread, loads no plugin, and libhdf5 prints nothing. Only files that the work writes, and the
- * status and error that it returns, remain after the process has ended. */
+/* Callback for the work of a separate process, in which libhdf5 reads untrusted files. The process
+ * has no other thread, loads no plugin, and libhdf5 prints nothing. After the process has ended,
+ * only two things remain: the files that the work has written, and the status and error that it has
+ * returned. */
 typedef ebpo_status (*ebpo_process_fn)(void *user, ebpo_error *error);
 
-/* Runs `work` in a separate process with limits; a crash ends only that process. Returns the status
- * and error of the work; even if the status is EBPO_OK, *error may have a message. Returns
+/* Runs `work` in a separate process with limits. A crash ends only that process. Returns the status
+ * and error of the work. Even if the status is EBPO_OK, *error may have a message. Returns
  * EBPO_E_FORMAT if the process crashed or exceeded a limit. `shown`: name of the file for messages.
  */
 EBPO_MUST_USE ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *shown,

@@ -28,14 +28,14 @@ enum {
     EXPANSION_FREE = 64 << 20
 };
 
-/* A dataset to read, and the request. */
+/* A request for rows, and the dataset that has the rows. */
 typedef struct dataset {
-    const char *path, *name;      /* path of the file; name of the dataset in the file */
-    int to;                       /* descriptor of the temporary file for the rows */
-    unsigned least, most;         /* allowed numbers of columns */
-    uint64_t bytes_max;           /* limit for all rows */
-    double fill;                  /* value of the columns that the dataset lacks */
-    uint64_t first, end;          /* the requested rows [first, end) */
+    const char *path, *name; /* path of the file; name of the dataset in the file */
+    int to;                  /* descriptor of the temporary file for the rows */
+    unsigned least, most;    /* allowed numbers of columns */
+    uint64_t bytes_max;      /* limit for all rows */
+    double fill;             /* value for columns that were requested, but that the dataset lacks */
+    uint64_t first, end;     /* the requested rows [first, end) */
     hid_t file, set, space, type; /* valid while the dataset is open */
     hsize_t size[2];              /* rows and columns of the dataset */
 } dataset;
@@ -94,7 +94,8 @@ static bool is_of_format(hid_t file)
     return fits;
 }
 
-/* Returns a description of the values if they are not real numbers, else NULL. */
+/* Returns a description of the values if the dataset does not have plain real numbers, else NULL.
+ */
 static const char *other_values(const dataset *d, hid_t set, hid_t type)
 {
     H5T_class_t class = H5Tget_class(type);
@@ -120,7 +121,8 @@ static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2]
            H5Sget_simple_extent_dims(space, size, NULL) == 2 && size[1] >= least && size[1] <= most;
 }
 
-/* Writes the expected shape of rows, such as "rows of 3 numbers" or "rows of 6 to 7 numbers". */
+/* Writes a description of the expected rows to `what`, such as "rows of 3 numbers" or "rows of 6 to
+ * 7 numbers". */
 static void describe_rows(const dataset *d, char what[64])
 {
     snprintf(what, 64, "rows of %u%s%.0u numbers", d->least, d->most > d->least ? " to " : "",
@@ -165,8 +167,9 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
 /* The datasets of the file that have the requested rows. */
 typedef struct candidates {
     const dataset *d;
-    unsigned objects, found; /* number of visited objects, and of datasets found */
-    char names[384];         /* the first names, for a message */
+    unsigned objects,
+        found;       /* number of visited objects; number of datasets with the requested rows */
+    char names[384]; /* the first names, for a message */
 } candidates;
 
 /* Callback of H5Ovisit2: adds a dataset to the candidates if it has the requested rows. */
@@ -200,7 +203,8 @@ static herr_t inspect_object(hid_t file, const char *name, const H5O_info_t *inf
     return 0;
 }
 
-/* Sets an error that lists the candidate datasets, or that reports that the file has none. */
+/* Sets an error that lists the datasets with the requested rows, or that reports that the file has
+ * no such dataset. */
 static ebpo_status name_sets(dataset *d, ebpo_error *error)
 {
     candidates c = { .d = d };
@@ -216,9 +220,9 @@ static ebpo_status name_sets(dataset *d, ebpo_error *error)
                           *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
 }
 
-/* Reads `count` rows from row `first` on into `rows`, [count][most]. If the dataset has fewer than
- * `most` columns, the last columns of `rows` do not change. On failure, sets *short_of_memory to
- * true if a lack of memory is the reason. */
+/* Reads `count` rows, beginning with row `first`, into `rows`, [count][d->most]. If the dataset has
+ * fewer than d->most columns, the last columns of `rows` do not change. On failure, sets
+ * *short_of_memory to true if a lack of memory is the reason. */
 static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *rows,
                        bool *short_of_memory)
 {
@@ -257,7 +261,7 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Does the work of the separate process. */
+/* Does the work of the separate process: reads the rows and writes them to d->to. */
 static ebpo_status read_apart(void *user, ebpo_error *error)
 {
     dataset *d = user;
@@ -285,7 +289,8 @@ static bool read_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes
     return true;
 }
 
-/* Reads the other process's result: the total number of rows, and the requested rows. */
+/* Reads the result of the separate process from the temporary file: the total number of rows, and
+ * the requested rows. */
 static ebpo_status read_result(const dataset *d, double **rows, uint64_t *count, uint64_t *total,
                                ebpo_error *error)
 {
@@ -343,7 +348,7 @@ ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned lea
     if (least < 1 || most < least || most > COLUMNS_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be requested",
                          COLUMNS_MAX);
-    /* datasets in this library's files may have the library's filter */
+    /* because datasets in files of this library may have the library's filter (zstd) */
     ebpo_status status = ebpo_h5_register(error);
     if (status == EBPO_OK)
         status = prepare_reading(&d, error);

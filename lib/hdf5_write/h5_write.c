@@ -1,8 +1,8 @@
-/* Creates files in this library's layout: headers are one contiguous range at the start, links and
- * attributes are in the object headers, and chunks are written as the caller has encoded them. HDF5
- * spaces and property lists are closed, also after an earlier failure. All calls after a failed
- * write return the first failure (sink.c). This file also writes the attributes of tables for other
- * programs (tables.c). */
+/* Creates files in this library's layout. The HDF5 headers are one contiguous range at the start.
+ * Links and attributes are in the object headers. Chunks are written as the caller has encoded
+ * them. The functions close HDF5 spaces and property lists even after an earlier failure. All calls
+ * after a failed write return the first failure (sink.c). This file also writes the attributes of
+ * tables for other programs (tables.c). */
 #include <string.h>
 
 #include "core/error.h"
@@ -10,7 +10,7 @@
 #include "hdf5_write/h5_parts.h"
 #include "hdf5_write/zstd_filter.h"
 
-/* Number of links or attributes of an object up to which HDF5 stores them in the object's header.
+/* Greatest number of links or attributes of an object that HDF5 stores in the object's header.
  * Beyond this number HDF5 would use B-trees and heaps, which readers of this format do not read. */
 enum { COMPACT = 65535 };
 
@@ -26,7 +26,7 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
     ebpo_h5_leave(&scope);
 }
 
-/* Makes libhdf5 keep all metadata in memory, so that it never reads metadata again: if such a read
+/* Makes libhdf5 keep all metadata in memory, so that it never reads metadata again. If such a read
  * failed, libhdf5 could not close the file. */
 static bool keep_metadata(hid_t fapl)
 {
@@ -93,8 +93,8 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
     return status;
 }
 
-/* Closes the file. Sets out->file to -1 even if closing fails, because libhdf5 has released the
- * file also in this case. */
+/* Closes the file. Sets out->file to -1 even if closing fails, because libhdf5 releases the id even
+ * then. */
 static ebpo_status close_file(ebpo_h5_out *out, ebpo_error *error)
 {
     bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
@@ -147,9 +147,9 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
     return status;
 }
 
-/* --- attributes: stored little-endian, from values in the machine's order --- */
+/* --- attributes; libhdf5 converts values from the machine's byte order to little-endian --- */
 
-/* Writes an attribute of `count` numbers; 0: a scalar. */
+/* Writes an attribute of `count` numbers; if `count` is 0, a scalar. */
 static ebpo_status put_numbers(ebpo_h5_out *out, ebpo_h5_id id, const char *name, hid_t stored,
                                hid_t memory, const void *values, unsigned count, ebpo_error *error)
 {
@@ -294,8 +294,8 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
     return status;
 }
 
-/* Unused space is zero, and metadata blocks end with a checksum. So the metadata end at the last
- * byte that is not zero, or a few bytes later if the checksum ends with zeros. */
+/* Unused bytes are zero, and blocks of metadata end with a checksum. So the metadata end after the
+ * last byte that is not zero, or a few bytes later if the last checksum ends with zero bytes. */
 ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                               ebpo_error *error)
 {
@@ -360,8 +360,8 @@ void ebpo_h5_discard(ebpo_h5_out *out)
     ebpo_h5_leave(&scope);
 }
 
-/* Returns the sink's first failure, if any. Otherwise, if `good` is false, returns the failure of
- * the last call of libhdf5; else EBPO_OK. */
+/* If a write of the sink has failed, returns the first failure. Otherwise, if `good` is false,
+ * returns the failure of the last call of libhdf5. Otherwise returns EBPO_OK. */
 static ebpo_status report_outcome(const ebpo_h5_out *out, const char *object, bool good,
                                   const char *what, ebpo_error *error)
 {

@@ -1,7 +1,7 @@
 /* Provides the scope of each use of libhdf5 (h5_parts.h): locks a mutex, because Debian's serial
  * build is not thread-safe, and switches off HDF5's error printing. Also provides functions that
- * are used within a scope: to make errors that name file, object and libhdf5's innermost reason,
- * and to open untrusted files. Registers the library's filter. */
+ * are called within a scope. They open untrusted files, and make errors that name the file, the
+ * object and libhdf5's innermost reason. Also registers the library's filter. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -32,8 +32,7 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
 }
 
 enum {
-    /* size of a buffer for a message of libhdf5; large enough for the error number, which follows a
-     * path */
+    /* size of a buffer for a message of libhdf5, which may have a path before the error number */
     CAUSE_BYTES = 8192,
     CAUSE_SHOWN = 160 /* greatest length of libhdf5's message in a message of this library */
 };
@@ -62,8 +61,8 @@ bool ebpo_h5_short_of_memory(void)
     return found;
 }
 
-/* Returns the error number of the system (errno) in libhdf5's reason, or 0 if the reason has none.
- */
+/* Returns the error number of the system (errno) in libhdf5's message `cause`. Returns 0 if the
+ * message has no such number. */
 static int system_error(const char *cause)
 {
     const char *number = strstr(cause, "errno = ");

@@ -20,7 +20,7 @@ typedef struct report {
     ebpo_error error;
 } report;
 
-/* Returns the address space of this process in bytes; 0: not known. */
+/* Returns the address space of this process in bytes, or 0 if it is not known. */
 static uint64_t address_bytes(void)
 {
     unsigned long long pages = 0;
@@ -32,7 +32,7 @@ static uint64_t address_bytes(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Lowers a limit of this process to `most`. */
+/* Lowers the limit of the resource `what` of this process to `most`. */
 static void limit_resource(int what, uint64_t most)
 {
     struct rlimit limit;
@@ -97,7 +97,8 @@ static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits
     for (size_t i = 0; i < sizeof handled / sizeof handled[0]; i++)
         /* signal handlers of the caller must not run in the separate process */
         signal(handled[i], SIG_DFL);
-    signal(SIGXFSZ, SIG_IGN); /* so that a write beyond the limit fails */
+    signal(SIGXFSZ,
+           SIG_IGN); /* so that a write beyond the limit fails instead of ending the process */
     signal(SIGPIPE, SIG_IGN);
     set_limits(limits, address_space);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
@@ -107,7 +108,8 @@ static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits
     _exit(0);
 }
 
-/* Sets the error for a process that ended without a result. `state`: from waitpid. */
+/* Sets the error for a process that ended without a result. `state`: state of the process, from
+ * waitpid. */
 static ebpo_status fail_by_state(int state, const char *shown, ebpo_error *error)
 {
     if (!WIFSIGNALED(state)) /* the process ended by itself, but could not report its result */

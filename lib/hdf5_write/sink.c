@@ -1,9 +1,10 @@
 /* Provides the virtual file driver (sink) through which libhdf5 writes to a file or to memory.
  *
- * libhdf5 1.10 does not survive a failed write: it keeps unflushed data and an id whose file is
- * already released, and fails when it uses this id at exit. So the driver stores the first failure,
- * and reports every write to libhdf5 as successful. libhdf5 then always closes the file normally.
- * ebpo_h5_sink_status and ebpo_h5_sink_close return the stored failure. */
+ * libhdf5 1.10 does not survive a failed write. After such a failure, it keeps unflushed data and
+ * an id whose file is already released, and it fails when it uses this id at exit. So the driver
+ * stores the first failure, and reports every write to libhdf5 as successful. libhdf5 then always
+ * closes the file normally. ebpo_h5_sink_status and ebpo_h5_sink_close return the stored failure.
+ */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -20,7 +21,7 @@
  * GiB. */
 static const size_t CALL_BYTES_MAX = (size_t)1 << 30;
 
-/* An open file, as libhdf5 sees it. libhdf5 uses only the first member. */
+/* The driver's struct for an open file. libhdf5 uses only the first member. */
 typedef struct sink_file {
     H5FD_t libhdf5;
     ebpo_h5_sink *sink;
@@ -45,7 +46,8 @@ ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error)
     return sink->status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &sink->error);
 }
 
-/* Stores a failure with the system's reason (errno), if it is the first one. */
+/* Stores a failure with the system's reason (errno). Does nothing if an earlier failure is stored.
+ */
 static void fail_errno(ebpo_h5_sink *sink, const char *what)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -108,8 +110,8 @@ static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t a
 {
     (void)name;
     (void)address_max;
-    /* The flags (create, truncate) are ignored. A new sink is empty anyway, and a sink that libhdf5
-     * opens again later must not be truncated. */
+    /* Ignores the flags (create, truncate). A new sink is empty anyway, and when libhdf5 opens a
+     * sink again, the sink must keep its bytes. */
     (void)flags;
     const sink_settings *settings = H5Pget_driver_info(fapl);
     if (!settings)
@@ -130,8 +132,8 @@ static herr_t sink_close(H5FD_t *file)
     return 0;
 }
 
-/* Sets the same flags as libhdf5's default driver, because the offsets of metadata depend on these
- * flags. */
+/* Sets the flags that libhdf5's default driver sets, because the offsets of metadata depend on
+ * these flags. */
 static herr_t sink_query(const H5FD_t *file, unsigned long *flags)
 {
     (void)file;
@@ -185,7 +187,7 @@ static herr_t sink_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addre
     (void)dxpl;
     ebpo_h5_sink *sink = ((sink_file *)file)->sink;
     size_t available = 0;
-    /* available: bytes before the end of the file; bytes beyond the end are zeros */
+    /* number of requested bytes before the end of the file; the bytes beyond the end are zeros */
     if (sink->fd >= 0)
         available = read_file(sink, address, size, buffer);
     else if (address < sink->size)
@@ -270,7 +272,7 @@ static const H5FD_class_t sink_class = {
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    /* libhdf5 copies a sink_settings as bytes, because this class has no function to copy it */
+    /* libhdf5 copies sink_settings byte by byte, because this class defines no copy function */
     .fapl_size = sizeof(sink_settings),
     .open = sink_open,
     .close = sink_close,

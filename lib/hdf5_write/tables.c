@@ -135,7 +135,8 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
     return status;
 }
 
-/* Size of a chunk of a volume: layers, and values along the other two axes. */
+/* Size of a chunk of a volume: number of layers, and number of values along each of the other two
+ * axes. */
 enum { LAYERS_OF_A_CHUNK = 16, SIDE_OF_A_CHUNK = 64 };
 
 static hsize_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }

@@ -1,6 +1,7 @@
 /* Replaces all other files of lib/hdf5_write if the library is built without libhdf5
- * (-Dhdf5=disabled). The library then still reads files of this format, but the functions in this
- * file fail. Only ebpo_h5_finish succeeds, because no file is open. */
+ * (-Dhdf5=disabled). The library then still reads files of this format. The functions in this file
+ * fail, except the functions that close or finish a file or object: no file is ever open, so these
+ * do nothing. */
 #include <ebpo/rows.h>
 
 #include "core/error.h"

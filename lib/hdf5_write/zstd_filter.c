@@ -16,9 +16,9 @@ enum { DEFAULT_LEVEL = 3 };
 /* HDF5 stores chunk sizes in 32 bits. */
 static const uint64_t CHUNK_MAX = UINT32_MAX;
 
-/* Returns 0, HDF5's sign of failure, and reports the reason to libhdf5. The plugin does not report
- * the reason: programs with a private libhdf5, such as h5py, could not load a plugin that calls
- * HDF5's error functions. */
+/* Reports a lack of memory to libhdf5. Returns 0, which HDF5 treats as a failure. The plugin does
+ * not report the reason, because programs with a private libhdf5, such as h5py, could not load a
+ * plugin that calls HDF5's error functions. */
 static size_t short_of_memory(void)
 {
 #ifndef EBPO_FILTER_IN_PLUGIN
@@ -39,8 +39,9 @@ static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, si
     return used;
 }
 
-/* Replaces the buffer by its compressed content. `level`: [level_count] parameters of the filter.
- * Returns the compressed size, or 0 after an error. */
+/* Replaces the buffer by its compressed content. `level`: [level_count] parameters of the filter;
+ * the first parameter is the compression level. Returns the compressed size, or 0 after an error.
+ */
 static size_t compress_chunk(size_t level_count, const unsigned level[], size_t bytes,
                              size_t *buffer_size, void **buffer)
 {
@@ -62,7 +63,7 @@ static size_t compress_chunk(size_t level_count, const unsigned level[], size_t 
 failed:
     free(block);
     ZSTD_freeCCtx(context);
-    return 0; /* HDF5's sign of failure */
+    return 0; /* HDF5 treats 0 as a failure */
 }
 
 /* Decodes a frame that states its size. Returns the size, or 0 after an error. */
@@ -81,8 +82,8 @@ static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, voi
     return replace_buffer(buffer, buffer_size, block, (size_t)size, used);
 }
 
-/* Decodes a frame of another writer, which does not state its size, into a growing buffer. Returns
- * the size, or 0 after an error. */
+/* Decodes a frame that does not state its size into a growing buffer. Other programs write such
+ * frames. Returns the size, or 0 after an error. */
 static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
 {
     ZSTD_DCtx *context = ZSTD_createDCtx();
@@ -101,7 +102,7 @@ static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
         size_t before = out.pos;
         pending = ZSTD_decompressStream(context, &out, &in);
         if (ZSTD_isError(pending) || (pending && in.pos == in.size && out.pos == before))
-            break; /* damaged, or the frame ends early */
+            break; /* the frame is damaged, or ends early */
     }
     ZSTD_freeDCtx(context);
     if (pending == 0 && out.pos)
