@@ -1,4 +1,4 @@
-/* Allocates memory with checked sizes: the number of items comes from a file or a mesh, so the
+/* Allocates memory with checked sizes. The number of items comes from a file or a mesh, so the
  * product of this number and the item size may overflow. Arrays that may be larger than memory come
  * from a workspace instead (workspace.c). A quota limits the memory of an object that is being
  * built. */

@@ -96,9 +96,8 @@ void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count
 /* Sets `most` bytes of the budget aside for data other than items: items can no longer use these
  * bytes. Call this function before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Takes bytes that are set aside, and drops items to free memory. Returns false if fewer than
- * `bytes` bytes of those set aside are left, or if items in use and running loads leave too little
- * memory now. */
+/* Takes bytes that are set aside, and drops items to free memory. Returns false if too few bytes
+ * are still set aside, or if items in use and running loads leave too little memory now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
 /* Gives back bytes that ebpo_cache_take_aside has taken. */
 void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);

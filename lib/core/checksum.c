@@ -1,5 +1,5 @@
-/* Computes checksums: SHA-256 (by the library nettle) of source meshes and of the content of files,
- * and lookup3 ("hashlittle" with the initial value 0, Bob Jenkins, 2006) of HDF5 metadata.
+/* Computes checksums. SHA-256 (by the library nettle) is for source meshes and for the content of
+ * files. lookup3 ("hashlittle" with the initial value 0, Bob Jenkins, 2006) is for HDF5 metadata.
  * Comparisons of checksums are in checksum.h, because a fuzzing build skips them. */
 #include "core/checksum.h"
 #include "core/endian.h"

@@ -21,8 +21,9 @@ void ebpo_sha256_hex(const uint8_t digest[32], char hex[65]);
 
 /* ebpo_sum_differs and ebpo_digest_differs compare a computed checksum with the checksum that a
  * file states. All comparisons of checksums are in these two functions, so that a fuzzing build
- * (`-Dfuzzing=true`, never installed) can skip them: with comparisons, damaged input would be
- * rejected by its checksum, and would never reach the code that the fuzzer tests. */
+ * (`-Dfuzzing=true`, never installed) can skip them. If the fuzzing build compared checksums, the
+ * input of the fuzzer would be rejected by its checksum, and would never reach the code that the
+ * fuzzer tests. */
 
 #ifdef EBPO_FUZZING
 enum { EBPO_CHECKSUMS_COMPARED = 0 };

@@ -1,5 +1,5 @@
 /* Keeps disjoint sets of items (union-find) in one array. parent[i] is an item of the set of item
- * i. The root of a set is its lowest item, and is its own parent. */
+ * i. The root of a set is its lowest item. For the root, parent[i] is i. */
 #ifndef EBPO_CORE_DISJOINT_SETS_H
 #define EBPO_CORE_DISJOINT_SETS_H
 

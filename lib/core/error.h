@@ -47,9 +47,9 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
 /* Returns EBPO_E_ARGUMENT when the caller's result struct does not state its size. */
 #define EBPO_CHECK_SIZED(type, out, error) ebpo_sized_check((out)->struct_size, #type, error)
 
-/* Copies to the caller's struct *out those members of *filled that *out has. Members of *out that
- * *filled lacks become 0. Keeps the caller's struct_size. If struct_size is not set, returns
- * EBPO_E_ARGUMENT and writes nothing. */
+/* Copies each member of *filled to the caller's struct *out, if *out has this member. Members of
+ * *out that *filled lacks become 0. Keeps the caller's struct_size. If struct_size is not set,
+ * returns EBPO_E_ARGUMENT and writes nothing. */
 #define EBPO_GIVE(type, out, filled) \
     ebpo_sized_give((out), (out)->struct_size, (filled), sizeof(type))
 

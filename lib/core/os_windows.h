@@ -326,7 +326,7 @@ static inline double ebpo_windows_sqrt(double x)
 #define getenv ebpo_windows_getenv
 char *ebpo_windows_getenv(const char *name);
 
-/* The only locale is "C", because the library never uses another one. */
+/* The only locale is "C", because the library uses no other locale. */
 typedef struct ebpo_windows_locale *locale_t;
 #define LC_ALL_MASK 0
 locale_t newlocale(int mask, const char *name, locale_t base);

@@ -77,8 +77,8 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 }
 /* Eight numbers below 16, which select from the 16 floats of an f8_table (f8_look_up). */
 typedef struct n8 {
-    /* low: the numbers, of which only the lower three bits are used. high: a mask in which a lane
-     * is set if its number is at least 8 */
+    /* low: the numbers; only their lower three bits are used. high: a mask in which a lane is set
+     * if its number is at least 8 */
     __m256i low, high;
 } n8;
 typedef struct f8_table {
@@ -318,7 +318,7 @@ EBPO_EIGHT f8 f8_inverse(f8 a)
     return f8_mul(x, f8_sub(f8_all(2), f8_mul(a, x)));
 }
 
-/* Returns the least of the eight floats, none of which may be NaN. */
+/* Returns the least of the eight floats. No float may be NaN. */
 EBPO_EIGHT float f8_least(f8 a)
 {
 #if defined(EBPO_SIMD_AVX2)

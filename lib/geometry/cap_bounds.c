@@ -8,9 +8,9 @@
  * |x - p|, the solid angle at p is the integral of f . dA over the triangles, where f(x) = (x - p)
  * / r^3. The norm of f is 1 / r^2, and the norm of its derivative is 2 / r^3. Let a box have the
  * centre q and half the diagonal s, and a distance g > 0 from the ball. For every p in the box, the
- * half angle is at most a / (2 g^2). It differs from V . f(c) / 2 at q by at most a (R + s) / g^3,
- * because the differences x - p form a convex set, in which the norm is at least g. The half angle
- * of a triangle is also at most pi.
+ * half angle is at most a / (2 g^2). The half angle differs from V . f(c) / 2 at q by at most a (R
+ * + s) / g^3, because the differences x - p form a convex set, in which the norm is at least g. The
+ * half angle of a triangle is also at most pi.
  *
  * Border edges. Away from the faces of S, w_S is smooth, also on caps. The gradient of 4 pi w_S is
  * the integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of
@@ -134,8 +134,8 @@ static bool has_parts(const ebpo_cap_tree *t, uint32_t entry)
 }
 
 /* Writes the parts of a node. The parts of a group are its two nodes. A stretch is a path along a
- * border loop; its parts are its triangle, and those of its two halves that have triangles. Returns
- * the number of parts. */
+ * border loop. Its parts are its triangle and its two halves; a half without triangles is omitted.
+ * Returns the number of parts. */
 static uint32_t find_parts(const ebpo_cap_tree *t, uint32_t entry, uint32_t part[3])
 {
     const ebpo_cap_node *n = &t->node[entry];

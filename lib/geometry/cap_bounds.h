@@ -3,9 +3,9 @@
  *
  * The bounds are sums of half angles (halves of solid angles). The sum for all discs is 2 pi w_D,
  * where w_D is the winding number of the discs. An entry is the index of a node of the tree, and
- * means all triangles of the node. A node may be a stretch, that is, a path along a border loop.
- * The triangles of a stretch are those of its two halves and one more triangle
- * (geometry/cap_triangles.h). An entry with the bit EBPO_CAP_TRIANGLE means only this triangle. */
+ * means all triangles of the node. A node may be a stretch, that is, a path along a border loop. A
+ * stretch has the triangles of its two halves, and one more triangle (geometry/cap_triangles.h). An
+ * entry with the bit EBPO_CAP_TRIANGLE means only this triangle. */
 #ifndef EBPO_GEOMETRY_CAP_BOUNDS_H
 #define EBPO_GEOMETRY_CAP_BOUNDS_H
 
@@ -45,8 +45,8 @@ bool ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
 typedef struct ebpo_near_cell {
     float far_middle, far_error; /* ebpo_bounded of the far discs */
     /* If no face touches the cell: the winding number k of the mesh with its caps, at the lowest
-     * corner. If the cell is a part of a leaf: the index of the leaf's own ebpo_near_cell, whose
-     * list has all caps that may touch the leaf, or -1 if no cap touches the leaf. */
+     * corner. If the cell is a part of a leaf: the index of the ebpo_near_cell of the whole leaf,
+     * whose list has all caps that may touch the leaf; -1: no cap touches the leaf. */
     int32_t winding;
     uint32_t first;
     uint16_t count;
@@ -92,10 +92,10 @@ ebpo_bounded ebpo_cap_front_sum(const ebpo_cap_front *front, bool *apart);
  * replaced, or if the entries without parts have an error of pi, so that refining is useless. */
 bool ebpo_cap_front_refine(ebpo_cap_front *front);
 
-/* Returns an upper bound of the variation of 2 pi w_S between the centre of a box and any point of
- * the box, where w_S is the winding number of the mesh without caps. Returns INFINITY if no bound
- * below `most` is found. No face may touch the box, but a cap may cross it, because w_S does not
- * jump at caps. */
+/* w_S is the winding number of the mesh without caps. Returns an upper bound of the difference of 2
+ * pi w_S between the centre of a box and any point of the box. Returns INFINITY if no bound below
+ * `most` is found. No face may touch the box, but a cap may cross it, because w_S does not jump at
+ * caps. */
 double ebpo_cap_variation(const ebpo_cap_tree *tree, const ebpo_cap_box *box, double most);
 
 #endif

@@ -7,9 +7,9 @@
  *
  *   w_S(p) = k(p) + w_D(p).
  *
- * w_D is a sum of solid angles over few triangles. A tree gives bounds of this sum, which are
- * refined only as far as a decision needs. At a point on a cap, k and w_D jump, but w_S does not.
- * There, k and w_D are those of the point after the infinitely small shift of ebpo_axis_crossing.
+ * w_D is a sum of solid angles over few triangles. A tree gives bounds of this sum. The bounds are
+ * refined only until a decision is possible. At a point on a cap, k and w_D jump, but w_S does not.
+ * There, k and w_D are computed after the infinitely small shift of ebpo_axis_crossing.
  */
 #ifndef EBPO_GEOMETRY_CAP_TREE_H
 #define EBPO_GEOMETRY_CAP_TREE_H
@@ -26,8 +26,8 @@ typedef struct ebpo_cap_node {
     double area;              /* upper bound of the sum of weight * area */
     double vector[3];         /* sum of weight * area * normal */
     double slack;             /* bound of the rounding error of `vector` */
-    /* upper bound of the sum of weight * length over the border edges of the path; in a node of a
-     * whole loop, also over the loop's last edge */
+    /* upper bound of the sum of weight * length over the border edges of the path. A node of a
+     * whole loop also includes the loop's last edge */
     double length;
     double most;       /* pi times the sum of the weights: bounds the sum of the half angles */
     uint32_t from, to; /* a stretch: positions in ebpo_cap_tree.position; a group: its two nodes */

@@ -1,10 +1,11 @@
 /* Makes the cap triangles of a closed loop of vertices, by halving.
  *
  * A stretch [i, j] of a loop is the path from position i to position j and the chord between them.
- * A stretch of more than one edge has the triangle (i, m, j), m = i + (j - i) / 2, and two halves,
- * the stretches [i, m] and [m, j]. The whole loop of n vertices is the stretch [0, n - 1], whose
- * chord is the loop's last edge. It has n - 2 triangles. The boundary of these triangles is the
- * loop in its direction. The caps, which close a mesh, have the opposite orientation. */
+ * A stretch of more than one edge has the triangle (i, m, j), where m = i + (j - i) / 2. It also
+ * has two halves, the stretches [i, m] and [m, j]. The whole loop of n vertices is the stretch [0,
+ * n - 1], whose chord is the loop's last edge. It has n - 2 triangles. The boundary of these
+ * triangles is the loop in its direction. The caps, which close a mesh, have the opposite
+ * orientation. */
 #ifndef EBPO_GEOMETRY_CAP_TRIANGLES_H
 #define EBPO_GEOMETRY_CAP_TRIANGLES_H
 

@@ -1,8 +1,8 @@
 /* Computes with cells of an octree: the root box, positions in the grid of a level, and octcodes.
  *
- * Each axis of the root box has a unit u = 2^e, chosen so that the coordinates of the cell faces of
- * all levels are u times integers of at most 53 bits. So every cell face is a double without
- * rounding, and neighbouring cells agree on it.
+ * Each axis of the root box has a unit u = 2^e. The unit is chosen so that the coordinates of the
+ * cell faces of all levels are u times integers of at most 53 bits. So the coordinate of every cell
+ * face is an exact double, and is the same for both cells at this face.
  *
  * An octcode is a leading 1, followed by three bits for each level (EBP 2017, section 3.2.3). These
  * are the interleaved bits of the cell's position. */
@@ -17,8 +17,8 @@
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
 /* The root box has a margin on each side of the model. On each axis the margin is own_margin times
- * the extent along this axis, but at least flat_margin times the largest extent; otherwise cells of
- * flat models would be too thin for arithmetic. */
+ * the extent along this axis, but at least flat_margin times the largest extent. With a smaller
+ * margin, cells of flat models would be too thin for arithmetic. */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
 /* Returns false if min > max on an axis, or a coordinate is too large or NaN. */

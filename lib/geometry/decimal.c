@@ -2,8 +2,8 @@
  * exact for the numbers that it accepts. The fastest method is tried first:
  * 1. Digits below 2^53, multiplied or divided by a power of ten up to 10^22. Both numbers are
  *   doubles, so one operation rounds once (Clinger, "How to read floating point numbers
- *   accurately", 1990). The float is this double, rounded again, unless the double is exactly
- *   between two floats: then rounding twice may give the wrong float.
+ *   accurately", 1990). The float is this double, rounded again. Exception: if the double is
+ * exactly between two floats, rounding twice may give the wrong float, so method 1 does not apply.
  * 2. Up to 19 digits, divided by a power of ten up to 10^27: a 128-bit quotient with its remainder,
  *   rounded by this code.
  * 3. The C library. */

@@ -1,7 +1,7 @@
 /* Provides double-double arithmetic for distances and rays, compiled once for each instruction set.
  *
  * On processors with FMA one instruction computes the rounding error of a product. On other
- * processors the factors are split (expansion.h). Both methods give the same value unless a number
+ * processors the factors are split (expansion.h). Both methods give the same value if no number
  * overflows or underflows.
  *
  * Errors of distances are bounded relative to the distance. Errors of rays are bounded relative to

@@ -44,7 +44,8 @@ static inline ebpo_pair ebpo_two_product(double a, double b)
 #endif
 }
 
-/* Appends x to an expansion of n components, unless x is 0. Returns the number of components. */
+/* Appends x to an expansion of n components. Does nothing if x is 0. Returns the number of
+ * components. */
 static inline int ebpo_expansion_push(double *out, int n, double x)
 {
     if (x != 0)
@@ -165,10 +166,10 @@ static inline int ebpo_expansion_minor(double *out, ebpo_difference p, ebpo_diff
 }
 
 /* Double-double arithmetic: a value is head + tail, |tail| at most about half an ulp of head. The
- * error of a sum is at most some 2^-104 of the sum of its operands' absolute values, the error of a
- * product at most some 2^-104 of the product, apart from overflow and underflow. Include
- * strict_fp.h first. Source: Dekker 1971, "A floating-point technique for extending the available
- * precision". */
+ * error of a sum is at most some 2^-104 of the sum of the operands' absolute values. The error of a
+ * product is at most some 2^-104 of the product. Overflow and underflow are not included in these
+ * bounds. Include strict_fp.h first. Source: Dekker 1971, "A floating-point technique for extending
+ * the available precision". */
 
 static inline ebpo_pair ebpo_pair_of(double x) { return (ebpo_pair){ x, 0 }; }
 
@@ -201,7 +202,7 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / b.head));
 }
 
-/* Computes two doubles, of which at least one is the exact a / b, rounded to nearest. The two
+/* Computes two doubles. At least one of them is the exact a / b, rounded to nearest. The two
  * doubles are equal if the rounding is certain, and otherwise adjacent. `error`: sum of the
  * relative errors of a and b. Returns false if the quotient is too large or too small. */
 static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])

@@ -20,7 +20,7 @@
 static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333),
                       NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f), BYTES = UINT64_C(0x00ff00ff00ff00ff);
 
-/* Counts the set bits of each byte of x, of which only even bits may be set. */
+/* Counts the set bits of each byte of x. Only even bits of x may be set. */
 static inline uint64_t bits_of_bytes(uint64_t x)
 {
     x = (x & PAIRS) + (x >> 2 & PAIRS);

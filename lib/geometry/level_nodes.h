@@ -180,9 +180,10 @@ typedef enum ebpo_entry_kind {
     EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: index of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: index of the group of its eight children */
-    /* In the top of a tree (the levels that stay in memory): the root of a subtree that is loaded
-     * on demand, or a pruned node (whose children are not in the file); value: index of the
-     * subtree. In a subtree: a pruned node; value: index of this node among the gray nodes. */
+    /* A pruned node is a gray node whose children are not in the file. In the top of a tree (the
+     * levels that stay in memory), the entry is the root of a subtree that is loaded on demand, or
+     * a pruned node; value: index of the subtree. In a subtree, the entry is a pruned node; value:
+     * index of this node among the gray nodes. */
     EBPO_ENTRY_SUBTREE_ROOT = 3
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };

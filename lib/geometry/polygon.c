@@ -260,8 +260,9 @@ typedef struct outline {
     uint32_t *next,
         *previous; /* neighbours in the remaining outline; next is NONE if the corner is cut off */
 
-    /* [LEVELS][words] level 0: a bit for each corner whose ear is to be tested; each other level: a
-     * bit for each word of the level below that is not 0 */
+    /* [LEVELS][words] Level 0 has a bit for each corner, which is set if the corner's ear must be
+     * tested. Each further level has a bit for each word of the level below, which is set if this
+     * word is not 0. */
     uint64_t *bits[LEVELS];
     uint64_t words[LEVELS];
     int levels;

@@ -8,8 +8,8 @@
  * Let U = u - 511 and V = v - 511, both in [-511, 511]. The normal n is the point (U, V) of the
  * octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit
  * Vectors", 2014). Its components are integers, and the sum of their absolute values is 511. Let xi
- * be a point in cell coordinates (0 to 1 on each axis), and m the sum of the negative components of
- * n, which is the least value of n . xi over the cell. The half-space is
+ * be a point in cell coordinates (0 to 1 on each axis). Let m be the sum of the negative components
+ * of n; m is the least value of n . xi in the cell. The half-space is
  *
  *   4096 * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094
  *
@@ -32,9 +32,10 @@ enum { EBPO_NORMAL_NORM = 511, EBPO_OFFSET_STEPS = 4096 };
  * function. */
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
 
-/* Computes the normal part (bits 0-19) of the code nearest to a direction in cell coordinates, of
- * any length; returns false for (0, 0, 0) and for non-finite directions. In cell coordinates, the
- * direction of a face's normal is the normal multiplied by the cell's size, axis by axis. */
+/* Computes the normal part (bits 0-19) of the code that is nearest to a direction in cell
+ * coordinates. The direction may have any length. Returns false for (0, 0, 0) and for non-finite
+ * directions. In cell coordinates, the direction of a face's normal is the normal multiplied by the
+ * cell's size, axis by axis. */
 bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal);
 
 /* Returns the least q whose half-space contains every point of the cell with n . xi <= support, or
@@ -135,7 +136,8 @@ static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double 
     return (double)d * (1.0 / (511.0 * 4096));
 }
 
-/* Cuts the envelope by plane codes of its own cell; a face's tag is the index of its code. */
+/* Cuts the envelope by plane codes in the coordinates of its cell. The tag of a new face is the
+ * index of its code. */
 void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
 
 /* The half-space 4096 (n . xi) <= d. */
@@ -146,9 +148,9 @@ typedef struct ebpo_half_space {
 
 enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* a node has at most 255 planes */
 
-/* The half-spaces that bound a node's envelope within its cell: the planes of its ancestors and its
- * own planes, as exact integers in the coordinates of its cell. Half-spaces that keep the whole
- * cell are omitted. */
+/* The half-spaces that bound a node's envelope within its cell. They come from the planes of the
+ * node's ancestors and of the node itself, as exact integers in the coordinates of the node's cell.
+ * Half-spaces that contain the whole cell are omitted. */
 typedef struct ebpo_half_spaces {
     int count;
     ebpo_half_space at[EBPO_HALF_SPACES_MAX];

@@ -32,8 +32,9 @@ typedef struct ebpo_posing {
 
 /* Checks a pose, for vertices whose coordinates have absolute values of at most largest[axis].
  *
- * EBPO_E_ARGUMENT: a number is not finite, the matrix is not a rotation (the message gives the
- * deviation) or is a mirror, or the scale or a posed coordinate is out of range. */
+ * Returns EBPO_E_ARGUMENT if a number is not finite, or if the matrix is a mirror or no rotation
+ * (the message gives the difference). Also returns EBPO_E_ARGUMENT if the scale or a posed
+ * coordinate is out of range. */
 EBPO_MUST_USE ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose,
                                            const double largest[3], ebpo_error *error);
 

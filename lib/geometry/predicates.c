@@ -156,9 +156,9 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
  * underflows. */
 
 /* A difference is a pair: the head is the rounded difference, the tail its rounding error. The
- * determinant of the heads differs from the exact determinant by at most 3 eps times the permanent,
- * where eps is 2^-53, and the permanent is the sum of the absolute values of all products.
- * heads_error has the factor 4 instead of 3 for terms of higher order. */
+ * permanent is the sum of the absolute values of all products in the determinant. The determinant
+ * of the heads differs from the exact determinant by at most 3 * 2^-53 times the permanent.
+ * heads_error has the factor 4 instead of 3, for terms of higher order. */
 static const double heads_error = 4 * 0x1p-53;
 
 static bool in_range(const double *x, int n, double least, double largest)

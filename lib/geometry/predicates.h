@@ -34,15 +34,15 @@ int ebpo_sign_of_products(const double *factor, int n);
  * numbers.
  *
  * The segment runs from `from` in direction +axis (0, 1, 2) to coordinate `to` >= from[axis] on
- * that axis. Both ends are shifted by (d0, d1, d2), infinitely small positive numbers where d0 >>
- * d1 >> d2 (d1 is negligible compared with every power of d0, and d2 compared with every power of
- * d1). This is simulation of simplicity, with the same shift for every call. Therefore no end is on
- * a face, no segment intersects an edge or vertex, and crossing numbers are exact and consistent. A
+ * that axis. Both ends are shifted by (d0, d1, d2), three infinitely small positive numbers. d1 is
+ * negligible compared with every power of d0, and d2 is negligible compared with every power of d1.
+ * This is simulation of simplicity, with the same shift for every call. Therefore no end is on a
+ * face, no segment intersects an edge or vertex, and crossing numbers are exact and consistent. A
  * face without area counts as no crossing.
  *
- * Returns the change of the winding number from `from` to the end: +1 when the segment enters (goes
- * against the normal of the counter-clockwise face), -1 when the segment leaves, 0 when there is no
- * crossing. */
+ * Returns the change of the winding number from `from` to the end. The result is +1 when the
+ * segment enters (goes against the normal of the counter-clockwise face), -1 when the segment
+ * leaves, and 0 when there is no crossing. */
 int ebpo_axis_crossing(const double from[3], double to, int axis, const double a[3],
                        const double b[3], const double c[3]);
 

@@ -13,9 +13,9 @@ typedef struct ebpo_segment {
 
 typedef struct ebpo_ray_intersection {
     bool intersects; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
-    /* 1: the ray passes through the triangle's interior against the normal (enters); -1: the ray
-     * passes through the interior with the normal (leaves); 0: the ray intersects an edge or
-     * corner, the ray is within the plane, or the triangle has no area */
+    /* 1: the ray passes through the triangle's interior against the normal (enters). -1: the ray
+     * passes through the interior with the normal (leaves). 0: the ray intersects an edge or
+     * corner, or is within the plane, or the triangle has no area */
     int side;
     /* direction of the line relative to the normal; also set if the line intersects an edge or
      * corner. 1: against the normal; -1: with the normal; 0: the line is within the plane, or the
@@ -24,11 +24,11 @@ typedef struct ebpo_ray_intersection {
     double t; /* t of the first common point, correctly rounded */
 } ebpo_ray_intersection;
 
-/* Exact tests of rays and boxes against triangles: the decisions are those of arithmetic without
- * rounding, for all finite doubles. Floating-point filters are tried first, then exact arithmetic
- * on doubles (expansions), or on integers of any size (GMP) if numbers are too large or too small
- * for expansions. All functions are pure and may be called by any thread. Results do not depend on
- * the compiler and its flags. */
+/* Exact tests of rays and boxes against triangles. For all finite doubles, the decisions are the
+ * same as in arithmetic without rounding. Floating-point filters are tried first, and then exact
+ * arithmetic on doubles (expansions). If numbers are too large or too small for expansions,
+ * integers of any size (GMP) are used. All functions are pure and may be called by any thread.
+ * Results do not depend on the compiler and its flags. */
 
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
                        ebpo_ray_intersection *out);

@@ -1,7 +1,7 @@
 /* Intersects a ray with a triangle.
  *
- * There are several stages, of which the fastest is tried first. The first stage computes the side
- * of each edge on which the line passes, in floating-point arithmetic with error bounds. The second
+ * There are several stages. The fastest stage is tried first. The first stage computes the side of
+ * each edge on which the line passes, in floating-point arithmetic with error bounds. The second
  * stage computes t in double-double arithmetic (double_double_kernels.c), which gives nearly all
  * bits of t. Here t is the ray's parameter at the triangle's plane, a fraction. If the result is
  * not certain, expansions are used. If exponents are out of the range of expansions, rational
@@ -10,9 +10,9 @@
  * Let e_i = corner i - origin, and d the direction. The sign of d . (e_i x e_j) is the side of the
  * edge from corner i to corner j on which the line passes. If one edge has the sign 1 and another
  * edge the sign -1, the line misses the triangle. This is also true for triangles that have no area
- * or whose plane contains d, because the signs are those of the triangle projected along d. If the
- * three signs are equal and not 0, the line passes through the interior. In all other cases the
- * line touches an edge or a corner, or a sign is not certain. */
+ * or whose plane contains d, because the signs depend only on the projection of the triangle along
+ * d. If the three signs are equal and not 0, the line passes through the interior. In all other
+ * cases the line touches an edge or a corner, or a sign is not certain. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>

@@ -9,7 +9,7 @@
  * rounded additions. So the error of the determinant is at most 8 u sqrt(3) M < 14 u M, to first
  * order. A dot product has an error of at most 5 u times the product of the lengths, and a length
  * has a relative error of at most 4 u. So each of the four terms of the real part has an error of
- * at most 13 u M, and the three additions have errors of at most 4 u M each. Together this is 64 u
+ * at most 13 u M. Each of the three additions has an error of at most 4 u M. Together this is 64 u
  * M. The errors of both parts are together below 80 u M. The code uses E = 2^-46 M, which is 1.6
  * times as much, for terms of second order and the rounding of M. Let H > 2 E be the absolute value
  * of the computed number. Its argument differs from the exact argument by at most asin(E / H) < 1.1
@@ -19,8 +19,8 @@
  * sign is uncertain, the exact orientation of the shifted point (predicates.h) decides, and the
  * bounds are limited to pi or -pi.
  *
- * In 512 bits, A, B and C have relative errors of at most 2^-510, and the same sums give an error
- * of at most 80 * 2^-509 M; the code uses 2^-500 M.
+ * In 512 bits, A, B and C have relative errors of at most 2^-510. The same computation of errors
+ * gives at most 80 * 2^-509 M; the code uses 2^-500 M.
  *
  * At a point p on the edge from a to b, let e = b - a, h = c - p, and d the direction of the shift.
  * There, the complex number is the limit for a small shift: -(|e|^2 (d.h) - (d.e)(h.e)) + i |e|

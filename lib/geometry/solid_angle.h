@@ -1,7 +1,7 @@
 /* Computes solid angles of triangles, with error bounds.
  *
- * The half angle of the triangle (a, b, c) at p is half of its signed solid angle, in [-pi, pi]:
- * positive when p is on the side from which the triangle turns clockwise. The half angles of a
+ * The half angle of the triangle (a, b, c) at p is half of its signed solid angle, in [-pi, pi]. It
+ * is positive when p is on the side from which the triangle turns clockwise. The half angles of a
  * closed surface with outward faces sum up to 2 pi at points inside. With A = a - p, B = b - p and
  * C = c - p, the half angle is the argument of this complex number (van Oosterom and Strackee
  * 1983):

@@ -262,8 +262,8 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
  * - The normal: 8 u l^2 on each axis.
  * - Products of a corner with edge x normal: 64 u r l^3.
  * - Distances to corners and to points of edges: 16 u r.
- * - The distance to the plane: 16 u r, and the distance by which the plane moves within the
- *   triangle when its normal is tilted by 16 u l^2 / |n|.
+ * - The distance to the plane: 16 u r, plus l times the tilt of the computed normal. The tilt is
+ *   at most 16 u l^2 / |n|.
  *
  * The code uses at least twice these bounds. Numbers whose fourth powers overflow or underflow are
  * scaled first. */

@@ -1,8 +1,8 @@
 /* Computes the relation of two faces: apart, touching, crossing or coplanar. The result is exact
  * for all finite doubles.
  *
- * If the planes of the faces intersect in a line, the corners of each face are reordered so that
- * the first corner is alone on its side of the other plane. Each face intersects the line in an
+ * If the planes of the faces intersect in a line, the corners of each face are reordered. Then the
+ * first corner is alone on its side of the other plane. Each face intersects the line in an
  * interval. Two orientation tests (ebpo_orient3d) compare the ends of the intervals (Devillers and
  * Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are projected
  * along an axis and compared in two dimensions. A face without area is the segment between its
@@ -54,8 +54,8 @@ static int projection_axis(const double corner[3][3])
 }
 
 /* Compares the projection `other` with the edge from - to of another projection. `outer`: the sign
- * of ebpo_orient2d on the outer side of this edge. Returns 2 if `other` is strictly on the outer
- * side of the edge's line, 1 if it is on the outer side or on the line, otherwise 0. */
+ * of ebpo_orient2d on the outer side of this edge. Returns 2 if `other` is completely on the outer
+ * side of the edge's line, 1 if `other` also touches the line, otherwise 0. */
 static int separated_by_edge(const double from[2], const double to[2], int outer,
                              const projection *other)
 {

@@ -1,6 +1,6 @@
 /* Encodes and decodes chunks of arrays as HDF5 stores them, with shuffle, compression and checksum.
- * The bytes are those that libhdf5's own filters write. Also declares the shape of an array, and
- * the location of a chunk in its file. */
+ * The encoded bytes are equal to the output of libhdf5's filters. Also declares the shape of an
+ * array, and the location of a chunk in its file. */
 #ifndef EBPO_HDF5_READ_CHUNK_H
 #define EBPO_HDF5_READ_CHUNK_H
 
@@ -99,8 +99,8 @@ typedef struct ebpo_chunk_location {
     uint32_t bytes;
 } ebpo_chunk_location;
 
-/* Returns the number of rows in a full chunk: the largest power of two with which a chunk takes at
- * most 64 KiB, or `rows` if `rows` is less. rows > 0. */
+/* Returns the number of rows in a full chunk. This is the largest power of two with which a chunk
+ * takes at most 64 KiB, or `rows` if `rows` is less. rows > 0. */
 static inline uint32_t ebpo_full_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size)
 {
     uint32_t row = element_size * (cols ? cols : 1), full = 1;

@@ -36,7 +36,7 @@ typedef struct ebpo_chunk_blocks {
 } ebpo_chunk_blocks;
 
 /* Encode and decode a zstd frame. `level`: level of compression; 0: the default. `out`: has space
- * for ebpo_chunk_bound(raw_bytes) bytes. `*why`: as in ebpo_chunk_decode. */
+ * for ebpo_chunk_bound(raw_bytes) bytes. *why: the reason of EBPO_E_FORMAT, a static string. */
 EBPO_MUST_USE ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
                                            size_t raw_bytes, const ebpo_chunk_blocks *b,
                                            uint8_t *out, size_t *out_bytes);

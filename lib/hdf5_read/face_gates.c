@@ -34,7 +34,7 @@ enum { AS_CODES = 1 }; /* first byte of a chunk that has the codes of corners in
 
 /* Open edges, newest last. (a, b) means that the face on the other side of the edge, if it exists,
  * has a side from a to b. Vertices are counted from the first new vertex of the chunk, modulo 2^32,
- * as in codes. */
+ * as the codes count them. */
 typedef struct open_edges {
     uint64_t edge[SPACE]; /* see edge_of */
     uint32_t begin, end;  /* range of the open edges in `edge` */
@@ -276,7 +276,7 @@ void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
 
 /* ---- reading ---- */
 
-/* State of decoding; streams as in `writing`. */
+/* State of decoding. The streams have the same meaning as in `writing`. */
 typedef struct reading {
     const uint8_t *gate, *third, *low, *more; /* next byte of each stream */
     const uint8_t *end;                       /* end of the stream `more` */

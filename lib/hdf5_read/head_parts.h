@@ -196,8 +196,8 @@ static inline ebpo_head_cursor ebpo_head_message_cursor(const ebpo_head_header *
  * set, the kinds ABSENT and OTHER are not reliable, because a header could not be read. */
 ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_object *object);
 
-/* Sets the error for a refusal: "path: what: reason of the refusal". `what` may be "". If the input
- * has failed, sets the input's error instead. */
+/* Sets the error for a refusal, with the message "path: what: reason of the refusal". `what` may be
+ * "". If the input has failed, sets the input's error instead. */
 EBPO_MUST_USE ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
                                          ebpo_error *error);
 

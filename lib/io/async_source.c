@@ -92,7 +92,7 @@ static bool is_available(const ebpo_async *a, uint64_t begin, uint64_t end)
     return first_missing(a, begin, end).size == 0;
 }
 
-/* Copies the bytes [begin, end), all of which are available, to `to`. */
+/* Copies the bytes [begin, end) to `to`. All these bytes must be available. */
 static void copy_bytes(ebpo_async *a, uint64_t begin, uint64_t end, uint8_t *to)
 {
     for (uint64_t i = find_extent(a, begin); begin < end; i++) {

@@ -523,9 +523,9 @@ static bool is_idle(const ebpo_cached_range *range)
             (range->state == RANGE_COMING && range->request.done));
 }
 
-/* Drops one range. Prefers the least recently read range among those without hinted bytes to read.
- * If there is none, drops the range with the oldest hint, but only if STALE_AFTER later hints were
- * given. Returns false if no range can be dropped. */
+/* Drops one range. If some ranges have no hinted bytes left to read, drops the least recently read
+ * of these ranges. Otherwise drops the range with the oldest hint, but only if more than
+ * STALE_AFTER later hints were given. Returns false if no range can be dropped. */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;

@@ -35,7 +35,7 @@ typedef struct ebpo_http_response {
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
     char type[EBPO_HTTP_TYPE_BYTES]; /* content type in lower case: "text/html" */
-    uint64_t header_bytes;           /* size of all heads, including those of redirects */
+    uint64_t header_bytes;           /* size of all heads, including the heads of redirects */
 } ebpo_http_response;
 
 /* Reads one line of the head, as the server sent it. A status line clears the response, because the

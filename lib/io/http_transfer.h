@@ -14,8 +14,8 @@
 typedef struct ebpo_request {
     uint64_t offset, size; /* size > 0 */
     uint8_t *data;         /* [size] */
-    /* true for the first request, when the file's size and version are not known: the file may be
-     * shorter than the range, and the server may send the whole file */
+    /* true for the first request, when the file's size and version are not known. Then the file may
+     * be shorter than the range, and the server may send the whole file */
     bool first;
     /* The members from here to `type` are valid when `done` is true. */
     bool done;

@@ -23,8 +23,8 @@ void ebpo_unfinished_forget(int slot);
 /* Removes all registered files. Calls only unlink, so a signal handler may call this function. */
 void ebpo_unfinished_remove(void);
 
-/* Names of temporary files contain at most this number of bytes of the output's name: enough to
- * recognise the output, and few enough to keep the names below the common limit of 255 bytes. */
+/* Names of temporary files contain at most this number of bytes of the output's name. This is
+ * enough to recognise the output, and keeps the names below the common limit of 255 bytes. */
 enum { EBPO_TARGET_NAME_KEPT = 200 };
 
 /* Removes abandoned temporary files of the output `name` in `folder`. A file is abandoned if the
