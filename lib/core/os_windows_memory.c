@@ -112,8 +112,8 @@ int munlockall(void) { return not_provided(); }
 /* --- aligned blocks --- */
 
 /* A block of aligned_alloc: `at` is the address that the caller uses, and `from` is the address to
- * free. A hash table with linear probing has all blocks, by `at`. There are at most some thousand
- * blocks. */
+ * free. A hash table with linear probing, with the key `at`, has all blocks. There are at most some
+ * thousand blocks. */
 typedef struct aligned_block {
     void *at, *from;
 } aligned_block;

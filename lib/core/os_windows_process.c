@@ -27,7 +27,7 @@ pid_t waitpid(pid_t process, int *state, int flags)
 }
 
 /* Returns 0 if a process exists. Sends no signal, because callers use only signal 0, which only
- * tests if the process exists. */
+ * tests whether the process exists. */
 int kill(pid_t process, int number)
 {
     DWORD code = STILL_ACTIVE;

@@ -50,7 +50,7 @@ typedef struct ebpo_near_cell {
     int32_t winding;
     uint32_t first;
     uint16_t count;
-    bool touched; /* a cap may touch the cell */
+    bool touched; /* true: a cap may touch the cell */
 } ebpo_near_cell;
 
 /* Decides as ebpo_cap_decide does, at a point p of a cell. `disc`: the cell's list of entries. If
@@ -74,16 +74,17 @@ typedef struct ebpo_cap_front {
     ebpo_cap_box box;
     ebpo_bounded done; /* sum of the bounds of discs that are no longer among the entries */
     double stuck;      /* sum of the errors of entries that cannot be refined */
-    bool touched;      /* a disc in `done` may touch the box */
+    bool touched;      /* true: a disc in `done` may touch the box */
     uint32_t count;
     uint32_t entry[EBPO_CAP_FRONT];
     ebpo_bounded bound[EBPO_CAP_FRONT];
 } ebpo_cap_front;
 
-/* Begins with a list of entries, and `far`, the bounds of the discs that are not in the list. */
+/* Begins a front with a list of entries. `far`: the sum of the bounds of the discs that are not in
+ * the list. */
 void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, const ebpo_cap_box *box,
                           const uint32_t *entry, uint64_t count, ebpo_bounded far);
-/* Begins with all discs. */
+/* Begins a front with all discs. */
 void ebpo_cap_front_begin_all(ebpo_cap_front *front, const ebpo_cap_tree *tree,
                               const ebpo_cap_box *box);
 /* Returns the sum of the bounds of all discs. *apart: true if certainly no disc touches the box. */

@@ -32,8 +32,8 @@ static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 static bool is_sign(char c) { return c == '+' || c == '-'; }
 
-/* Adds the exponent in [s, end), digits without a sign, to d->exponent. `negative`: subtracts it
- * instead. Returns false if the text has other characters. */
+/* Adds the exponent in [s, end), digits without a sign, to d->exponent. If `negative` is true,
+ * subtracts the exponent instead. Returns false if the text has other characters. */
 static bool scan_exponent_of(decimal *d, bool negative, const char *s, const char *end)
 {
     int32_t e = 0;
@@ -173,8 +173,9 @@ static bool long_quotient(double *out, const decimal *d, int bits)
 
 /* Decides exactly whether `value`, the float nearest to digits / 10^e, gives the digits again when
  * it is rounded to the last digit (ties to even). It does so if value * 10^e differs from the
- * digits by less than 0.5, where e = -d->exponent. The value is from 1e-27 to 1e20, where floats
- * are normal. *keeps: the result. Returns false if this method does not apply. */
+ * digits by less than 0.5, or by exactly 0.5 if the digits are an even number; e = -d->exponent.
+ * The value is from 1e-27 to 1e20, where floats are normal. *keeps: the result. Returns false if
+ * this method does not apply. */
 static bool compare_scaled(bool *keeps, float value, const decimal *d)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -194,7 +195,7 @@ static bool compare_scaled(bool *keeps, float value, const decimal *d)
 }
 
 #else
-/* Leaves the decision to the C library. */
+/* Without integers of 128 bits, these methods never apply, and the callers use slower methods. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     (void)out, (void)d, (void)bits;

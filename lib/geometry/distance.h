@@ -33,7 +33,8 @@ void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3
 typedef struct ebpo_triangle_nearest {
     /* the double nearest to the exact distance (ties to even); INFINITY if this double overflows */
     double distance;
-    /* nearest point, each coordinate within 8 ulp of the largest coordinate involved */
+    /* nearest point; the error of each coordinate is at most 8 ulp of the largest coordinate of p
+     * and the triangle */
     double point[3];
     /* certain, never UNKNOWN; the lowest-dimensional feature that contains the nearest point */
     ebpo_feature feature;

@@ -174,7 +174,8 @@ static inline plane_normal cross_bounded(const ebpo_pair f[3], const ebpo_pair g
 }
 
 /* Returns n . y with an error bound. The error of n is some 12 * 2^-106 of the permanent, and the
- * products and sums have an error of the same size. The bound of 2^-97 is larger than their sum. */
+ * products and sums have an error of the same size. The bound of 2^-97 of the permanent is larger
+ * than the sum of both errors. */
 static inline ebpo_bounded dot_bounded(const plane_normal *n, const ebpo_pair y[3])
 {
     ebpo_pair first = ebpo_pair_multiply(n->x[0], y[0]), second = ebpo_pair_multiply(n->x[1], y[1]);

@@ -48,7 +48,7 @@ typedef struct ebpo_plane_pairs {
 
 typedef struct ebpo_ray_pairs {
     void (*plane)(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out);
-    /* Computes d . (a x e), e = to - from. */
+    /* Computes d . (a x e), where e = to - from is an edge. */
     void (*edge)(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
                  ebpo_bounded *out);
 } ebpo_ray_pairs;

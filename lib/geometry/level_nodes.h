@@ -22,7 +22,7 @@ static inline uint16_t ebpo_group_of(ebpo_node_type type, unsigned octant)
     return (uint16_t)((unsigned)type << 2 * octant);
 }
 
-/* Returns the word with another type of this octant. */
+/* Returns the word `types`, changed so that this octant has the type `type`. */
 static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node_type type)
 {
     return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
@@ -32,8 +32,9 @@ static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node
  * this octant. */
 static inline unsigned ebpo_group_filled(uint16_t types) { return types >> 1 & 0x5555u; }
 
-/* Returns how many octants less than `octants` (at most 8) have this type. If `octants` is the
- * number of an octant, the result is this octant's rank among its siblings of this type. */
+/* Returns how many of the octants 0 to octants - 1 have this type; `octants` is at most 8. If
+ * `octants` is the number of an octant, the result is this octant's rank among its siblings of this
+ * type. */
 static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, unsigned octants)
 {
     unsigned differs = types ^ 0x5555u * (unsigned)type;
@@ -132,9 +133,9 @@ typedef struct ebpo_level_ranks {
     /* [group_count] by type: number of nodes of this type in the preceding groups; NULL for white
      * and black nodes if the level has no winding numbers for them */
     uint64_t *before[4];
-    uint64_t *plane_first;      /* [gray_count]; NULL without planes */
-    uint64_t *leaf_plane_first; /* [leaf_count]; NULL without stored leaf planes */
-    uint64_t *ref_first;        /* [leaf_count]; NULL without face lists */
+    uint64_t *plane_first;      /* [gray_count]; NULL: the level has no planes */
+    uint64_t *leaf_plane_first; /* [leaf_count]; NULL: no stored leaf planes */
+    uint64_t *ref_first;        /* [leaf_count]; NULL: no face lists */
 } ebpo_level_ranks;
 
 /* Makes ranks. EBPO_E_FORMAT when the level's counts contradict each other. On failure all memory

@@ -243,7 +243,7 @@ typedef enum ears_result {
 enum {
     WORD = 64,
     LEVELS = 6,  /* levels of bits, enough for 2^32 corners */
-    BLOCK = 8,   /* corners of a leaf of the tree */
+    BLOCK = 8,   /* number of corners in a leaf of the tree */
     SCANNED = 64 /* outlines up to this length have no tree */
 };
 

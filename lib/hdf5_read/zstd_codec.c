@@ -46,7 +46,7 @@ static bool block_has_unused(const uint8_t *block, size_t size)
 {
     size_t at = size ? literals_bytes(block, size) : 0;
     if (at == 0 || at >= size ||
-        block[at] == 0) /* block[at] is 0: the block has no sequences, so no byte of modes */
+        block[at] == 0) /* block[at] is 0: no sequences, and therefore no byte of modes */
         return false;
     at += block[at] < 128 ? 1 : block[at] < 255 ? 2 : 3;
     return at < size && block[at] & 3;
