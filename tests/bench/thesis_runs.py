@@ -307,5 +307,4 @@ STEPS = {
     for k in ("0.01", "0.05", "0.5", "5")}
 
 # Expected minutes of one core for steps that are often omitted.
-MINUTES = {"levels_uniform": 3, "lucy16_methods_40": 7, "bunny_bp_5": 10, "dragon_bp_0.5": 30, "dragon_bp_1": 30,
-           "dragon_bp_5": 30, **{f"large_{select}_40": 16 for select in ("kmedoids", "offset", "random")}}
+MINUTES = {f"large_{select}_40": 16 for select in ("kmedoids", "offset", "random")}
