@@ -1,13 +1,13 @@
 /* Sorts a mesh's vertices and faces along a Morton curve. Afterwards, the vertices of every cell
  * are one contiguous range, and neighbours in space are mostly neighbours in memory.
  *
- * The root box of the grid is chosen first: every cell face has to be exact in doubles, at every
+ * The root box of the grid is chosen first, such that every cell face is exact in doubles at every
  * level in use. Vertices are sorted by the octcode of their cell (the cell's position on the curve)
  * and, within a cell, by position, so that equal positions are neighbours. Vertices without faces
  * ("unreferenced") come after the others. Faces are sorted by the least of their vertices' new
- * indices. Sorting uses the mesh's workspace (arrays in files), so that meshes larger than memory
- * are sorted too. The mesh's arrangement stores the source index of each vertex and face. The
- * result depends on the mesh alone, not on the number of threads. */
+ * indices. Sorting uses the mesh's workspace (arrays in memory or in temporary files), so that a
+ * mesh may be larger than memory. The mesh's arrangement stores the source index of each vertex and
+ * face. The result depends on the mesh alone, not on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,20 +25,22 @@
 
 enum { GRAIN = 1 << 15 }; /* number of vertices or faces of a parallel task */
 
-/* bit of a vertex's sort key: the vertex must come after all vertices without this bit */
+/* bit 63 of a vertex's sort key: vertices with this bit come after all vertices without it */
 #define UNREFERENCED (UINT64_C(1) << 63)
 
 typedef struct arranging {
     ebpo_mesh *mesh;
     unsigned threads;
-    bool all_by_position; /* false: unreferenced vertices come after all others; true: they are
-                           * sorted like the others */
+    /* false: unreferenced vertices come after all others; true: unreferenced vertices are sorted
+     * among the others */
+    bool all_by_position;
     const ebpo_progress *progress;
     uint8_t *referenced; /* bit v: a face uses vertex v */
     /* [block of GRAIN vertices] least and greatest coordinates of its referenced vertices */
     double (*bounds)[2][3];
     struct ebpo_arrangement *to; /* result */
-    float *xyz32; /* sorted coordinates: floats or doubles; the other array is NULL */
+    /* sorted coordinates, as floats in xyz32 or as doubles in xyz64; the other array is NULL */
+    float *xyz32;
     double *xyz64;
     uint32_t *corners; /* faces in their old order, with the vertices' new indices */
     uint32_t *faces;   /* sorted faces */
@@ -105,12 +107,13 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
 }
 
 /* Makes the root box around the model, so that cell faces are exact in doubles down to `level`. If
- * the model is small and far from the origin, this condition can enlarge the box much. With level
- * -1, takes the deepest level at which the condition hardly enlarges the box. Returns false if the
- * coordinates are too large for every box. */
+ * the model is small and far from the origin, this condition can enlarge the box much. If `level`
+ * is -1, the function uses the deepest level at which the condition hardly enlarges the box.
+ * Returns false if the coordinates are too large for every box. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
-    static const double allowed = 1 + 0x1p-16; /* maximum ratio of the sizes of `out` and `least` */
+    /* maximum ratio of the sides of `out` and of the least box */
+    static const double allowed = 1 + 0x1p-16;
     ebpo_box least;
     if (level >= 0)
         return ebpo_box_make(out, min, max, level);
@@ -165,7 +168,8 @@ typedef struct vertex_record {
     double p[3];                /* position */
 } vertex_record;
 
-/* The same for a mesh with float coordinates, in 24 bytes. */
+/* The record that is sorted for each vertex of a mesh with float coordinates. It has only 24 bytes.
+ */
 typedef struct float_record {
     uint64_t key;
     uint32_t old_index;
@@ -173,8 +177,8 @@ typedef struct float_record {
 } float_record;
 
 /* Returns the index, along one axis, of the cell that contains the coordinate x. The division may
- * round to the wrong side of a cell face; the comparisons with the exact cell faces correct this.
- */
+ * round to the wrong side of a cell face. The comparisons with the exact cell faces correct the
+ * index. */
 static uint32_t cell_index(const ebpo_box *box, int axis, int level, double x)
 {
     double cells = (double)(1u << level),
@@ -222,8 +226,9 @@ static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, vo
     return EBPO_OK;
 }
 
-/* Compares two vertices of one cell: by position, so that vertices with equal positions are
- * neighbours, then by their old indices `a` and `b`. */
+/* Compares two vertices of one cell by their positions `p` and `q`, so that vertices with equal
+ * positions become neighbours. Equal positions are compared by the vertices' old indices `a` and
+ * `b`. */
 static int compare_points(const double p[3], const double q[3], uint32_t a, uint32_t b)
 {
     for (int k = 0; k < 3; k++)
@@ -264,7 +269,8 @@ static void store_vertices(void *context, uint64_t new_index, const void *record
         if (a->to->key)
             a->to->key[new_index] =
                 (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
-        a->to->vertex_source[new_index] = old_index; /* compose_maps makes source indices of it */
+        /* compose_maps replaces the old index by the source index */
+        a->to->vertex_source[new_index] = old_index;
     }
 }
 
@@ -288,7 +294,8 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
                        .stage = "ordering vertices",
                        .count = n,
                        .record = mesh->xyz32 ? sizeof(float_record) : sizeof(vertex_record),
-                       .shift = 46, /* bins are chosen by the highest 18 bits of the key */
+                       /* the highest 18 bits of the 64-bit key choose the bin of a record */
+                       .shift = 46,
                        .context = a,
                        .make = make_vertices,
                        .compare = mesh->xyz32 ? compare_floats : compare_doubles,
@@ -296,8 +303,8 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
     return ebpo_sort_run(&sort, error);
 }
 
-/* --- faces: their vertices' indices are replaced by the new ones; then they are sorted by their
- * least vertex --- */
+/* --- faces: the faces' vertices get their new indices; then the faces are sorted by their least
+ * vertex --- */
 
 static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
@@ -325,8 +332,9 @@ static ebpo_status translate_corners(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* Translates the faces in passes. Each pass handles a window of vertices that fits into memory, and
- * reads all faces. So memory is accessed in order, except in the window. */
+/* Replaces old by new indices of vertices in all faces, in passes. Each pass handles the old
+ * indices of one window, whose table `rank` fits into memory, and reads all faces. So all arrays
+ * except this table are accessed in order. */
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
@@ -364,8 +372,8 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
 }
 
 typedef struct face_record {
-    /* least vertex << 32 | index of the face in the source, so that the result does not depend on
-     * the old order */
+    /* least vertex << 32 | index of the face in the source. With the source index, the result does
+     * not depend on the old order */
     uint64_t key;
     uint32_t corner[3], unused; /* corner: new indices of the vertices */
 } face_record;

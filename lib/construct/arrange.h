@@ -6,9 +6,10 @@
 #include <ebpo/mesh.h>
 
 /* Does the same as ebpo_mesh_arrange, for trees down to `level`. Cell faces must be exact in
- * doubles down to this level, which may enlarge the root cell. With -1, the level is the deepest
- * one that hardly enlarges the root cell. A mesh that is already arranged is arranged again only if
- * it was arranged for another level or was changed afterwards. */
+ * doubles down to this level; this condition may enlarge the root cell. If `level` is -1, the
+ * function uses the deepest level that hardly enlarges the root cell. A mesh that is already
+ * arranged is arranged again only if it was arranged for another level or was changed afterwards.
+ */
 EBPO_MUST_USE ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads,
                                        const ebpo_progress *progress, ebpo_error *error);
 

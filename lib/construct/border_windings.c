@@ -1,13 +1,13 @@
 /* Finds the border of a surface, and the winding numbers of the surface with its caps.
  *
- * The caps (geometry/cap_triangles.h) close the border, so the winding number of surface and caps
- * is an integer. The winding number of a white node or a leaf is the one at its lowest corner,
- * shifted as in corner_windings.c. The nodes are visited depth first. Each visit returns the
- * cell's corner differences: the winding numbers at its corners minus the winding number at its
- * lowest corner. They are sums of the crossings of the leaf's faces and of caps along the edges of
- * the cell. The lowest corner of a child is a corner of an earlier sibling, so its winding number
- * is known before the child is visited.
- * Source: format-spec/border.md. */
+ * The caps are triangles that close the border (geometry/cap_triangles.h), so the winding number of
+ * surface and caps is an integer. The winding number of a white node or a leaf is the winding
+ * number at its lowest corner. All corners are shifted by the same infinitely small amount
+ * (corner_windings.c). The nodes are visited depth first. Each visit returns the cell's corner
+ * differences: the winding numbers at its corners minus the winding number at its lowest corner.
+ * For a leaf, these differences are sums of the signed crossings of faces and caps with the edges
+ * of the cell. The lowest corner of a child is a corner of an earlier sibling, so its winding
+ * number is known before the child is visited. Source: format-spec/border.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -37,15 +37,16 @@ typedef struct winding_walk {
     ebpo_tree *tree;
     ebpo_box box;
     const ebpo_cap_tree *caps;
-    /* [level] index of the next group, leaf, white node and reference: in a depth-first visit, the
-     * items of a level come in the order of the level's arrays */
+    /* [level] index of the next group, leaf, white node and reference to a face. A depth-first
+     * visit reaches the items of a level in the order of the level's arrays */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], white[EBPO_LEVELS_MAX],
         ref[EBPO_LEVELS_MAX];
     bool agree; /* so far, all paths to a corner gave the same winding number */
     ebpo_triangle buffer[BUFFER_FACES];
 } winding_walk;
 
-/* For each corner of a cell, the axis of an edge from an earlier corner, and that corner. */
+/* For each corner of a cell except corner 0: an earlier corner `before`, and the axis of the edge
+ * from the corner `before` to this corner. */
 static const struct {
     int axis, before;
 } edge_to[8] = { { 0, 0 }, { 0, 0 }, { 1, 0 }, { 1, 1 }, { 2, 0 }, { 2, 1 }, { 2, 2 }, { 2, 3 } };
@@ -68,7 +69,8 @@ static void add_cap_crossings(const winding_walk *w, ebpo_cell cell, int32_t del
 }
 
 /* Adds the crossings of faces along the edges of a cell to the differences of its corners. The
- * faces are faces[0 .. count - 1]; if `faces` is NULL, first .. first + count - 1. */
+ * indices of the faces are faces[0 .. count - 1]. If `faces` is NULL, they are first .. first +
+ * count - 1. */
 static void add_faces(winding_walk *w, ebpo_cell cell, const uint32_t *faces, uint64_t first,
                       uint64_t count, int32_t delta[8])
 {
@@ -104,12 +106,13 @@ static void visit_leaf(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t
 static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
                        int32_t delta[8]);
 
-/* Visits the children of a gray node, and sets `delta` to its corner differences. */
+/* Visits the children of a gray node, and sets `delta` to the gray node's corner differences. */
 static void visit_gray(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t delta[8])
 {
     const ebpo_level *below = &w->tree->level[cell.level + 1];
     uint16_t types = below->types[w->group[cell.level + 1]++];
-    /* offset: winding number at each child's lowest corner, minus the one at the node's */
+    /* offset: winding number at each child's lowest corner, minus the winding number at the node's
+     * lowest corner */
     int32_t offset[8] = { 0 }, child_delta[8][8];
     for (int o = 0; o < 8; o++) {
         bool known = o == 0;
@@ -260,7 +263,8 @@ ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *err
 
 /* --- files --- */
 
-/* Adds the border to a tree that can have one and has none. */
+/* Adds the border to a tree of a surface that has the mesh and no pruned nodes, unless the tree
+ * already has its border. */
 static ebpo_status add_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
 {
     const ebpo_info *info = &tree->info;

@@ -3,22 +3,22 @@
  * Terms: a piece is a subtree that one thread builds. The top is the set of the nodes above all
  * pieces. A branch is the top or a piece. The fresh faces of a piece are the faces in its list that
  * no earlier piece lists. The index of a face or vertex along the curve is its index in the
- * arranged mesh; its final index is its index in the result and in the file. The corner differences
- * of a cell are the winding numbers at its eight corners minus the winding number at corner 0, the
- * lowest corner. In the code, `b` is the builder and `s` is a branch.
+ * arranged mesh. The final index of a face or vertex is its index in the result and in the file.
+ * The corner differences of a cell are the winding numbers at its eight corners minus the winding
+ * number at corner 0, the lowest corner. In the code, `b` is the builder and `s` is a branch.
  *
  * Before the stages, vertices and faces are arranged along the Morton curve (arrange.h). The stages
  * are:
  *   1. The top of the tree:
  *      - partition assigns faces to the pieces into which the tree is cut;
  *      - corner_windings computes winding numbers;
- *      - propose chooses planes, if the selection works from the leaves up;
+ *      - propose chooses planes, if the selection of planes works from the leaves up;
  *      - envelopes computes the envelopes above the pieces.
  *   2. Piece by piece, on all cores:
  *      - partition assigns faces to cells;
  *      - face_numbers assigns final indices to the piece's fresh faces;
  *      - emit_levels computes envelopes and the piece's part of each level;
- *      - pieces moves these results to the store.
+ *      - pieces moves these results to the store, which holds them until stage 3.
  *   3. The entire tree:
  *      - emit_levels joins the levels' arrays;
  *      - face_numbers computes the final indices of the vertices.
@@ -53,21 +53,23 @@ typedef struct ebpo_build_node {
 /* Data of a node that is not empty. */
 typedef struct ebpo_build_detail {
     int32_t delta[8]; /* corner differences */
-    /* leaf: its list is entries[entry_begin .. entry_end - 1] of the branch; gray node of a piece:
-     * the same range for the lists of all leaves below; gray node of the top: range of the pieces
-     * below, in ebpo_builder.piece */
+    /* leaf: its list of faces is entries[entry_begin .. entry_end - 1] of the branch; gray node of
+     * a piece: this range has the lists of all leaves below the node; gray node of the top: the
+     * pieces below the node are ebpo_builder.piece[entry_begin .. entry_end - 1] */
     uint64_t entry_begin, entry_end;
-    /* gray: range in `crossing` of the branch: the faces that are not entirely inside the cell */
+    /* gray: crossing[cross_begin .. cross_end - 1] of the branch are the faces in the cell that are
+     * not entirely inside the cell */
     uint64_t cross_begin, cross_end;
-    /* leaf: final index of its first new face (no earlier leaf lists it); number of new faces */
+    /* leaf: final index of its first new face, and number of new faces (faces that no earlier leaf
+     * lists) */
     uint32_t first, new_count;
 } ebpo_build_detail;
 
 /* A piece, or the top of the tree. Its nodes are stored depth first; nodes[0] is the root. */
 typedef struct ebpo_branch {
     ebpo_cell cell; /* cell of the root */
-    /* [list_count] indices of the faces that touch the cell, ascending; NULL for the top, whose
-     * `crossing` has indices of faces */
+    /* [list_count] indices (along the curve) of the faces that touch the cell, ascending; NULL for
+     * the top, so that the elements of its `crossing` are such indices */
     uint32_t *list;
     uint64_t list_count;
     uint8_t *fresh;              /* bit i: no piece before this one lists face list[i] */
@@ -84,11 +86,12 @@ typedef struct ebpo_branch {
     /* type and corner differences of nodes[0]; they remain when the nodes are freed */
     uint8_t root_type;
     int32_t root_delta[8];
-    struct ebpo_proposals *proposals; /* planes that were chosen from the leaves up; NULL: planes
-                                       * are chosen on the way down from the root */
-    struct ebpo_piece_level *out;     /* [EBPO_LEVELS_MAX] results of ebpo_emit_piece */
-    ebpo_polytope *above;             /* the envelope of the root's parent, cut to this cell */
-    ebpo_workspace *workspace;        /* the builder's workspace, for all arrays */
+    /* planes that were chosen from the leaves up; NULL: planes are chosen from the root down,
+     * together with the envelopes */
+    struct ebpo_proposals *proposals;
+    struct ebpo_piece_level *out; /* [EBPO_LEVELS_MAX] results of ebpo_emit_piece */
+    ebpo_polytope *above;         /* the envelope of the root's parent, cut to this cell */
+    ebpo_workspace *workspace;    /* the builder's workspace, for all arrays */
 } ebpo_branch;
 
 /* Boxes around blocks of consecutive vertices, in a hierarchy: a block of level 0 has 16 vertices,
@@ -116,15 +119,17 @@ typedef struct ebpo_builder {
     const uint64_t *key;       /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3]; /* [face_count] vertices of each face */
     ebpo_bounds bounds;        /* boxes around ranges of vertices */
-    uint32_t *final_index;     /* [face] EBPO_NO_INDEX until its piece sets it */
-    ebpo_branch top;           /* each of its leaves is a piece: `detail` is an index in `piece` */
-    ebpo_branch *piece;        /* [piece_count] the pieces */
+    /* [face] EBPO_NO_INDEX until the piece sets it in which the face is fresh */
+    uint32_t *final_index;
+    ebpo_branch top;    /* each of its leaves is a piece: `detail` is an index in `piece` */
+    ebpo_branch *piece; /* [piece_count] the pieces */
     uint64_t piece_count, piece_capacity;
-    /* numbers of leaves, and of entries of their lists, in all pieces so far */
+    /* number of leaves in all pieces so far; number of entries in the lists of these leaves */
     _Atomic uint64_t leaf_count, entry_count;
-    struct ebpo_top_envelope *top_envelope; /* envelopes of the top's gray nodes, by detail */
+    struct ebpo_top_envelope *top_envelope; /* [detail] envelopes of the top's gray nodes */
     struct ebpo_store *store;               /* pieces.c; NULL: nothing is stored yet */
-    const struct ebpo_thesis_run *thesis;   /* NULL: a tree for a file is built */
+    /* request of ebpo_build_as_theses; NULL: a tree for a file is built */
+    const struct ebpo_thesis_run *thesis;
 } ebpo_builder;
 
 /* Sets `out` to the corners of a face. */

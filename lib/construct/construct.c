@@ -5,9 +5,10 @@
  * into pieces, which are subtrees, and the top, which is the set of the nodes above the pieces. In
  * the code, the top and each piece are an `ebpo_branch`: `b->top` and `b->piece[i]` (builder.h).
  * Several threads process the pieces, one piece per thread at a time. The envelopes of a piece need
- * the envelope of the parent of its root, so the envelopes of the top are computed first. With a
- * selection from the leaves up, the planes of all nodes are chosen before any envelope is computed.
- * ebpo_build takes over the mesh and frees it, also on failure. */
+ * the envelope of the parent of its root, so the envelopes of the top are computed first. A
+ * selection chooses the planes of the envelopes. If the selection works from the leaves up, the
+ * planes of all nodes are chosen before any envelope is computed. ebpo_build takes over the mesh
+ * and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,8 +29,8 @@
 #include "construct/thesis_levels.h"
 #include "ebpo_config.h"
 
-/* Implements EBP 2017, equation 3: returns the least i >= 1 for which the longest side of the
- * bounds, divided by 2^i, is less than the mean edge. */
+/* Implements EBP 2017, equation 3. Returns the least i >= 1 for which the longest side of the
+ * mesh's bounding box, divided by 2^i, is less than the mean length of the edges. */
 static int level_limit(const ebpo_mesh_report *report)
 {
     double side = 0;
@@ -122,7 +123,7 @@ static void copy_name(char *to, const char *from)
     *to = 0;
 }
 
-/* Sets the fields of the result's info that are known before the stages. */
+/* Sets the fields of `info` that are known before the stages run. */
 static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh,
                       const ebpo_mesh_report *report, const ebpo_repair_record *repair_record)
 {
@@ -276,10 +277,10 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* Builds the top and the pieces. With a selection from the root down, each piece is finished in one
- * pass. With a selection from the leaves up, the top first needs the planes of all pieces; then
- * each piece is divided into nodes twice, because its nodes are not kept. A build as in the theses
- * ends when the planes are chosen. */
+/* Builds the top and the pieces. If the selection works from the root down, each piece is finished
+ * in one pass. If it works from the leaves up, the top first needs the planes of all pieces. Then
+ * the nodes of each piece are made twice, because they are not kept. For ebpo_build_as_theses, the
+ * build ends when the planes are chosen. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);
@@ -325,7 +326,7 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
                : status;
 }
 
-/* Builds a tree, or the sums of ebpo_build_as_theses if `thesis` is not NULL. */
+/* Builds a tree. If `thesis` is not NULL, computes the sums of ebpo_build_as_theses instead. */
 static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                               const ebpo_repair_record *repair_record,
                               const ebpo_build_options *options, const ebpo_thesis_run *thesis,

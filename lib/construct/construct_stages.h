@@ -20,11 +20,11 @@ ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_
 /* Makes the nodes of the top, and lists the faces of the pieces below the top. */
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
 
-/* --- propose.c: selections from the leaves up (of the theses) --- */
+/* --- propose.c: the theses' selections of planes, from the leaves up --- */
 
-/* Chooses planes for all pieces and for the top, after the corner windings are computed. Makes the
- * nodes of each piece for this purpose, and frees them again. Does nothing if the selection works
- * from the root down. */
+/* Chooses the planes of all nodes in the pieces and in the top. Call ebpo_build_corner_windings
+ * before. The function makes the nodes of each piece, and frees them again. It does nothing if the
+ * selection works from the root down. */
 EBPO_MUST_USE ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error);
 
 /* --- emit_levels.c: envelopes, and the arrays of the levels --- */
@@ -45,7 +45,7 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
 /* --- triangle_cell.c: a face and a cell --- */
 
 /* Returns a mask for a face that touches the cell: bit i is set if the face touches octant i of the
- * cell. It may also be set if the face misses octant i by a rounding error. */
+ * cell. Bit i may also be set if the face misses octant i by a rounding error. */
 unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
 
 /* --- face_numbers.c: final indices of faces, in the order of the leaves that list them first ---
@@ -53,13 +53,13 @@ unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_tr
 
 /* Assigns final indices to a piece's fresh faces (faces that no earlier piece lists). */
 ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-/* Moves the mesh's data to `out`, in the final order. */
+/* Moves the mesh's vertices, faces and attributes to `out`, in the final order. */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
 
 /* --- gray_colours.c (format-spec/colours.md) --- */
 
-/* Computes the colours of gray nodes for a tree with levels, mesh and coloured attributes. Returns
- * EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. */
+/* Computes the colours of gray nodes for a tree with levels, mesh and attributes that contain
+ * colours. Returns EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. */
 EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tree *out,
                                                   ebpo_error *error);
 
@@ -80,7 +80,8 @@ EBPO_MUST_USE ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads,
  * winding numbers at the eight corners minus the winding number at corner 0 --- */
 
 /* Computes the corner differences of the top's gray nodes from those of the pieces' roots. Does
- * nothing for a surface. Returns EBPO_E_NOT_SOLID if they disagree. */
+ * nothing for a surface. Returns EBPO_E_NOT_SOLID if two paths to a corner give different winding
+ * numbers. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 /* Computes, from the children's corner differences, the offset of each child: the winding number at
  * the child's corner 0 minus the winding number at the parent's corner 0. `child`: index of the
@@ -88,16 +89,16 @@ ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
 /* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces
- * are list[entries[0]] to list[entries[count - 1]]; if `entries` is NULL, the first `count` faces
- * of the list. Long lists are processed EBPO_CORNER_FACES faces at a time, so `buffer` must have
- * space for the lesser of EBPO_CORNER_FACES and `count` triangles. */
+ * are list[entries[0]] to list[entries[count - 1]] of the branch. If `entries` is NULL, they are
+ * the first `count` faces of the list. Long lists are processed EBPO_CORNER_FACES faces at a time,
+ * so `buffer` must have space for the lesser of EBPO_CORNER_FACES and `count` triangles. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);
 /* Computes a gray node's corner differences from those of its children. Returns false if two paths
  * along the children's edges give different winding numbers for a corner; then the mesh does not
- * balance. */
+ * bound a solid. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
 /* Returns a mask: bit i is set if corner i of a cell is inside by the builder's rule. `winding`:
@@ -110,10 +111,10 @@ typedef struct ebpo_envelope_scratch ebpo_envelope_scratch; /* work space of one
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 
-/* Sets `codes` to the planes that a gray node adds: the planes that were chosen from the leaves up
- * if the branch has proposals, or else planes that are chosen now. On entry, `envelope` is the
- * parent's envelope cut to the node's cell; on return, it is the node's envelope. Returns the
- * number of planes, or -1 when out of memory. */
+/* Sets `codes` to the planes that a gray node adds to its parent's planes. If the branch has
+ * proposals, they are the planes that were chosen from the leaves up. Otherwise they are chosen
+ * now. On entry, `envelope` is the parent's envelope cut to the node's cell; on return, it is the
+ * node's envelope. Returns the number of planes, or -1 when out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);

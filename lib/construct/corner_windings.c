@@ -1,16 +1,16 @@
-/* Computes winding numbers at the corners of cells. The winding number of a corner decides
- * whether the corner is inside the solid. The winding number of a cell without faces decides this
- * for the whole cell.
+/* Computes winding numbers at the corners of cells. The winding number of a corner decides whether
+ * the corner is inside the solid. The winding number of a cell without faces decides this for the
+ * whole cell.
  *
- * In one cell, the winding number at a corner is the one at another corner plus the signed
- * crossings of faces along the cell's edges between them. All corners are shifted by the same
+ * In one cell, the winding numbers at two corners differ by the sum of the signed crossings of
+ * faces along the cell's edges between the two corners. All corners are shifted by the same
  * infinitely small amount, so a face through a corner is no special case (ebpo_axis_crossing). Each
  * node of the tree stores corner differences: the winding numbers at its corners minus the winding
  * number at its corner 0, the lowest corner. The corner differences of a gray node are computed
  * from those of its children, added along the children's edges. The root's lowest corner is outside
  * the model: its winding number is 0. This method replaces the special cases of BP 2008, 3.4.1.1.
- * If two paths to a corner give different winding numbers, the mesh does not balance, and the model
- * is a surface. */
+ * If two paths to a corner give different winding numbers, the mesh does not balance (some edge is
+ * not used equally often in both directions), so it does not bound a solid. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -61,7 +61,7 @@ static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
     return agree;
 }
 
-/* Sets child_delta[o] to the corner differences of child o; those of an empty child are zero.
+/* Sets child_delta[o] to the corner differences of child o, which are zero if the child is empty.
  * `child`: index of the first child's node. */
 static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          const int32_t *child_delta[8])
@@ -98,8 +98,8 @@ bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t chi
     return agree;
 }
 
-/* Computes the corner differences of a node of the top and of all nodes below. Returns false if
- * they disagree (ebpo_gather_delta). */
+/* Computes the corner differences of a node of the top and of all nodes below. Returns false if two
+ * paths to a corner give different winding numbers (ebpo_gather_delta). */
 static bool top_deltas(ebpo_builder *b, uint32_t index)
 {
     ebpo_branch *s = &b->top;
@@ -135,10 +135,11 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 
 /* --- the corners of one cell --- */
 
-/* Returns a mask of the cell faces that the triangle `f` may touch: bit 2 k for the lower and bit
- * 2 k + 1 for the upper cell face along axis k. A triangle strictly on one side of a cell face
+/* Returns a mask of the cell faces that the triangle `f` may touch: bit 2*k for the lower and bit
+ * 2*k+1 for the upper cell face along axis k. A triangle strictly on one side of a cell face
  * crosses none of that cell face's edges. A triangle strictly on one side of the cell crosses no
- * edge at all, so the mask is 0. The infinitely small shift of the corners does not change this. */
+ * edge at all, so the mask is 0. The infinitely small shift of the corners does not change these
+ * two facts. */
 static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_triangle *f)
 {
     unsigned reached = 0;
@@ -155,9 +156,9 @@ static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_tria
     return reached;
 }
 
-/* For each corner except corner 0, the edge to it from an earlier corner: the axis of the edge, the
- * earlier corner, and a mask of the two cell faces that contain the edge (as cell_faces_reached
- * returns it). */
+/* For each corner except corner 0, an edge to this corner from an earlier corner. `axis`: axis of
+ * the edge; `before`: the earlier corner; `cell_faces`: the two cell faces that contain the edge,
+ * as a mask of cell_faces_reached. */
 static const struct {
     int axis, before;
     unsigned cell_faces;
@@ -175,7 +176,8 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_triangle *f = &faces[i];
         unsigned reached = cell_faces_reached((const double(*)[2])cell_face, f);
-        if ((reached & (reached - 1)) == 0) /* an edge is in two cell faces */
+        /* an edge is in two cell faces, so the triangle crosses none */
+        if ((reached & (reached - 1)) == 0)
             continue;
         for (int corner = 1; corner < 8; corner++) {
             int axis = edge_to[corner].axis, before = edge_to[corner].before;

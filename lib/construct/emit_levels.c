@@ -4,11 +4,12 @@
  * codes), so the piece's part of each array is one contiguous range, called a stretch. Stretches
  * are joined in the depth-first order of the pieces, which is also the order of octcodes. The nodes
  * of the top (the nodes above the pieces) have separate stretches. A leaf's references are the
- * faces in its list that an earlier leaf also lists. Until all pieces are done, references are
- * indices along the curve, because the final indices of other pieces' faces are not known before.
+ * faces in its list that an earlier leaf also lists. Until all pieces are done, references are the
+ * faces' indices in the arranged mesh ("along the curve"), because the final indices of other
+ * pieces' faces are not known yet.
  *
- * Arrays that the options exclude, and arrays with only default values, are omitted. Volumes are
- * added in a fixed order, so the number of threads does not change the result. */
+ * Arrays that the options exclude, and optional arrays with only default values, are omitted.
+ * Volumes are added in a fixed order, so the number of threads does not change the result. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -139,9 +140,10 @@ static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t wind
     return count;
 }
 
-/* The functions emit_... add a node and all nodes below to the piece's stretches. `winding`:
- * winding number at the lowest corner of the cell. `envelope`: on entry, the parent's envelope cut
- * to the cell; they change it. They return false when out of memory. */
+/* The functions emit_leaf, emit_empty, emit_gray and emit_node add a node and all nodes below to
+ * the piece's stretches. `winding`: winding number at the lowest corner of the cell. `envelope`: on
+ * entry, the parent's envelope cut to the cell; the functions change this polytope. They return
+ * false when out of memory. */
 static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope)
 {
@@ -187,10 +189,10 @@ static unsigned filled_children(const ebpo_branch *s, uint32_t child)
     return mask;
 }
 
-/* Emits the children in the order of octants. Their envelopes are cut from halves and quarters of
- * the node's envelope, which neighbours share. If a half becomes empty by rounding errors,
- * ebpo_polytope_half replaces it by the whole cube: an envelope may be too large, never too small.
- */
+/* Emits the children in the order of octants. The children's envelopes are cut from halves and
+ * quarters of the node's envelope; neighbouring children share a half or a quarter. If a half
+ * becomes empty by rounding errors, ebpo_polytope_half replaces it by the whole cube. So an
+ * envelope may be too large, but never too small. */
 static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
@@ -272,9 +274,10 @@ typedef struct joiner {
     /* [count][EBPO_LEVELS_MAX] stretches of pieces and of the top, depth first */
     ebpo_piece_level **stretch;
     uint64_t count, capacity;
-    ebpo_piece_level *current; /* stretches of the top, if they are the last ones so far; NULL: the
-                                * last ones are those of a piece */
-    ebpo_level *level;         /* [EBPO_LEVELS_MAX] result */
+    /* the last stretches so far, if they are stretches of the top; NULL: the last stretches so far
+     * are those of a piece */
+    ebpo_piece_level *current;
+    ebpo_level *level; /* [EBPO_LEVELS_MAX] result */
 } joiner;
 
 static const char stage[] = "joining levels";
@@ -316,8 +319,8 @@ static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, i
     return type;
 }
 
-/* Appends to the list the stretches below a node: those of its pieces and, between them, stretches
- * with the nodes of the top. Returns false when out of memory. */
+/* Appends to the joiner's list the stretches of the pieces below a node and, between them,
+ * stretches with the nodes of the top. Returns false when out of memory. */
 static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
 {
     ebpo_builder *b = j->b;
@@ -354,7 +357,8 @@ static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t
     return true;
 }
 
-/* Sets the count of an array unit (leaves, gray nodes, ...) of the joined level. */
+/* Sets one count of the joined level: its number of leaves, of gray nodes, or of another ebpo_per.
+ */
 static void add_counts(const joiner *j, int level, int unit)
 {
     uint64_t total = 0;
@@ -413,7 +417,8 @@ static int compare_indices(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sorts a list of indices. A short list, as most leaves have, is sorted by insertion. */
+/* Sorts a list of indices. Most lists of leaves are short, and short lists are sorted by insertion.
+ */
 static void sort_indices(uint32_t *a, uint64_t n)
 {
     static const uint64_t short_list = 32;
@@ -436,7 +441,8 @@ enum { LEAF_GRAIN = 1 << 13 }; /* number of leaves of a parallel task */
 typedef struct numbering {
     const ebpo_builder *b;
     ebpo_level *level;
-    uint64_t *first; /* [block of LEAF_GRAIN leaves] index of its first reference in leaf_refs */
+    /* [block of LEAF_GRAIN leaves] index in leaf_refs of the block's first reference */
+    uint64_t *first;
 } numbering;
 
 /* Replaces the indices along the curve by final indices in the references of a block of leaves. */
@@ -456,8 +462,9 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Replaces the indices along the curve in a level's leaf_refs by final indices. For progress: `all`
- * is the number of references of all levels, of which `before` are done. */
+/* Replaces the indices along the curve in a level's leaf_refs by final indices. `all` is the number
+ * of references of all levels, of which `before` are done; both are used only to report progress.
+ */
 static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
                                ebpo_error *error)
 {
@@ -508,9 +515,9 @@ static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Adds up the volumes of a level, in a fixed order that does not depend on the number of threads,
- * replaces the references by final indices, and omits arrays. `before`, `all`: as for number_refs.
- */
+/* Adds up the volumes of a level, in a fixed order that does not depend on the number of threads.
+ * Then replaces the references by final indices, and omits arrays. `before`, `all`: as for
+ * number_refs. */
 static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
                                 ebpo_error *error)
 {
@@ -527,11 +534,12 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
     return status;
 }
 
-/* Adds the group of level 0, which has the type of the root. */
+/* Adds the group of level 0, which holds only the type of the root. */
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    /* a stretch of the top, never one of a piece, whose arrays may be in the store */
+    /* the group goes to a stretch of the top, because the arrays of a piece's stretch may be in the
+     * store, where they cannot grow */
     ebpo_piece_level *first = current_stretch(j);
     return first &&
            ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));

@@ -1,20 +1,20 @@
-/* Chooses the planes of gray nodes, from the root down. A candidate is a plane that may be chosen:
- * a direction and the support of the solid along this direction (the greatest n . x over the solid
- * within the cell, supports.h). The directions are normals of the convex hull of the solid within
- * the cell:
+/* Chooses the planes of gray nodes, from the root down. A candidate is a plane that may be chosen.
+ * It has a direction n and an offset, the support of the solid along n: the greatest n . x over the
+ * solid within the cell (supports.h). The directions are normals of the convex hull of the solid
+ * within the cell:
  *
- * - If the node has few points (supports.h), the directions are the normals of the facets of these
- * points' hull.
- * - If it has many points, or if they span no volume, the hull grows in rounds: each round finds
- * the supports of the solid along the normals of the hull's facets, and adds the points of these
- * supports (extreme points of the solid) to the hull. Normals of the faces below the node are
- * tried, too: they are grouped in bins of the octahedral map (which maps normals to 10 + 10 bits),
- * no finer than needed, and the mean of each bin is tried.
+ * - If the solid within the cell is given by few points (supports.h), the directions are the
+ *   normals of the facets of these points' hull.
+ * - If there are many points, or if they span no volume, a hull grows in rounds. Each round finds
+ *   the supports of the solid along the normals of the hull's facets, and adds the points of these
+ *   supports (extreme points of the solid) to the hull. Normals of the faces below the node are
+ *   tried, too: they are grouped in bins of the octahedral map, which maps a normal to 10 + 10
+ *   bits. The mean of each bin is tried.
  *
- * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
+ * The selection (selections.c) takes planes from the candidates. A support is rounded up, so a
  * plane never cuts off a part of the solid, however bad its direction is. This file also computes
- * the envelopes of the nodes of the top (the nodes above the pieces), level by level, so that every
- * piece gets the envelope of its root's parent. */
+ * the envelopes of the top (the nodes above the pieces; a piece is a subtree that one thread
+ * builds), level by level, so that every piece gets the envelope of its root's parent. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +35,8 @@
 
 /* --- candidates: normals of faces --- */
 
-/* Maximum number of sampled normals; size of the table of bins. */
+/* CANDIDATES_SAMPLE: maximum number of sampled normals. CANDIDATES_BINS: size of the table of bins.
+ */
 enum { CANDIDATES_SAMPLE = 4096, CANDIDATES_BINS = 16384 };
 
 /* A bin of the octahedral map: a square of normals. */
@@ -53,8 +54,8 @@ typedef struct candidates_scratch {
 } candidates_scratch;
 
 /* Adds the normals of every `step`-th face to the sample, from face begin + *skip on. The faces are
- * entries[begin .. end - 1]; if `entries` is NULL, faces begin .. end - 1 of the branch's list.
- * Sets *skip to the number of faces to skip at the beginning of the next list. */
+ * entries[begin .. end - 1]. If `entries` is NULL, they are faces begin .. end - 1 of the branch's
+ * list. Sets *skip to the number of faces to skip at the beginning of the next list. */
 static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
                          uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step,
                          uint32_t *sample, int *count)
@@ -92,9 +93,9 @@ static int sample_candidates(const ebpo_builder *b, const ebpo_branch *s,
     return count;
 }
 
-/* Fills the table with bins of `width` * `width` normals. Returns false if more than `bins_max`
- * bins would be occupied. *used: number of occupied bins, before and after the call; their indices
- * in the table are in `slots`. */
+/* Removes the old bins from the table, and groups the sample in bins of `width` * `width` normals.
+ * Returns false if more than `bins_max` bins would be occupied. *used: number of occupied bins,
+ * before and after the call. `slots`: indices of these bins in the table. */
 static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
                       uint32_t width, int bins_max)
 {
@@ -120,8 +121,8 @@ static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *
     return true;
 }
 
-/* Makes candidates of the means of bins, at most bins_max, without supports. Returns their number.
- */
+/* Makes a candidate of the mean of each bin, at most `bins_max`. The supports are not computed yet.
+ * Returns the number of candidates. */
 static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
                             const ebpo_branch *s, const ebpo_build_detail *detail, int bins_max,
                             ebpo_candidate *out)
@@ -144,13 +145,14 @@ static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
 /* --- scratch memory and supports --- */
 
 enum {
-    TOP_LEVELS = 4,        /* down to this level, planes take hardly any bytes of the file */
+    /* down to this level, there are so few nodes that planes take hardly any bytes of the file */
+    TOP_LEVELS = 4,
     MANY_LEVELS = 2,       /* down to this level (at most 73 nodes), a node may have twice as many
                             * planes, which round solids need */
     FACES_TRIED = 16,      /* maximum number of means of face normals that are tried */
     HULL_ROUNDS = 3,       /* maximum number of rounds */
     ROUND_TRIED_TOP = 160, /* maximum number of directions tried in a round, down to TOP_LEVELS */
-    ROUND_TRIED = 24,      /* the same for the deeper levels */
+    ROUND_TRIED = 24,      /* maximum number of directions tried in a round, on deeper levels */
     TABLE = 1024           /* entries of the table of normals */
 };
 
@@ -158,7 +160,7 @@ struct ebpo_envelope_scratch {
     ebpo_supports supports;
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
     int count; /* number of candidates */
-    /* normals that were tried: those of candidates and those of useless planes */
+    /* normals that were tried, both of candidates and of useless planes */
     uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
     int tried_count;
     uint32_t normals[TABLE]; /* hash table: 1 + normal; 0: free */
@@ -182,10 +184,10 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     free(scratch);
 }
 
-/* Returns a limit for the support of a useful plane with the normal n: a plane whose support is the
+/* Returns a limit for the support of a useful plane with the normal n. A plane whose support is the
  * limit or more can remove neither the volume epsilon nor a needle (a long, thin portion of the
- * envelope). Reason: the part of height h that a plane cuts off from a convex body of width H and
- * volume V has at most the volume V (1 - (1 - h/H)^3) <= 3 V h / H. */
+ * envelope). Reason: let V be the volume of a convex body, and H its width along n. A plane that
+ * cuts off a part of height h removes at most the volume V (1 - (1 - h/H)^3) <= 3 V h / H. */
 static double useful_support_limit(const ebpo_polytope *envelope, double volume, const int32_t n[3],
                                    double epsilon)
 {
@@ -201,7 +203,8 @@ static double useful_support_limit(const ebpo_polytope *envelope, double volume,
 }
 
 /* Tries a direction: adds a candidate if its plane may be useful. The search for the support stops
- * as soon as the plane is useless. Sets `where` to the point with the greatest n . x found. */
+ * as soon as it finds that the plane is useless. Sets `where` to the point with the greatest n . x
+ * that the search found. */
 static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
                        double volume, double epsilon, double where[3])
 {
@@ -262,8 +265,8 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
     return false;
 }
 
-/* Runs one round: tries the normals of the facets of the hull of the known points, the largest
- * facets first, at most `directions_max` directions. Adds the extreme points that are beyond a
+/* Runs one round: computes the hull of the known points, and tries the normals of at most
+ * `directions_max` facets, the largest facets first. Adds the extreme points that are beyond a
  * facet. Returns false if no point was added. */
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
                        double epsilon, int directions_max)
@@ -288,7 +291,7 @@ static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, 
     return s->hull_point_count > before;
 }
 
-/* Runs rounds until one adds no point, at most HULL_ROUNDS. */
+/* Runs rounds until a round adds no point, at most HULL_ROUNDS rounds. */
 static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
                      double epsilon, int directions_max)
 {
@@ -299,12 +302,12 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 
 /* --- few points --- */
 
-/* On levels deeper than TOP_LEVELS, points outside the hull so far are omitted if they are nearer
- * to it than this distance (in cells): they would only add nearly equal directions. */
+/* On levels deeper than TOP_LEVELS, a point that is outside the hull found so far by less than this
+ * distance (in cells) is omitted: it would only add directions that are nearly equal to others. */
 static const double hull_tolerance = 1e-3;
 
-/* Makes all points of the node the points of the hull. Returns false if they are too many, or if
- * some points of the node are not in the array `point` but are a range of vertices. */
+/* Makes all points of the solid in the cell the points of the hull. Returns false if there are too
+ * many, or if some of these points are not in the array `point` but are a range of vertices. */
 static bool use_all_points(ebpo_envelope_scratch *s)
 {
     const ebpo_supports *from = &s->supports;
@@ -318,7 +321,7 @@ static bool use_all_points(ebpo_envelope_scratch *s)
     return true;
 }
 
-/* Adds a normal to the table. Returns false if the table has it already. */
+/* Adds a normal to the table. Returns false if the table already contains this normal. */
 static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
 {
     uint64_t at;
@@ -330,8 +333,9 @@ static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
     return true;
 }
 
-/* Makes candidates of the facets of the points' hull. Points outside the hull so far by less than
- * `tolerance` are omitted. Returns the volume of the hull, or -1 if the points span no volume. */
+/* Makes candidates of the facets of the hull of the points. A point that is outside the hull found
+ * so far by less than `tolerance` is omitted. Returns the volume of the hull, or -1 if the points
+ * span no volume. */
 static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 {
     int facets = ebpo_hull_facets((const double(*)[3])s->hull_points, s->hull_point_count,
@@ -360,9 +364,10 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 
 /* --- the node --- */
 
-/* Returns the factor of epsilon for a node of levels 0 to TOP_LEVELS. `volume`: volume of its
- * envelope so far, in cells. The factor is small, because planes of these levels take hardly any
- * bytes, and even a solid that fills a thousandth of its cell needs planes. */
+/* Returns the factor by which epsilon is multiplied for a node of levels 0 to TOP_LEVELS. `volume`:
+ * volume of the node's envelope so far, in cells. The factor is small for two reasons: planes of
+ * these levels take hardly any bytes, and even a solid that fills a thousandth of its cell needs
+ * planes. */
 static double top_factor(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
 /* Makes the candidates of a node with many points. */
@@ -431,7 +436,8 @@ typedef struct pending {
     uint32_t node; /* index in the top's nodes */
     ebpo_cell cell;
     int32_t winding; /* winding number at the lowest corner */
-    /* first the parent's envelope cut to the cell, then the envelope of the node */
+    /* before front_envelopes: the parent's envelope cut to the cell; afterwards: the envelope of
+     * the node */
     ebpo_polytope *envelope;
 } pending;
 

@@ -4,8 +4,9 @@
  * vertex gets the next index in the first face that uses it. So the new faces of a leaf (no earlier
  * leaf lists them) are one range in the file, and only the leaf's other faces need references. A
  * piece (a subtree that one thread builds) assigns indices to its *fresh* faces, which no earlier
- * piece lists; so the pieces can be processed in any order. Attributes move with their vertices and
- * faces. format-spec/README.md describes the order. */
+ * piece lists. The first index of each piece is known before, so the pieces can be processed in any
+ * order. Attributes move with their vertices and faces. format-spec/README.md describes the order.
+ */
 #include "core/strict_fp.h"
 
 #include "construct/construct_stages.h"
@@ -79,20 +80,20 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
     }
 }
 
-/* Input and output of the parallel tasks that move the data into the final order. */
+/* Input and output of the parallel tasks that move the mesh's data into the final order. */
 typedef struct moving {
     const ebpo_builder *b;
     const ebpo_mesh *mesh; /* in the order along the curve */
     const uint32_t *final; /* [vertex] final index */
     uint32_t *face_at;     /* [final index] face of `mesh` */
-    /* result; vertex_source first contains vertices of `mesh`, which move_vertices replaces by
+    /* result; out->vertex_source first contains vertices of `mesh`, which move_vertices replaces by
      * source indices */
     ebpo_tree *out;
 } moving;
 
 enum { MOVE_GRAIN = 1 << 14 }; /* number of vertices or faces of a task */
 
-/* Sets face_at for the final indices of faces. */
+/* Sets face_at, the inverse of final_index, for a range of faces. */
 static ebpo_status invert_final_indices(void *context, uint64_t begin, uint64_t end,
                                         unsigned worker, ebpo_error *error)
 {

@@ -2,12 +2,12 @@
  * by area (format-spec/colours.md).
  *
  * The levels are processed from the deepest upwards: the sums of a gray node are the sums over its
- * group of eight children. No data is stored for each face: the weight of a face is computed again
- * for each leaf that lists the face, because most faces are in one leaf only. Weights and sums are
- * integers, so the result is exact and does not depend on the number of threads. The colour of a
- * face is the mean of its vertices' colours. Exception: if faces have colours, and the vertices
- * have no colours or all have the same colour, it is the colour of the face itself. lib/verify
- * computes the same colours with separate code. */
+ * group of eight children. No data is stored for each face. The weight of a face is computed again
+ * for each leaf that lists the face; this takes little time, because most faces are in one leaf
+ * only. Weights and sums are integers, so the result is exact and does not depend on the number of
+ * threads. The colour of a face is the mean of its vertices' colours. Exception: if faces have
+ * colours, and the vertices have no colours or all have the same colour, the face's own colour is
+ * used. lib/verify computes the same colours with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,7 +32,7 @@ typedef struct colour_sums {
     ebpo_wide weight;    /* sum of 3 * weight */
 } colour_sums;
 
-/* Numbers of a level's leaves, gray nodes and references that come before the groups of a task. (A
+/* How many of a level's leaves, gray nodes and references come before the groups of a task. (A
  * reference is an element of leaf_refs: a face that an earlier leaf also lists.) */
 typedef struct task_start {
     uint64_t leaf, gray, ref;
@@ -41,13 +41,13 @@ typedef struct task_start {
 typedef struct colouring {
     ebpo_tree *tree;
     double size;  /* longest side of the root box */
-    bool by_face; /* the columns are colours of faces, not of vertices */
+    bool by_face; /* true: `column` has the colours of faces; false: of vertices */
     ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
     const ebpo_level *level;  /* level whose groups are added up */
     const task_start *start;  /* [task] */
     const colour_sums *below; /* [gray node of the level] sums */
-    /* [group] sums and colours of the level's groups. A group has the sums and the colour of its
-     * parent, a gray node of the level above */
+    /* [group] sums and colours of the level's groups. They are the sums and the colour of the
+     * group's parent, a gray node of the level above */
     colour_sums *above;
     uint32_t *colours; /* bytes 0 to 2: red, green, blue */
 } colouring;
@@ -88,7 +88,7 @@ static void add_sums(colour_sums *to, const colour_sums *more)
     to->weight = ebpo_wide_plus(to->weight, more->weight);
 }
 
-/* Adds the faces of a leaf. `ref`: index of the leaf's first reference. */
+/* Adds the faces of a leaf to the sums. `ref`: index in leaf_refs of the leaf's first reference. */
 static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sums *sums)
 {
     const ebpo_level *l = c->level;
@@ -98,8 +98,8 @@ static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sum
         add_face(c, l->leaf_refs[ref + i], sums);
 }
 
-/* Returns the byte nearest to colour / weight; halves are rounded up. It is the greatest byte with
- * 2 * byte * weight <= 2 * colour + weight, found bit by bit. */
+/* Returns the byte nearest to colour / weight; halves are rounded up. This byte is the greatest one
+ * with 2 * byte * weight <= 2 * colour + weight. It is found bit by bit. */
 static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
 {
     ebpo_wide limit = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);

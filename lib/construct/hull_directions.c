@@ -1,17 +1,17 @@
 /* Computes a small convex hull. Envelopes use only the directions of its facets. So a rounding
  * error in this file may enlarge an envelope, but the envelope still contains the model's faces.
  *
- * The hull grows point by point: a point outside the hull is above the planes of some facets
- * ("visible" facets), which are replaced by new facets with this point as a corner (a
- * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
- * first, so that most other points are inside the hull when they are tested. The planes of the
- * facets are stored as a structure of arrays (nx, ny, nz, d), for the kernel that tests a point
+ * The hull grows point by point, by a beneath-beyond algorithm in doubles. A point outside the hull
+ * is above the planes of some facets, its visible facets. These are replaced by new facets with
+ * this point as a corner. Points that are extreme along the axes and diagonals come first, so that
+ * most other points are inside the hull when they are tested. The planes of the facets are stored
+ * as a structure of arrays (nx, ny, nz, d), for a vectorised loop, a kernel, that tests a point
  * against all planes (sweep.h).
  *
  * Limits: if there are more than EBPO_HULL_POINTS points, no hull is computed (0 facets). When the
- * capacity for facets is reached (at most EBPO_HULL_FACETS), the remaining points are omitted. Ties
- * are ordered by indices of points, so that all machines return the same facets in the same order.
- */
+ * capacity for facets is reached (at most EBPO_HULL_FACETS), the remaining points are omitted.
+ * Equal values are ordered by indices of points, so that all machines return the same facets in the
+ * same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -29,7 +29,8 @@ _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have spa
 
 enum {
     FACETS_MAX = EBPO_HULL_FACETS,
-    EXTREMES = 14,    /* number of directions of extreme points: axes and diagonals, both ways */
+    /* number of directions of extreme points: three axes and four diagonals, both ways */
+    EXTREMES = 14,
     VISIBLE_MAX = 192 /* maximum number of facets that one point replaces */
 };
 
@@ -37,8 +38,8 @@ enum {
 typedef struct hull {
     const ebpo_sweep *sweep; /* kernels for this processor */
     const double (*p)[3];    /* points */
-    /* planes n . x = d of the facets, padded to a multiple of four with planes that no point is
-     * above */
+    /* planes n . x = d of the facets; further planes, above which there is no point, make their
+     * number a multiple of four */
     double nx[FACETS_MAX + 4], ny[FACETS_MAX + 4], nz[FACETS_MAX + 4], d[FACETS_MAX + 4];
     double length[FACETS_MAX];      /* length of the facet's cross product: twice its area */
     double tolerance;               /* points at most this far outside the hull are omitted */
@@ -46,7 +47,8 @@ typedef struct hull {
     int count, capacity;            /* number of facets, and its limit */
 } hull;
 
-/* Computes the normal of the triangle a, b, c. Its length is twice the triangle's area. */
+/* Computes the normal `n` of the triangle p[a], p[b], p[c]. The length of the normal is twice the
+ * triangle's area. */
 static void cross_of(const double (*p)[3], int a, int b, int c, double n[3])
 {
     double u[3], v[3];
@@ -101,8 +103,8 @@ static void set_count(hull *h, int count)
 
 /* --- the first four facets --- */
 
-/* Finds the extreme point in each direction: at[w] is its index. Directions 2 w and 2 w + 1 are
- * opposite; 0 to 5 are along the axes, the others along the diagonals. */
+/* Finds the extreme point in each direction w: at[w] is the index of this point. Directions 2*w and
+ * 2*w+1 are opposite. Directions 0 to 5 are along the axes, the others along the diagonals. */
 static void find_extremes(const double (*p)[3], int count, int at[EXTREMES])
 {
     double best[EXTREMES];
@@ -135,8 +137,8 @@ static double height_above(const double n[3], const double from[3], const double
     return ebpo_vec3_dot(n, difference);
 }
 
-/* Finds four points far from each other: the corners of a tetrahedron. The fourth is below the
- * facet of the first three. Returns false if the points span no volume. */
+/* Finds four points far from each other: the corners of a tetrahedron. The fourth point is below
+ * the facet of the first three points. Returns false if the points span no volume. */
 static bool first_four(const double (*p)[3], int count, const int extremes[EXTREMES], int corner[4])
 {
     double best = -1, n[3];
@@ -181,9 +183,9 @@ static bool first_facets(hull *h, const int c[4])
 
 /* --- adding a point --- */
 
-/* Lists the edges of the visible facets, as from << 16 | to in `edges` and as to << 16 | from in
- * `reversed` (from, to: indices of points). Returns their number. Pads `edges` to a multiple of
- * four with invalid edges. */
+/* Lists the edges of the visible facets. An edge between the points `from` and `to` is from << 16 |
+ * to in `edges`, and to << 16 | from in `reversed`. Returns the number of edges. Adds invalid edges
+ * to `edges` until their number is a multiple of four. */
 static int edges_of(const hull *h, const uint16_t *visible, int visible_count, uint32_t *edges,
                     uint32_t *reversed)
 {
@@ -202,7 +204,7 @@ static int edges_of(const hull *h, const uint16_t *visible, int visible_count, u
 }
 
 /* Returns true if the edge is in a list of 4 * fours edges. The loop has no early exit, so that
- * compilers vectorise it. */
+ * compilers can vectorise the loop. */
 static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
 {
     uint32_t found = 0;
@@ -211,10 +213,10 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Removes the visible facets that no new facet has replaced. Their indices are index[from] to
- * index[to - 1], which ascend. `count`: number of facets before the removal. Facets are removed in
- * descending order of index; each time, the last facet of the hull moves to the free index. So the
- * facet that moves is never one that must still be removed. */
+/* Removes the visible facets that no new facet has replaced. The indices of these facets are
+ * index[from] to index[to - 1], in ascending order. `count`: number of facets before the removal.
+ * Facets are removed in descending order of index. Each time, the last facet of the hull moves to
+ * the free index. This order ensures that the facet that moves is not itself in the list. */
 static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--)
@@ -225,7 +227,8 @@ static void close_gaps(hull *h, const uint16_t *index, int from, int to, int cou
 
 /* Adds a point to the hull; a point inside the hull changes nothing. Returns false if the point
  * would replace more than VISIBLE_MAX facets or if the capacity is reached. Then the hull may have
- * overlapping facets, so no more points can be added, but its facets still give directions. */
+ * overlapping facets, so no more points can be added. The directions of its facets can still be
+ * used. */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE_MAX];

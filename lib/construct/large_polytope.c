@@ -1,6 +1,8 @@
 /* Cuts convex polytopes with any number of faces, by the method of geometry/polytope.c (BP 2008,
- * section 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first shape
- * if the cut succeeds. A vertex that is nearer to the cutting plane than a tolerance counts as a
+ * section 3.4.3) on arrays that grow. A shape is the list of the polytope's faces with their
+ * vertices. A cut builds a second shape, which replaces the first shape if the cut succeeds. The
+ * new face in the cutting plane is called the cap, and the edges of the other faces on this plane
+ * are called the rim. A vertex that is nearer to the cutting plane than a tolerance counts as a
  * vertex on the plane. If rounding errors would make the new shape inconsistent, the cut is
  * refused; so the polytope is never too small. */
 #include "core/strict_fp.h"
@@ -20,10 +22,10 @@ static const double least_depth = 1e-7;
 
 static const uint32_t no_vertex = UINT32_MAX;
 
-/* An edge that the plane cuts. */
+/* An edge that the plane cuts between its ends. */
 struct ebpo_large_edge {
     uint64_t key;    /* 1 + (kept end << 32 | end that is cut off); 0: empty slot */
-    uint32_t vertex; /* the new vertex, in `next` */
+    uint32_t vertex; /* index in `next` of the new vertex */
 };
 
 /* --- shapes --- */
@@ -138,11 +140,11 @@ double ebpo_large_volume(const ebpo_large_polytope *p)
 
 /* --- clipping --- */
 
-/* Returns true if the plane cuts off a vertex of `now`. */
+/* Returns true if the plane cuts off the vertex v of `now`. */
 static bool is_out(const ebpo_large_polytope *p, uint32_t v) { return p->distance[v] > tolerance; }
 
-/* Returns the vertex of `next` where the plane cuts the edge from the kept vertex `in` to the
- * vertex `out`; it is the same for both faces at the edge. */
+/* Returns the index in `next` of the point at which the plane cuts the edge from the kept vertex
+ * `in` to the removed vertex `out`. Both faces at the edge get the same index. */
 static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
 {
     uint64_t key = ((uint64_t)in << 32 | out) + 1, at, mask = p->edge_slots - 1;
@@ -170,8 +172,8 @@ static void record_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
         p->rim[p->rims++] = (struct ebpo_large_rim){ from, to };
 }
 
-/* Copies the part of face f within the half-space to `next`, and adds its edges on the plane to the
- * rim. */
+/* Copies the part of face f within the half-space to `next`, and adds the edges of this part that
+ * are on the plane to the rim. */
 static void clip_loop(ebpo_large_polytope *p, uint64_t f)
 {
     const ebpo_large_shape *s = &p->now;
@@ -195,7 +197,8 @@ static void clip_loop(ebpo_large_polytope *p, uint64_t f)
         record_rim(p, to->corner[i], to->corner[i + 1 < to->corner_count ? i + 1 : start]);
 }
 
-/* Returns true if edge i of the rim also occurs reversed: then it is between two kept faces. */
+/* Returns true if the rim contains edge i in both directions. Then the edge is between two kept
+ * faces. */
 static bool is_paired(const ebpo_large_polytope *p, uint64_t i)
 {
     for (uint64_t j = 0; p->touched && j < p->rims; j++)
@@ -204,8 +207,8 @@ static bool is_paired(const ebpo_large_polytope *p, uint64_t i)
     return false;
 }
 
-/* Adds the cap: its loop consists of the reversed edges of the rim, except paired edges. Returns
- * false if they do not form one loop. */
+/* Adds the cap. Its loop consists of the reversed edges of the rim, except edges that are paired
+ * (is_paired). Returns false if these edges do not form one loop. */
 static bool add_cap(ebpo_large_polytope *p, int32_t tag)
 {
     uint64_t open = 0, steps = 0;
@@ -235,7 +238,8 @@ static bool add_cap(ebpo_large_polytope *p, int32_t tag)
     return at == begin && steps == open;
 }
 
-/* Prepares the work space: vertices that remain, and an empty table of cut edges. */
+/* Prepares a cut: copies the kept vertices to `next`, and empties the table of cut edges. Returns
+ * false when out of memory. */
 static bool begin_cut(ebpo_large_polytope *p)
 {
     uint64_t edges = p->now.corner_count / 2 + 1;

@@ -19,11 +19,12 @@ typedef struct ebpo_large_shape {
 } ebpo_large_shape;
 
 typedef struct ebpo_large_polytope {
-    ebpo_large_shape now, next;   /* now: the polytope; next: the result of the current cut */
-    double *distance;             /* [vertex of now] signed distance from the cutting plane */
-    uint32_t *next_index;         /* [vertex of now] index in `next`, if the vertex is kept */
-    uint32_t *cap;                /* [vertex of next] next vertex of the cap, the new face in the
-                                   * cutting plane */
+    ebpo_large_shape now, next; /* now: the polytope; next: the result of the current cut */
+    double *distance;           /* [vertex of now] signed distance from the cutting plane */
+    uint32_t *next_index;       /* [vertex of now] index in `next`, if the vertex is kept */
+    /* [vertex of next] the vertex that follows this one in the cap, the new face in the cutting
+     * plane */
+    uint32_t *cap;
     bool *on;                     /* [vertex of next] the vertex is on the cutting plane */
     struct ebpo_large_edge *edge; /* hash table of the cut edges */
     struct ebpo_large_rim {
@@ -32,9 +33,10 @@ typedef struct ebpo_large_polytope {
     uint64_t rims, distance_capacity, next_index_capacity, cap_capacity, on_capacity, edge_capacity,
         rim_capacity;
     uint64_t edge_slots; /* size of the hash table, a power of two */
-    bool touched;        /* vertices of `now` are on the plane, so an edge of `rim` may be between
-                          * two kept faces */
-    bool no_memory;      /* a call failed for lack of memory */
+    /* at least one vertex of `now` is on the plane, so an edge of `rim` may be between two kept
+     * faces */
+    bool touched;
+    bool no_memory; /* a call failed for lack of memory */
 } ebpo_large_polytope;
 
 /* Sets `p` to the unit cube. Before the first call, all bytes of `p` must be zero. Returns false

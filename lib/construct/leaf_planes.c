@@ -2,11 +2,12 @@
  * the same planes from the same faces, bit for bit, so most files do not store the planes of
  * leaves.
  *
- * The directions of candidates are the normals of the convex hull of the leaf's points: the corners
- * of the faces' parts in the cell, and the cell's corners that are inside the solid. If there are
- * too many points, or if all are in one plane, the directions are the normals of the faces. The
- * offset of a plane is the support (the greatest n . x) of all points, plus a bound of the rounding
- * error, so no part of a face in the cell is cut off. */
+ * A candidate is a plane that may be chosen. Its direction is a normal of the convex hull of the
+ * leaf's points. These are the corners of the faces' parts in the cell, and the cell's corners that
+ * are inside the solid. If there are too many points, or if all are in one plane, the directions
+ * are the normals of the faces. The offset of a plane with the normal n is its support, which is
+ * the greatest n . x of all points, plus a bound of the rounding error. So no part of a face in the
+ * cell is cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,8 +19,8 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
-/* Maximum number of candidates (planes that may be chosen); maximum number of points; size of the
- * hash table of points. */
+/* LEAF_CANDIDATES: maximum number of candidates. LEAF_POINTS: maximum number of points. LEAF_TABLE:
+ * size of the hash table of points. */
 enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
 
 /* The points whose hull contains the solid in the cell. */
@@ -27,13 +28,13 @@ typedef struct leaf_points {
     double at[LEAF_POINTS][3];
     double slack[LEAF_POINTS]; /* upper bounds of the rounding errors of a point's coordinates */
     int count;
-    /* Hash table of the points, because most corners of faces occur several times. A slot has 1 +
-     * the index of a point, or 0 if it is empty. */
+    /* Hash table that finds equal points, because most corners of faces occur several times. A slot
+     * has 1 + the index of a point, or 0 if the slot is empty. */
     uint8_t table[LEAF_TABLE];
 } leaf_points;
 
-/* Adds a candidate with this normal, unless there is one. Returns false if no further candidate can
- * be added. */
+/* Adds a candidate with this normal if no candidate has this normal yet. Returns false if no
+ * further candidate can be added. */
 static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
 {
     for (int i = 0; i < *count; i++)
@@ -51,7 +52,8 @@ static bool equal_points(const double a[3], const double b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Adds a point, or raises the slack of an equal point. Returns false if there are too many. */
+/* Adds a point. If there is an equal point already, raises the slack of that point to at least
+ * `slack`. Returns false if there are too many points. */
 static bool add_point(leaf_points *points, const double p[3], double slack)
 {
     uint64_t bits[3], slot;
@@ -113,8 +115,8 @@ static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 /* --- many points, or all of them in a plane: the faces' directions --- */
 
 /* Makes candidates of the faces' normals (of every step-th face if there are many) and of the
- * opposite normals: where all faces are in one plane, the opposite normals bound the other side of
- * the envelope. Returns the number of candidates. */
+ * opposite normals. If all faces are in one plane, the opposite normals bound the other side of the
+ * envelope. Returns the number of candidates. */
 static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count,
                         ebpo_candidate *out)
 {

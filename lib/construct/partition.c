@@ -1,6 +1,6 @@
-/* Assigns faces to cells. First the root is divided until the nodes have few enough faces to be
- * processed in parallel: these nodes are the roots of the pieces, and the nodes above them are the
- * top. Then the nodes of each piece are made, depth first.
+/* Assigns faces to cells. First the root is divided into nodes with few faces. Each of these nodes
+ * is the root of a piece, a subtree that one thread builds; the nodes above the pieces are the top.
+ * Then the nodes of each piece are made, depth first.
  *
  * A node depends on its cell and its faces alone, and the pieces depend on the model alone, so the
  * result does not depend on the number of threads or the machine. Sources: EBP 2017, 3.3
@@ -30,14 +30,15 @@
 /* Number of faces after which pages of the workspace are released. */
 enum { RELEASE_FACES = 1 << 13 };
 
-/* Limits of the numbers of leaves and of entries in their lists, for meshes with huge faces and a
- * deep maximum level: without limits, every face could be listed in millions of cells. A limit is
- * ..._always + ..._per_face times the number of faces. */
+/* Limits of the number of leaves and of the number of entries in their lists. Without limits, a
+ * mesh with huge faces and a deep maximum level could list every face in millions of cells. For F
+ * faces, the limits are leaves_always + leaves_per_face * F, and entries_always + entries_per_face
+ * * F. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
                       entries_always = 1 << 26;
 
-/* A set of faces (hash table). A slot is occupied if its round is the set's round, so a new round
- * empties the set without clearing the slots. */
+/* A set of faces, as a hash table. A slot is occupied if its round is equal to the set's round. So
+ * increasing the set's round empties the set without clearing the slots. */
 typedef struct face_set {
     struct {
         uint32_t face, round;
@@ -46,7 +47,7 @@ typedef struct face_set {
     uint32_t round;
 } face_set;
 
-/* State of making the nodes of a piece. */
+/* State while the nodes of a piece are made. */
 typedef struct grower {
     ebpo_builder *b;
     ebpo_branch *s;
@@ -54,7 +55,9 @@ typedef struct grower {
      */
     uint32_t *stack;
     uint64_t stack_used, stack_capacity;
-    uint8_t *mask; /* [face of the node that is being divided] octants that it touches */
+    /* [face in the list of the node that is being divided] octants that the face touches, one bit
+     * each */
+    uint8_t *mask;
     uint64_t mask_capacity;
     ebpo_triangle *faces; /* faces of a leaf */
     uint64_t faces_capacity;
@@ -62,8 +65,9 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
-/* Returns true if a criterion of the theses decides which nodes become leaves: then each node is
- * divided first, and may become a leaf after its children have been made. */
+/* Returns true if a criterion of the theses decides which nodes become leaves. Then each node is
+ * divided first. After its children have been made, the node may become a leaf (collapse_if_few).
+ */
 static bool coalesces_late(const ebpo_builder *b)
 {
     return b->thesis && b->thesis->coalesce != EBPO_COALESCE_DISTINCT;
@@ -93,8 +97,8 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-/* Adds to s->crossing the faces of the list that cross a cell face or touch an upper cell face:
- * such a face has a vertex that is not in the cell's range of vertices. Returns false when out of
+/* Adds to s->crossing the faces of the list that have a vertex outside the cell's range of
+ * vertices. These faces cross a cell face or touch an upper cell face. Returns false when out of
  * memory. */
 static bool record_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
                             const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
@@ -145,7 +149,8 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
 }
 
 /* Splits the list stack[at] to stack[at + count - 1] of a cell into eight lists, one for each
- * octant, from stack[top] on. List o is stack[begin[o]] to stack[begin[o + 1] - 1]. */
+ * octant. The lists are stored from stack[top] on. The list of octant o is stack[begin[o]] to
+ * stack[begin[o + 1] - 1]. */
 static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top,
                               uint64_t begin[9])
 {
@@ -205,9 +210,10 @@ static bool set_start(face_set *set, uint64_t faces_max)
     return set->slots != NULL;
 }
 
-/* Makes a gray node a leaf, or an empty node, if the leaves below it list at most as many different
- * faces as a leaf may list. (A node's list may have faces that miss the cell by a rounding error
- * and that no smaller cell lists. So there may be fewer faces below a node than in its list.) */
+/* Replaces a gray node by a leaf, or by an empty node, if the leaves below the node list no more
+ * different faces than a leaf may list. The leaves below may list fewer faces than the node does,
+ * because a face in the node's list may miss the cell by a rounding error. The node's list is
+ * stack[at] to stack[at + count - 1]. */
 static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
                                    uint64_t count)
 {
@@ -250,7 +256,7 @@ static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t
 {
     ebpo_branch *s = g->s;
     if (count == 0)
-        return EBPO_OK; /* stays white until winding numbers are known */
+        return EBPO_OK; /* the node stays white until winding numbers are known */
     if (is_leaf(g->b, cell.level, count)) {
         ebpo_build_node node = { 0 };
         ebpo_status status = grow_leaf(g, &node, cell, at, count);
@@ -314,8 +320,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
 
 /* --- the top of the tree --- */
 
-/* A piece has at most PIECE_FACES faces, unless this limit would make more than about PIECES_MAX
- * pieces. SPLIT_GRAIN: number of faces of a task. */
+/* PIECE_FACES: maximum number of faces of a piece, if about PIECES_MAX pieces suffice for the
+ * model; otherwise the maximum is larger. SPLIT_GRAIN: number of faces of a parallel task. */
 enum { PIECE_FACES = 4096, PIECES_MAX = 2048, SPLIT_GRAIN = 1 << 13 };
 
 static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error)
@@ -323,25 +329,27 @@ static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error
     return ebpo_workspace_fail_while(b->workspace, "while cutting the tree into pieces", error);
 }
 
-/* The tasks of dividing a node of the top: blocks of SPLIT_GRAIN faces are classified, and then
- * distributed to the children's lists, both in parallel. */
+/* Data for dividing a node of the top. First each block of SPLIT_GRAIN faces is classified
+ * (make_masks), then its faces are copied to the children's lists (distribute_faces). The blocks of
+ * one step are processed in parallel. */
 typedef struct top_split {
     const ebpo_builder *b;
     ebpo_cell cell;
     const uint32_t *list;
     uint64_t count;
     uint64_t first_vertex, end_vertex; /* range of the vertices in the cell */
-    /* [face of the list] bits 0 to 7: octants that the face touches; bit 8: the face crosses the
-     * cell's faces */
+    /* [face of the list] bits 0 to 7: octants that the face touches; bit 8: the face has a vertex
+     * outside the cell's range of vertices ("crossing") */
     uint16_t *mask;
-    /* [block][bit of `mask`] the number of faces with this bit; after add_up, the index in to[bit]
-     * of the block's next face */
+    /* [block][bit of `mask`] before add_up: the number of the block's faces with this bit;
+     * afterwards: the index in to[bit] of the block's next face */
     uint64_t (*begin)[9];
     uint32_t *to[9]; /* [bit of `mask`] the list that gets the faces */
 } top_split;
 
 /* Returns a mask of the octants that the face touches. If several octants are possible, an exact
- * test decides, because each face that a piece lists must be in one of its leaves. */
+ * test decides. Without this test, a piece could list a face that misses its cell by a rounding
+ * error, and that would be in none of its leaves. */
 static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebpo_triangle *face)
 {
     unsigned mask = ebpo_octants_visited(&b->box, cell, face);
@@ -362,7 +370,7 @@ static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebp
     return mask;
 }
 
-/* Sets the masks of a block's faces, and counts the faces of each bit. */
+/* Sets the masks of a block's faces, and counts the faces with each bit. */
 static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -407,8 +415,8 @@ static uint64_t faces_done(const ebpo_builder *b)
     return last ? last->first + last->fresh_count : 0;
 }
 
-/* Replaces the number of each block's faces by the index of its first face in the list, and sets
- * `sizes` to the lengths of the lists. */
+/* Replaces, for each block and bit, the number of faces by the index in to[bit] of the block's
+ * first face. Sets `sizes` to the lengths of the lists to[0] to to[8]. */
 static void add_up(top_split *t, uint64_t sizes[9])
 {
     memset(sizes, 0, 9 * sizeof *sizes);
@@ -431,7 +439,7 @@ static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[
     if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity,
                               s->cross_count + sizes[8], sizeof *s->crossing))
         return no_memory_for_pieces(b, error);
-    /* NULL while no face crosses */
+    /* `crossing` is NULL until a face crosses */
     t->to[8] = s->crossing ? s->crossing + s->cross_count : NULL;
     s->cross_count += sizes[8];
     return EBPO_OK;
@@ -442,7 +450,8 @@ static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[
 static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *list, uint64_t count,
                              uint32_t *lists[8], uint64_t sizes[9], ebpo_error *error)
 {
-    /* the progress is constant during this node; it is reported only to allow cancellation */
+    /* the reported progress does not change while this node is divided; the reports only allow the
+     * caller to cancel */
     uint64_t done = faces_done(b);
     ebpo_pass pass = { &b->options->progress, done, done, b->face_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
@@ -469,8 +478,9 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
     return status;
 }
 
-/* Marks the fresh faces of a piece: the faces that no earlier piece lists. `listed`: bit f is set
- * if a piece so far lists face f. Returns false when out of memory. */
+/* Marks the fresh faces of a piece, and adds the piece's faces to `listed`. Fresh faces are faces
+ * that no earlier piece lists. `listed`: bit f is set if an earlier piece lists face f. Returns
+ * false when out of memory. */
 static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
 {
     s->fresh = ebpo_alloc_zero(s->list_count / 8 + 1, 1);
@@ -489,7 +499,7 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
     return true;
 }
 
-/* State of dividing the tree into pieces. */
+/* State while the tree is divided into pieces. */
 typedef struct cutting {
     ebpo_builder *b;
     uint64_t piece_faces; /* a node with at most this number of faces becomes a piece */
@@ -499,7 +509,8 @@ typedef struct cutting {
 } cutting;
 
 /* Adds a piece; takes over `list`. A piece has at least one leaf, and its leaves list all of its
- * faces, so the limits of leaves can be checked before the piece's nodes are made. */
+ * faces. So the function can check lower bounds of the counts of leaves and entries against the
+ * limits before the piece's nodes are made. */
 static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, uint32_t *list,
                              uint64_t count)
 {
@@ -516,12 +527,13 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
         return status;
     }
     node->type = EBPO_LEAF;
-    node->detail = (uint32_t)b->piece_count; /* fewer than the top's nodes */
+    /* fits in 32 bits: there are fewer pieces than nodes in the top */
+    node->detail = (uint32_t)b->piece_count;
     b->piece[b->piece_count++] = s;
     return EBPO_OK;
 }
 
-/* Makes a piece of a node of the top, or divides it; takes over `list`. */
+/* Makes a piece of a node of the top, or divides the node; takes over `list`. */
 static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t *list,
                             uint64_t count)
 {
@@ -567,7 +579,8 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
                   b->face_count / PIECES_MAX > PIECE_FACES ? b->face_count / PIECES_MAX
                                                            : PIECE_FACES,
                   ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
-    /* then each node of the top has too many faces for collapse_if_few to make it a leaf */
+    /* with this minimum, each node of the top has too many faces for collapse_if_few to replace it
+     * by a leaf */
     if (c.piece_faces < 2 * (uint64_t)b->options->leaf_faces)
         c.piece_faces = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;
@@ -607,11 +620,12 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
 }
 
 /* Limits the number of threads so that half of the memory budget is sufficient if each thread
- * processes a piece as large as the largest one. (A piece is processed in memory, and a cell of the
- * deepest level is not divided, however many faces it lists.) */
+ * processes a piece as large as the largest one. This limit is needed because a piece is processed
+ * in memory, and a cell of the deepest level is not divided, however many faces it lists. */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
-    /* memory for the points of a hull, measured with a million faces at one vertex */
+    /* memory for each face of a piece, mostly for the points of a hull; measured with a million
+     * faces at one vertex */
     enum { BYTES_A_FACE = 160 };
     ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
     stats.memory = 0;

@@ -119,7 +119,8 @@ bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsi
         for (int k = 0; k < 3; k++)
             given->corner[given->corner_count][k] = (child->corner[i][k] + (octant >> k & 1)) / 2;
     for (uint64_t i = 0; i < child->offer_count; i++) {
-        int32_t n[3], d, shift = 0; /* shift: n . (octant's lowest corner in child cells) */
+        /* shift: n . x for the lowest corner x of the octant, if the side of a child's cell is 1 */
+        int32_t n[3], d, shift = 0;
         ebpo_plane_code_decode(child->offers[i].normal, n, &d);
         for (int k = 0; k < 3; k++)
             shift += octant >> k & 1 ? n[k] : 0;
@@ -142,7 +143,7 @@ bool ebpo_proposals_make(ebpo_branch *s)
 
 /* --- the store --- */
 
-enum { BLOCK_BYTES = 16 << 20 /* least size of a block */, ALIGNMENT = 8 };
+enum { BLOCK_BYTES = 16 << 20 /* least size of a block, in bytes */, ALIGNMENT = 8 };
 
 /* Blocks of the workspace, filled one after the other. */
 struct ebpo_store {
@@ -179,7 +180,8 @@ static char *store_take(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
     return at;
 }
 
-/* Makes the builder's store if there is none. Any thread. Returns false when out of memory. */
+/* Makes the builder's store if there is none. Any thread may call this function. Returns false when
+ * out of memory. */
 static bool make_store(ebpo_builder *b)
 {
     static pthread_mutex_t making = PTHREAD_MUTEX_INITIALIZER;
@@ -206,7 +208,7 @@ void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
     return make_store(b) ? store_reserve(b, aligned_bytes(bytes, 1)) : NULL;
 }
 
-/* Returns the bytes of an array in the store; 0 if the level does not have it. */
+/* Returns the bytes that an array takes in the store; 0 if the level does not have the array. */
 static size_t packed_bytes(const ebpo_level *level, int id)
 {
     return ebpo_schema_is_held(id) && ebpo_level_array(level, id)

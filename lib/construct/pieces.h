@@ -13,12 +13,15 @@
 /* A piece's part of the arrays of one level: a contiguous range ("stretch") of each array. */
 typedef struct ebpo_piece_level {
     ebpo_level level;
-    bool packed;                          /* its arrays are in the builder's store */
-    uint64_t capacity[EBPO_LEVEL_ARRAYS]; /* [ebpo_array_id] */
+    /* the arrays are in the builder's store, which frees them */
+    bool packed;
+    /* [ebpo_array_id] number of elements for which the array has space */
+    uint64_t capacity[EBPO_LEVEL_ARRAYS];
 } ebpo_piece_level;
 
-/* Add a group of eight nodes; a gray node; a white or black node. Return false when out of memory.
- */
+/* These three functions add, in this order: the types of a group of eight nodes; the plane codes
+ * and the volume of a gray node; the winding number of a white or black node. They return false
+ * when out of memory. */
 bool ebpo_piece_level_add_group(ebpo_piece_level *out, uint16_t types);
 bool ebpo_piece_level_add_gray(ebpo_piece_level *out, const uint32_t *codes, int count,
                                double volume);
@@ -32,22 +35,25 @@ void ebpo_piece_levels_free(ebpo_piece_level *out);
  * face of a leaf. */
 typedef struct ebpo_offer {
     uint32_t normal; /* normal of the plane: bits 0 to 19 of a plane code */
-    uint32_t rank;   /* position among the offers of the node's children (or faces) */
-    /* offset of the plane before any node moved it: n . xi at the centroid of its face, in the
-     * coordinates of the node's cell */
+    /* position among all offers that the node got from its children, or from its faces if it is a
+     * leaf */
+    uint32_t rank;
+    /* offset of the plane before any node moved the plane: n . x for the centroid x of the face
+     * that gave the plane, in the coordinates of the node's cell */
     double origin;
 } ebpo_offer;
 
-/* Data that a node passes to its parent, in the coordinates of the node's cell: its chosen planes,
- * and the corners of those faces of its envelope that planes made (EBP 2017, 3.4.1). */
+/* Data that a node passes to its parent, in the coordinates of the node's cell (EBP 2017, 3.4.1):
+ * the node's chosen planes, and corners of the node's envelope. Only corners of envelope faces that
+ * were made by planes are passed, not those of the cell's faces. */
 typedef struct ebpo_handover {
     ebpo_offer *offers;
     double (*corner)[3];
     uint64_t offer_count, offer_capacity, corner_count, corner_capacity;
 } ebpo_handover;
 
-/* Planes of a piece's gray nodes and leaves, chosen from the leaves up. A node is given by its
- * detail (ebpo_build_detail). */
+/* Planes of a branch's gray nodes and leaves, chosen from the leaves up. The index of a node in
+ * these arrays is its index in ebpo_branch.details. */
 typedef struct ebpo_proposals {
     uint64_t *first; /* [detail_count] index of the node's first code in `codes` */
     uint8_t *count;  /* [detail_count] number of the node's codes */
@@ -58,8 +64,8 @@ typedef struct ebpo_proposals {
     ebpo_handover root;        /* data that the piece's root passes to its parent in the top */
 } ebpo_proposals;
 
-/* Sets s->proposals to proposals without planes, for the branch's details. Returns false when out
- * of memory. */
+/* Sets s->proposals to proposals without planes, for all elements of s->details. Returns false when
+ * out of memory. */
 bool ebpo_proposals_make(ebpo_branch *s);
 /* Returns the codes of the planes that were chosen for a node, and sets *count to their number.
  * Returns NULL if the selection works from the root down. */
@@ -67,7 +73,8 @@ const uint32_t *ebpo_proposed(const ebpo_branch *s, uint32_t detail, int *count)
 void ebpo_proposals_free(ebpo_proposals *p);
 
 void ebpo_handover_free(ebpo_handover *h);
-/* Adds an offer with these fields. Returns false when out of memory. */
+/* Adds an offer with this normal and this origin; its rank is 0. Returns false when out of memory.
+ */
 bool ebpo_handover_add(ebpo_handover *h, uint32_t normal, double origin);
 /* Adds the data of the child in this octant to `given`, in the coordinates of the parent's cell.
  * Returns false when out of memory. */
@@ -84,8 +91,9 @@ void ebpo_store_free(struct ebpo_store *store);
 
 /* --- the nodes of a piece --- */
 
-/* Add a detail of zeros, or eight empty nodes, and set *index or *first to the index of the (first)
- * new one. Return false when out of memory. */
+/* The first function adds a detail of zeros, and sets *index to its index. The second function adds
+ * eight empty nodes, and sets *first to the index of the first one. Both return false when out of
+ * memory. */
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);
 bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first);
 /* Returns EBPO_E_LIMIT if the indices of eight more nodes, or of a detail, exceed 32 bits. */

@@ -1,7 +1,8 @@
-/* Declares what is needed to choose the planes of an envelope: selections from candidates
+/* Declares functions for choosing the planes of an envelope: selections from candidates
  * (selections.c), a leaf's planes (leaf_planes.c), tests of faces against cells (triangle_cell.c),
  * a small convex hull (hull_directions.c), and winding numbers at a cell's corners
- * (corner_windings.c). Lengths and volumes are in cells: the side and volume of a cell are 1. */
+ * (corner_windings.c). Lengths and volumes are in cells: the side and the volume of the node's cell
+ * are 1. */
 #ifndef EBPO_CONSTRUCT_PLANES_H
 #define EBPO_CONSTRUCT_PLANES_H
 
@@ -16,20 +17,21 @@ enum {
     /* maximum number of planes that a leaf, or a gray node deeper than the first levels, adds to
      * the planes of its parent */
     EBPO_PLANES_MAX = 32,
-    EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of such a node */
-    /* maximum number of planes of a node in a file, which stores the number in a byte; also the
-     * maximum that the selections of the theses choose */
+    EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of a node, from the root down */
+    /* maximum number of planes of a node in a file, which stores this number in a byte; also the
+     * maximum number of planes that the selections of the theses choose */
     EBPO_PLANES_STORED = 255
 };
 
-/* A needle is a long, thin portion of an envelope. A plane is stored, however small the volume is
- * that it cuts off, if the envelope extends more than this distance (in cells) beyond the plane. */
+/* A needle is a long, thin portion of an envelope. If the envelope extends more than this distance
+ * (in cells) beyond a plane, the plane is stored, even if it cuts off only a small volume. */
 static const double ebpo_needle = 0.1;
 
 /* A candidate for a plane of the envelope. */
 typedef struct ebpo_candidate {
     uint32_t normal; /* bits 0-19 of a plane code, which give the normal n */
-    /* upper bound of n . xi over the points xi of the solid in the cell, in cell coordinates */
+    /* upper bound of n . x over the points x of the solid in the cell, in cell coordinates (0 to 1)
+     */
     double support;
     /* selections of the theses: distance by which the plane was moved away from its face, in the
      * model's unit */
@@ -40,17 +42,18 @@ typedef struct ebpo_candidate {
 typedef struct ebpo_choice {
     const ebpo_candidate *candidates; /* [count] no two have the same normal */
     int count;                        /* number of candidates */
-    /* for the random selection: [count] indices of the candidates, in the order of the node's faces
-     * or children; NULL: in the order of the array */
+    /* random selection: [count] indices of the candidates, in the order of the node's faces or
+     * children; NULL: the order of `candidates` */
     const int *order;
-    int codes_max; /* maximum number of codes */
-    /* greedy selection: volume of the solid's hull, which no candidate can remove (0: not known) */
+    int codes_max; /* maximum number of plane codes that the selection writes */
+    /* greedy selection: volume of the solid's hull, which no candidate can remove; 0: not known */
     double hull_volume;
     /* greedy selection: a plane must remove at least the volume `epsilon`, or the envelope must
      * extend more than `needle_length` beyond the plane (0: only volume counts) */
     double epsilon, needle_length;
     int wanted; /* selections of the theses: number of candidates to choose */
-    /* k-medoids selection: [3] size of the cell, in the model's unit; the distance of normals */
+    /* k-medoids selection: [3] size of the cell, in the model's unit; `normals`: the distance
+     * between two normals */
     const double *cell_size;
     ebpo_normal_distance normals;
     uint64_t seed; /* selections with random choices: seed of this node */
@@ -69,29 +72,30 @@ typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice
  * and `envelope` is first the parent's envelope, cut to the cell. */
 ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
-/* Sets chosen[i] for the candidates that a selection of the theses takes, whether or not their
- * planes cut anything off. Candidates may have equal normals. Returns false when out of memory. */
+/* Sets chosen[i] to true if a selection of the theses takes candidate i, and to false otherwise. It
+ * may take planes that cut nothing off. Candidates may have equal normals. Returns false when out
+ * of memory. */
 bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice, bool *chosen);
 
 /* Selects, again and again, the plane that removes the most volume, until this volume is below
- * `epsilon`; then planes that cut off needles. Returns the number of codes. */
+ * `epsilon`. Then selects planes that cut off needles. Returns the number of codes. */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* Returns the number of candidates, of `count`, that the theses choose: `percent` of them, rounded
- * up (EBP 2017, equation 5). If k_root > 0, it is K of BP 2008, 3.5.1: k_root / 2^level, halved
- * until it is below `count`. As in BP 2008, all candidates are chosen if k_root / 2^level is
- * below 1. */
+/* Returns how many of `count` candidates the theses choose: `percent` of them, rounded up (EBP
+ * 2017, equation 5). If k_root > 0, the result is K of BP 2008, 3.5.1: k_root / 2^level, halved
+ * until it is below `count`. As in BP 2008, all candidates are chosen if k_root / 2^level is below
+ * 1. */
 int ebpo_selection_requested(int count, int level, double percent, double k_root);
 
-/* Returns ebpo_selection_requested, but at most EBPO_PLANES_STORED. The number of clusters must be
- * the number of planes that can be stored: with more clusters, the stored planes would not be the
- * best. */
+/* Returns the smaller of ebpo_selection_requested and EBPO_PLANES_STORED. A selection by clusters
+ * must make no more clusters than planes can be stored: with more clusters, the stored planes would
+ * not be the best ones. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
-/* Selects every candidate that may remove 0.03 % of the cell or more, the greatest volume first,
- * then planes that cut off needles; at most `codes_max` planes. The result is nearly the tightest
- * envelope. With few candidates, this selection takes the least time. Returns the number of codes.
- */
+/* Selects every candidate that may remove 0.03 % of the cell or more, the greatest volume first.
+ * Then selects planes that cut off needles. Selects at most `codes_max` planes. The result is
+ * nearly the tightest envelope. With few candidates, this selection takes the least time. Returns
+ * the number of codes. */
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count,
                     int codes_max, uint32_t *codes);
 
@@ -101,9 +105,9 @@ typedef struct ebpo_triangle {
 } ebpo_triangle;
 
 /* Computes the corners, at most 9, of the polygon face ∩ cell, in cell coordinates. Returns their
- * number; 0 if face and cell do not intersect. On each axis, the exact intersection is within
- * *slack of the polygon. The cell is enlarged by the slack before clipping, so that a face that
- * touches the closed cell always gives points. */
+ * number; 0 if face and cell do not intersect. On each axis, the distance of the exact intersection
+ * from the polygon is at most *slack. The cell is enlarged by the slack before clipping, so that a
+ * face that touches the closed cell always gives points. */
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack);
 
@@ -114,17 +118,19 @@ bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_t
  * root box. Returns false for a face without area. */
 bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal);
 
-/* Computes the corner differences of a cell, exactly: the winding numbers of its eight corners (bit
- * 0 of the index: x, bit 1: y, bit 2: z), which are shifted as in ebpo_axis_crossing, minus the
- * winding number of corner 0. `faces` must contain every face that touches the closed cell. */
+/* Computes the corner differences of a cell, exactly: the winding numbers at its eight corners
+ * minus the winding number at corner 0. Bits 0, 1 and 2 of a corner's index are its position along
+ * x, y and z. The corners are shifted by an infinitely small amount, as in ebpo_axis_crossing.
+ * `faces` must contain every face that touches the closed cell. */
 void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                           uint64_t count, int32_t delta[8]);
 
 /* Computes a leaf's planes from its faces (EBP 2017, 3.3.4). On entry, `envelope` is the parent's
  * envelope cut to the leaf's cell; on return, it is the leaf's envelope. `inside_corners`: bit i is
- * set if corner i is in the solid. With `epsilon` > 0, the selection is ebpo_select_greedy, for
- * planes that will be stored. With 0, it is ebpo_select_all, for planes that readers derive, which
- * need no storage. Writes at most EBPO_PLANES_MAX codes, and returns their number. */
+ * set if corner i is in the solid. If `epsilon` > 0, ebpo_select_greedy selects the planes, which
+ * will be stored. If `epsilon` is 0, ebpo_select_all selects the planes; readers derive the same
+ * planes, so they are not stored. Writes at most EBPO_PLANES_MAX codes, and returns their number.
+ */
 int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
@@ -136,7 +142,8 @@ enum { EBPO_HULL_POINTS = 8192, EBPO_HULL_FACETS = 2048 };
 
 typedef struct ebpo_hull_facet {
     uint16_t corner[3]; /* indices of points, counter-clockwise seen from outside */
-    double n[3], d;     /* outward unit normal: n . x <= d for all points of the hull */
+    /* outward unit normal n, and offset d: n . x <= d for all points x of the hull */
+    double n[3], d;
     double area;
 } ebpo_hull_facet;
 
