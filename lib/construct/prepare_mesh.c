@@ -2,11 +2,11 @@
  *
  * ebpo_mesh_prepare first sorts the mesh along the Morton curve (arrange.h), so that each later
  * step accesses memory in order. Then it checks the mesh, repairs it as the options request, sorts
- * again and checks again. A mesh with coordinates beyond 2^1000, which ebpo_mesh_arrange rejects,
- * is checked all the same; ebpo_build rejects it.
+ * it again and checks it again. A mesh with coordinates beyond 2^1000 cannot be sorted, but it is
+ * checked all the same. Later ebpo_build rejects such a mesh.
  *
  * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
- * first, until the result of one is a solid without doubts. Doubts are reasons why a solid may
+ * first, until one of the results is a solid without doubts. Doubts are reasons why a solid may
  * differ from the author's intention: much of the surface was made by filling holes, or the volume
  * is negative, or the volume is very small for the area (a sheet). */
 #include "core/strict_fp.h"
@@ -30,9 +30,9 @@ typedef struct preparation {
     ebpo_prepared *out;
 } preparation;
 
-/* Returns EBPO_OK instead of EBPO_E_LIMIT, the error for coordinates beyond 2^1000, because the
- * mesh can still be checked. (ebpo_build returns the error again.) Copies any other error from
- * *local to *error, and returns its status. */
+/* Returns EBPO_OK if `status` is EBPO_E_LIMIT, the error of sorting for coordinates beyond 2^1000,
+ * because the mesh can still be checked. (ebpo_build returns EBPO_E_LIMIT again.) Copies any other
+ * error from *local to *error, and returns `status`. */
 static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
@@ -42,7 +42,7 @@ static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local,
     return status;
 }
 
-/* Applies the repairs of the options; `weld`: also welds vertices. */
+/* Applies the repairs that the options request. If `weld` is true, also welds vertices. */
 static ebpo_status repair_as_requested(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
@@ -70,7 +70,7 @@ static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_erro
 static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
-    /* faces of an STL file share no vertices, so these are always welded */
+    /* faces of an STL file share no vertices, so its vertices are always welded */
     bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
     if (!(o->weld_distance >= 0))
@@ -118,8 +118,8 @@ enum {
     DROP = EBPO_REPAIR_DROP
 };
 
-/* A mesh is a sheet if the cube root of its volume is at most this share of the square root of its
- * area. */
+/* A mesh counts as a sheet if the cube root of its volume is at most this factor times the square
+ * root of its area. */
 static const double THIN = 0.01;
 
 typedef struct trying {
@@ -132,8 +132,9 @@ typedef struct trying {
 
 /* --- doubts about a result --- */
 
-/* Returns true if more than half of the edges were boundary edges before holes were filled.
- * (Filling a loop of n edges adds n - 2 faces and n - 3 edges.) */
+/* Returns true if, before holes were filled, more than half of the edges were boundary edges. The
+ * counts before are computed from those after: filling a loop of n boundary edges adds n - 2 faces
+ * and n - 3 edges. */
 static bool mostly_open(const ebpo_mesh_report *report, const ebpo_repair_record *record)
 {
     uint64_t boundary = record->added_faces + 2 * record->filled_holes;
@@ -152,18 +153,21 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
         doubts |= EBPO_DOUBT_UNWELDED;
     if (mostly_open(report, record))
         doubts |= EBPO_DOUBT_MOSTLY_OPEN;
-    /* the filled holes are as large as the given surface, up to rounding errors */
+    /* the area of the filled holes is at least the area of the given surface, except for rounding
+     * errors */
     if (area > 0 && report->area - area >= area * 0.999999)
         doubts |= EBPO_DOUBT_MOSTLY_FILLED;
     return doubts;
 }
 
-/* Returns the doubt about a sheet, or the one about a solid that is inside out. If coordinates are
- * extremely large or small, volume and area overflow or underflow, but the volume keeps its sign.
- * Then only a mesh without extent along an axis counts as a sheet. */
+/* Returns EBPO_DOUBT_NO_VOLUME for a sheet, EBPO_DOUBT_INSIDE_OUT for a negative volume, and
+ * otherwise 0. If coordinates are extremely large or small, volume and area overflow or underflow,
+ * but the volume keeps its sign. With such coordinates, only a mesh without extent along an axis
+ * counts as a sheet. */
 static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
 {
-    /* limit of the sum of the binary exponents of the extents along the three axes */
+    /* coordinates are extreme if the binary exponents of the extents along the three axes have a
+     * sum beyond this limit */
     enum { EXTREME = 1000 };
     int exponent[3], sum = 0;
     bool flat = false;
@@ -216,7 +220,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns true if the further repairs `steps` may make a solid of a mesh with the report `base`. */
+/* Returns true if the repairs `steps` may make a solid of a mesh whose report is `base`. */
 static bool may_help(const ebpo_mesh_report *base, unsigned steps)
 {
     bool open = base->boundary_edges.count > 0;
@@ -227,14 +231,15 @@ static bool may_help(const ebpo_mesh_report *base, unsigned steps)
     return !(steps & ORIENT) || turned || open;
 }
 
-/* The beginning of a sequence: the steps so far, and the report on their result. */
+/* The beginning of a sequence of repairs: its steps, and the report on the mesh after these steps.
+ */
 typedef struct start {
     unsigned steps;
     const ebpo_mesh_report *report; /* NULL: the steps were not tried */
 } start;
 
-/* Tries from.steps followed by `more`, unless a sequence is already chosen or `more` cannot make a
- * solid. */
+/* Tries from.steps followed by the steps `more`. Does nothing if a sequence is already chosen, or
+ * if `more` cannot make a solid. */
 static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *error)
 {
     if (t->out->chosen >= 0 || !from.report || !may_help(from.report, more))
@@ -257,8 +262,8 @@ static ebpo_status drop_repeated(trying *t, start from, start *then, ebpo_error 
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
 }
 
-/* If vertices have equal positions, first tries short sequences without welding; then makes the
- * welded mesh the start of all further sequences. */
+/* If vertices have equal positions, first tries short sequences without welding. Then sets *from to
+ * the welded mesh, with which all further sequences start. */
 static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
 {
     start bare = *from, dropped = { 0, NULL };
@@ -292,8 +297,8 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
 }
 
-/* Tries to drop the repeated faces of a solid without doubts, only to report the result: no repair
- * is chosen. */
+/* Tries to drop the repeated faces of a solid without doubts. The result is only reported; no
+ * repair is chosen. */
 static ebpo_status try_dropping(trying *t, ebpo_error *error)
 {
     ebpo_status status = try_steps(t, DROP, error);

@@ -1,16 +1,16 @@
-/* Chooses planes from the leaves up, for the selections of the theses (EBP 2017, 3.4.1). The walk
- * from the root down, which computes the envelopes (emit_levels.c, envelopes.c), uses the chosen
- * planes later.
+/* Chooses the planes of envelopes from the leaves up, for the selections of the theses (EBP 2017,
+ * 3.4.1). Later, emit_levels.c and envelopes.c visit the nodes from the root down and compute the
+ * envelopes from the chosen planes.
  *
  * A candidate is a plane that may be chosen. The candidates of a leaf are the planes of its faces;
  * the candidates of a gray node are the planes that its children have chosen ("offers"). The chosen
- * planes clip the node's cell. The offset of a plane is its support (greatest n . xi), computed
- * from the corners of the children's envelopes and from the solid itself. So the envelope contains
- * the solid even if the corners are rounded.
+ * planes clip the node's cell. The offset of a plane with the normal n is its support, the greatest
+ * n . x. It is computed from the corners of the children's envelopes and from the solid itself. So
+ * the envelope contains the solid even if the corners are rounded.
  *
- * For each piece, the nodes are made, planes are chosen, and the nodes are freed again. Then planes
- * are chosen for the nodes of the top (the nodes above all pieces), the deepest level first; nodes
- * of the same level are processed in parallel. */
+ * A piece is a subtree that one thread processes. For each piece, the nodes are made, planes are
+ * chosen, and the nodes are freed again. Then planes are chosen for the nodes of the top (the nodes
+ * above all pieces), the deepest level first; nodes of the same level are processed in parallel. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -38,7 +38,7 @@ typedef struct proposer {
     ebpo_select_fn select;
     ebpo_supports supports;     /* work space for the supports of gray nodes */
     ebpo_candidate *candidates; /* candidates of the node that is being processed */
-    int *order;                 /* as in ebpo_choice */
+    int *order;                 /* indices of candidates, as ebpo_choice.order */
     uint64_t candidate_capacity, order_capacity;
     ebpo_large_polytope thesis_envelope; /* work space of ebpo_thesis_choose */
 } proposer;
@@ -51,7 +51,8 @@ static int by_normal(const void *a, const void *b)
     const ebpo_offer *x = a, *y = b;
     if (x->normal != y->normal)
         return x->normal < y->normal ? -1 : 1;
-    /* of equal normals, the plane that moves least comes first */
+    /* with equal normals, the offer comes first whose plane will be moved least to reach the
+     * support */
     return x->origin > y->origin ? -1 : x->origin < y->origin;
 }
 
@@ -61,8 +62,8 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* Approximate maximum number of candidates of a node. A node with more keeps every n-th candidate,
- * because k-medoids compares all pairs. Only leaves of the deepest level have more. */
+/* Approximate maximum number of candidates of a node. If there are more, only every n-th candidate
+ * is kept, because k-medoids compares all pairs. Only leaves of the deepest level can have more. */
 enum { CANDIDATES_MAX = 4096 };
 
 static int by_rank(const void *a, const void *b)
@@ -86,8 +87,8 @@ static bool sort_order(proposer *p, const ebpo_handover *given)
     return pair != NULL;
 }
 
-/* Sorts the offers by normal, keeps one offer of each normal, and at most about CANDIDATES_MAX in
- * all. Sets the ranks. */
+/* Sets the ranks of the offers, sorts the offers by normal, and keeps one offer of each normal. If
+ * more than about CANDIDATES_MAX offers remain, keeps every n-th of them. */
 static void thin_offers(ebpo_handover *given)
 {
     uint64_t kept = 0;
@@ -123,7 +124,8 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
 }
 
 /* Raises the candidate's support, if needed, so that the half-space n . x <= support contains the
- * exact point. n is the decoded normal; `slack` bounds the error of each coordinate of `point`. */
+ * exact point, where n is the decoded normal. `slack`: upper bound of the rounding error of each
+ * coordinate of `point`. */
 static void raise_support(ebpo_candidate *c, const double point[3], double slack)
 {
     int32_t n[3], d;
@@ -132,7 +134,8 @@ static void raise_support(ebpo_candidate *c, const double point[3], double slack
     c->support = s > c->support ? s : c->support;
 }
 
-/* Returns ebpo_candidate.moved for an offer. `size`: [3] size of the cell, in the model's unit. */
+/* Returns ebpo_candidate.moved for an offer: the distance between the offered plane and the plane
+ * with this support, in the model's unit. `size`: [3] size of the cell, in the same unit. */
 static double moved_by(const ebpo_offer *offer, double support, const double size[3])
 {
     int32_t n[3], d;
@@ -143,9 +146,9 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
     return (support - offer->origin) * least / sqrt(square);
 }
 
-/* Chooses planes of a node from p->candidates, which were made from the offers `given`. Adds the
- * planes to the proposals, and the data for the parent to `out`. `leaf_faces`: number of faces in
- * the list of a leaf; 0 for a gray node. Returns false when out of memory. */
+/* Chooses planes of a node from p->candidates, which were made from the offers in `given`. Adds the
+ * planes to the branch's proposals, and the data for the parent to `out`. `leaf_faces`: number of
+ * faces in the list of a leaf; 0 for a gray node. Returns false when out of memory. */
 static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t leaf_faces,
                           const ebpo_handover *given, ebpo_handover *out)
 {
@@ -187,7 +190,7 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
     if (!ebpo_grow(&out->corner, &out->corner_capacity, (uint64_t)envelope.vertex_count,
                    sizeof *out->corner))
         return false;
-    /* the corners of the faces that planes made; the cell's own faces have negative tags */
+    /* only corners of faces that planes made; faces of the cell have negative tags */
     bool used[EBPO_POLYTOPE_VERTICES] = { false };
     for (int f = 0; f < envelope.face_count; f++)
         for (int i = envelope.first[f]; i < envelope.first[f + 1] && envelope.tag[f] >= 0; i++)
@@ -199,7 +202,7 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
     return true;
 }
 
-/* --- leaves: planes of faces, around the solid --- */
+/* --- leaves: the candidates are planes of faces, moved until they contain the solid --- */
 
 /* Adds the plane of each face of a leaf to the offers. Returns false when out of memory. */
 static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
@@ -227,8 +230,8 @@ static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
     return true;
 }
 
-/* Computes the supports of a leaf's candidates: the maximum over its faces in the cell and over the
- * corners inside the solid. */
+/* Computes the supports of a leaf's candidates: the maximum of n . x over the leaf's faces in the
+ * cell and over the corners of the cell that are inside the solid. */
 static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
                           uint64_t count)
 {
@@ -264,10 +267,11 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
     return good;
 }
 
-/* --- gray nodes: the children's planes, around the children's envelopes --- */
+/* --- gray nodes: the candidates are the children's planes, moved until they contain the solid and
+ * the children's envelopes --- */
 
-/* Computes the supports of a gray node's candidates: the maximum over the solid in the cell and
- * over the corners of the children's envelopes. Returns false when out of memory. */
+/* Computes the supports of a gray node's candidates: the maximum of n . x over the solid in the
+ * cell and over the corners of the children's envelopes. Returns false when out of memory. */
 static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
                           const ebpo_handover *given)
 {
@@ -357,7 +361,7 @@ static bool make_proposals(const ebpo_builder *b, ebpo_branch *s)
                                ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *s->proposals->thesis)));
 }
 
-/* Moves the proposals to the builder's store until the walk down needs them. */
+/* Moves the proposals to the builder's store, where they stay until the envelopes are computed. */
 static ebpo_status pack_proposals(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
 {
     ebpo_proposals *p = s->proposals;
@@ -429,8 +433,9 @@ typedef struct top_list {
     uint64_t base; /* index of the first node of the level that is being processed */
 } top_list;
 
-/* Lists the gray nodes breadth first, so that the nodes of a level are consecutive. Also computes
- * the winding numbers of these nodes and of the pieces. Returns false when out of memory. */
+/* Lists the gray nodes of the top breadth first, so that the nodes of a level are consecutive. Also
+ * computes the winding numbers at the lowest corners of these nodes and of the pieces. Returns
+ * false when out of memory. */
 static bool list_top(top_list *t)
 {
     ebpo_builder *b = t->b;
@@ -462,8 +467,8 @@ static bool list_top(top_list *t)
     return true;
 }
 
-/* Chooses planes for nodes of one level of the top. The data of gray children were gathered before;
- * the data of children that are pieces are gathered first. */
+/* Chooses planes for nodes of one level of the top. The data of gray children are in top_node.given
+ * already. The function adds the data of children that are pieces. */
 static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t last, unsigned worker,
                                      ebpo_error *error)
 {
@@ -474,7 +479,8 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
         top_node *n = &t->nodes[t->base + i];
         const ebpo_build_node *node = &b->top.nodes[n->node];
-        ebpo_branch alone = b->top; /* a copy, because other threads also make proposals */
+        /* a copy with separate proposals, because other threads also make proposals for the top */
+        ebpo_branch alone = b->top;
         uint32_t detail = node->detail;
         int32_t offset[8];
         ebpo_child_windings(b, &b->top, node->child, offset);
@@ -554,8 +560,8 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
     return status;
 }
 
-/* Adds up the sums of ebpo_build_as_theses of all pieces and nodes of the top, in a fixed order, so
- * that the results do not depend on the number of threads. */
+/* Adds up the sums of ebpo_build_as_theses over all pieces and nodes of the top. The order is
+ * fixed, so that the results do not depend on the number of threads. */
 static void add_up_levels(const top_list *t)
 {
     ebpo_builder *b = t->b;

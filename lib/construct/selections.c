@@ -3,13 +3,13 @@
  * CONTRIBUTING.md describes how to add a selection.
  *
  * - greedy (EBPO_SELECT_INHERIT): the plane that removes the most volume is chosen first. The
- * volume that a plane removes is its gain. When planes make the envelope smaller, the gains of the
- * other candidates become smaller, too. So a gain that was computed earlier is an upper bound, and
- * most candidates are evaluated only once (lazy evaluation). A choice by volume alone would leave
- * needles: long, thin portions of the envelope with little volume. So planes that cut off needles
- * are added at the end.
+ *   volume that a plane removes is its gain. When other planes cut the envelope, the gain of a
+ *   candidate can only become smaller. So a gain that was computed earlier is an upper bound, and
+ *   most candidates are evaluated only once (lazy evaluation). A choice by volume alone would leave
+ *   needles: long, thin portions of the envelope with little volume. So planes that cut off needles
+ *   are added at the end.
  * - random, offset, k-medoids: the selections of the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2).
- * They choose a given number of candidates, whatever volume these cut off.
+ *   They choose a given number of candidates, and do not compute gains.
  *
  * A selection clips the given envelope and returns the codes of its planes. Results depend on the
  * arguments alone; random choices use the seed of the node. */
@@ -27,23 +27,25 @@
 
 /* --- greedy --- */
 
-/* A candidate's plane n . xi <= d. */
+/* A candidate's half-space n . x <= d, in cell coordinates. */
 typedef struct ranked {
     double gain; /* upper bound of the volume that the plane removes */
     double n[3], d;
     uint32_t code;
-    int round; /* number of planes that were taken when the gain was computed exactly; -1: never */
+    /* number of planes that were taken when the gain was last computed exactly; -1: not yet */
+    int round;
 } ranked;
 
 /* Candidates that may still be chosen. */
 typedef struct ranking {
-    ranked by_gain[EBPO_PLANES_CANDIDATES]; /* heap, the greatest gain first */
+    ranked by_gain[EBPO_PLANES_CANDIDATES]; /* heap; the greatest gain is the first element */
     ranked needle[EBPO_PLANES_CANDIDATES];  /* planes beyond which the envelope extends far */
-    int gains, needles;                     /* numbers of elements of both lists */
+    int gains, needles;                     /* numbers of elements of by_gain and of needle */
 } ranking;
 
-/* Makes the plane of a candidate, for ebpo_polytope_clip. Returns false if no plane code has an
- * offset that is at least the candidate's support. */
+/* Sets `code`, `n` and `offset` to the plane of a candidate, with the least offset that a plane
+ * code can store and that is at least the candidate's support. Returns false if there is no such
+ * offset. */
 static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
                             double *offset)
 {
@@ -59,7 +61,7 @@ static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, dou
     return true;
 }
 
-/* Computes the least and the greatest n . xi of the envelope. */
+/* Computes the least and the greatest n . x over the points x of the envelope. */
 static void envelope_extent(const ebpo_polytope *p, const double n[3], double *least,
                             double *greatest)
 {
@@ -73,8 +75,8 @@ static void envelope_extent(const ebpo_polytope *p, const double n[3], double *l
     *greatest = high;
 }
 
-/* Makes both lists of `c`. `volume`: volume of the envelope. `epsilon`, `needle_length`: as in
- * ebpo_choice. */
+/* Makes the lists by_gain and needle of `c`. `volume`: volume of the envelope. `epsilon`,
+ * `needle_length`: as in ebpo_choice. */
 static void rank_candidates(const ebpo_polytope *envelope, double volume,
                             const ebpo_candidate *candidates, int count, double epsilon,
                             double needle_length, ranking *c)
@@ -89,7 +91,8 @@ static void rank_candidates(const ebpo_polytope *envelope, double volume,
         r.gain = ebpo_polytope_cap_bound(volume, greatest - least, greatest - r.d);
         if (r.gain >= epsilon && r.gain > 0)
             c->by_gain[c->gains++] = r;
-        /* other cuts only reduce this extent, so no further candidate can be added later */
+        /* cuts by other planes only reduce how far the envelope extends beyond this plane, so no
+         * candidate has to be added to `needle` later */
         if (needle_length > 0 && greatest - r.d > needle_length * ebpo_vec3_length(r.n))
             c->needle[c->needles++] = r;
     }
@@ -101,7 +104,7 @@ static bool ranks_before(const ranked *a, const ranked *b)
     return a->gain > b->gain || (a->gain == b->gain && a->code < b->code);
 }
 
-/* Restores the heap (greatest gain first) below item i. */
+/* Restores the order of the heap below element i. */
 static void sift_down(ranked *heap, int count, int i)
 {
     ranked item = heap[i];
@@ -129,8 +132,8 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Cuts off needles, the longest first. `taken`: number of codes so far. Returns the new number of
- * codes. */
+/* Cuts off needles (long, thin portions of the envelope), the longest first. `taken`: number of
+ * codes so far. Returns the new number of codes. */
 static int cut_needles(ebpo_polytope *envelope, ranking *c, double needle_length, int codes_max,
                        int taken, uint32_t *codes)
 {
@@ -188,8 +191,8 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
     return cut_needles(envelope, &c, choice->needle_length, choice->codes_max, taken, codes);
 }
 
-/* A plane that a reader derives is not worth the time of a clip if it removes less than this share
- * of the cell. */
+/* Least volume, in cells, that a plane must remove in ebpo_select_all. Readers use this function to
+ * derive planes; for less volume, a plane is not worth the time of a clip. */
 static const double least_gain = 3e-4;
 
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count,
@@ -208,10 +211,11 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
 
 /* --- the selections of the theses --- */
 
-/* Clips by the chosen candidates in ascending order of their indices; omits candidates that then
- * cut off nothing. Returns the number of codes. ebpo_selection_wanted ensures that at most
- * choice->codes_max candidates are chosen, so the loop never omits the last ones for lack of space.
- * (Candidates are sorted by direction, so the omitted ones would all have similar directions.) */
+/* Clips the envelope by the chosen candidates, in ascending order of their indices. Omits
+ * candidates that cut off nothing. Returns the number of codes. ebpo_selection_wanted ensures that
+ * at most choice->codes_max candidates are chosen, so the loop never ends before the last chosen
+ * candidate. (Candidates are sorted by direction. If the loop could end earlier, the omitted planes
+ * would all have similar directions.) */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                           uint32_t *codes)
 {
@@ -229,9 +233,9 @@ static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, co
 
 /* --- random --- */
 
-/* Chooses consecutive candidates in the order of the node's faces or children, from a random one on
- * (EBP 2017, 3.3.4.3). (The array of candidates is sorted by direction; consecutive elements of the
- * array would all face to one side.) */
+/* Chooses consecutive candidates in the order of the node's faces or children, beginning with a
+ * random candidate (EBP 2017, 3.3.4.3). (The array of candidates is sorted by direction, so
+ * consecutive elements of the array would all face to one side.) */
 static bool choose_random(const ebpo_choice *choice, bool *chosen)
 {
     uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
@@ -283,28 +287,29 @@ typedef struct clustering {
     int count, wanted;
     double (*at)[3]; /* [count] normals as points (place_normal) */
     float *distance; /* [count][count] squared distances; NULL: `row` is used */
-    float *row;      /* [count] squared distances of one candidate */
-    int *medoid;     /* [wanted] index of the candidate */
+    float *row;      /* [count] squared distances of one candidate from all candidates */
+    int *medoid;     /* [wanted] index of the candidate that is this medoid */
     bool *chosen;    /* [count] the candidate is a medoid; the caller's array */
     /* [count] the nearest and the second nearest medoid: indices in `medoid` */
     int *nearest, *runner_up;
     /* [count] squared distances from the nearest and the second nearest medoid */
     float *first, *second;
-    double *removal; /* [wanted] change of the cost if the medoid is removed */
-    /* [wanted] change of the cost if the candidate of best_swap_for replaces the medoid, without
-     * the part that is the same for all medoids */
+    double *removal; /* [wanted] increase of the cost if the medoid is removed */
+    /* [wanted] change of the cost if candidate `h` of best_swap_for replaces the medoid, without a
+     * term that is equal for all medoids */
     double *change;
 } clustering;
 
-/* Returns the angle of (x, y) from the x axis, -pi .. pi, with an error of about 1e-15. Does not
- * use libm, because its implementations round differently, and the choices must be the same
- * everywhere. */
+/* Returns the angle of the vector (x, y) from the x axis, -pi .. pi, with an error of about 1e-15.
+ * Does not use libm: its implementations round differently, and all machines must choose the same
+ * planes. */
 static double angle_of(double y, double x)
 {
     double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
     if (!(most > 0))
         return 0;
-    double t = least / most; /* halved twice: atan t = 2 atan (t / (1 + sqrt (1 + t^2))) */
+    /* the loop halves the angle atan t twice: atan t = 2 atan (t / (1 + sqrt (1 + t^2))) */
+    double t = least / most;
     for (int i = 0; i < 2; i++)
         t /= 1 + sqrt(1 + t * t);
     double square = t * t, sum = 0;
@@ -318,9 +323,9 @@ static double angle_of(double y, double x)
     return y < 0 ? -angle : angle;
 }
 
-/* Converts a normal in cell coordinates to a point whose distances from other points are the
- * distances of normals: the normal in the model's coordinates as a unit vector
- * (EBPO_NORMALS_ANGLE), or the two angles of the theses. */
+/* Converts a normal in cell coordinates to a point, such that the distance of two points is the
+ * distance of their normals. For EBPO_NORMALS_ANGLE, the point is the unit normal in the model's
+ * coordinates. Otherwise its coordinates are the two angles of the theses. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
 {
     int32_t n[3], d;
@@ -343,7 +348,7 @@ static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[
     out[0] = azimuth, out[1] = polar, out[2] = 0;
 }
 
-/* Maximum number of candidates for which all distances are stored. */
+/* Maximum number of candidates for which the distances of all pairs are stored. */
 enum { DISTANCES_KEPT = 4096 };
 
 /* Returns the squared distance of the candidates i and j. */
@@ -556,8 +561,8 @@ static bool choose_kmedoids(const ebpo_choice *choice, bool *chosen)
 
 /* --- the table --- */
 
-/* Chooses candidates, at least one, for a selection of the theses; returns false when out of
- * memory. */
+/* Chooses candidates for a selection of the theses. There must be at least one candidate. Returns
+ * false when out of memory. */
 typedef bool (*choose_fn)(const ebpo_choice *choice, bool *chosen);
 
 static const choose_fn choosers[EBPO_SELECTION_COUNT] = {

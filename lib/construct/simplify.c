@@ -2,11 +2,12 @@
  *
  * The quadric of a vertex is a function of a position: the sum of the squared distances from the
  * planes of the vertex's triangles, weighted by area. A collapse moves a vertex onto a neighbour
- * and removes the triangles that have both vertices. Its cost is mainly the sum of the quadrics of
- * the two vertices at the neighbour's position. An edge with one triangle adds a plane that
- * contains the edge and is perpendicular to the triangle, which keeps open borders in place. A
- * corner is one of the three uses of a vertex by a triangle: corner c is entry c of the array
- * `triangle`. The corners of each vertex are a circular list, and a collapse joins two lists. */
+ * and removes the triangles that have both vertices. The cost of a collapse is mainly the sum of
+ * the quadrics of both vertices at the neighbour's position. For each edge with only one triangle,
+ * the quadrics of its two vertices also have a plane that contains the edge and is perpendicular to
+ * the triangle. These planes keep open borders in place. A corner is one of the three uses of a
+ * vertex by a triangle: corner c is entry c of the array `triangle`. The corners of each vertex are
+ * a circular list, and a collapse joins two lists. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,18 +22,20 @@
 /* Two vertices do not collapse if their lists have more corners than this number together, because
  * each attempt walks along the lists. */
 enum { MOST_CORNERS = 512 };
-/* Weight of the planes at open edges, weight of the squared length of an edge, and the least cosine
- * between the normals of a triangle before and after a collapse. */
+/* OPEN_WEIGHT: weight of the planes at open edges (edges with one triangle). LENGTH_WEIGHT: weight
+ * of the squared length of an edge in the cost. LEAST_COSINE: least cosine between the normals of a
+ * triangle before and after a collapse. */
 static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, LEAST_COSINE = 0.25;
 
-/* Sums over planes n . x + d = 0 with weights, which are a symmetric 4 x 4 matrix: products of two
- * coordinates of n, products of n and d, and d d; and the sum of the triangles' areas. */
+/* Weighted sums over planes n . x + d = 0. nn: products of two coordinates of n; nd: n times d; dd:
+ * d squared. Together they are a symmetric 4 x 4 matrix. area: sum of the areas of the vertex's
+ * triangles. */
 typedef struct quadric {
     double nn[6], nd[3], dd, area;
 } quadric;
 
-/* A collapse that may be done: vertex `from` moves onto vertex `to`. It is valid while both ages
- * are unchanged. */
+/* A collapse that may be done: vertex `from` moves onto vertex `to`. The candidate is valid while
+ * simplifier.age of both vertices is equal to from_age and to_age. */
 typedef struct candidate {
     double cost;
     uint32_t from, to, from_age, to_age;
@@ -40,16 +43,18 @@ typedef struct candidate {
 
 typedef struct simplifier {
     ebpo_patch_mesh *mesh;
-    quadric *sum;      /* [vertices] */
-    uint32_t *next;    /* [3 * triangles] next corner of the same vertex */
-    uint32_t *head;    /* [vertices] a corner of the vertex's list; NONE: it has no list */
-    uint32_t *corners; /* [vertices] upper bound of the number of corners in the list that are
-                        * of remaining triangles */
-    uint32_t *age;     /* [vertices] number of collapses that changed the vertex */
-    uint32_t *mark;    /* [vertices] last mark that was set */
-    uint32_t marks;    /* number of marks so far; a new number makes all vertices unmarked */
-    bool *dead;        /* [triangles] true: the triangle is removed */
-    candidate *heap;   /* the cheapest candidate first */
+    quadric *sum;   /* [vertices] */
+    uint32_t *next; /* [3 * triangles] next corner of the same vertex */
+    uint32_t *head; /* [vertices] a corner of the vertex's list; NONE: it has no list */
+    /* [vertices] upper bound of the number of corners in the vertex's list whose triangles are not
+     * removed */
+    uint32_t *corners;
+    uint32_t *age;  /* [vertices] number of collapses that changed the vertex */
+    uint32_t *mark; /* [vertices] last mark that was set */
+    /* the current mark; a vertex counts as marked if its element of `mark` has this value */
+    uint32_t marks;
+    bool *dead;      /* [triangles] the triangle is removed */
+    candidate *heap; /* the cheapest candidate first */
     uint64_t heap_count, heap_capacity;
     uint64_t alive; /* number of triangles that are not removed */
     bool short_of_memory;
@@ -75,7 +80,7 @@ static void add_plane(quadric *q, const double n[3], double d, double weight)
     q->dd += weight * d * d;
 }
 
-/* Returns the sum of the weighted squared distances of p from the planes. */
+/* Returns the sum of the weighted squared distances of p from the planes of a quadric. */
 static double quadric_value(const quadric *q, const double p[3])
 {
     return q->nn[0] * p[0] * p[0] + q->nn[3] * p[1] * p[1] + q->nn[5] * p[2] * p[2] +
@@ -83,7 +88,7 @@ static double quadric_value(const quadric *q, const double p[3])
            2 * ebpo_vec3_dot(q->nd, p) + q->dd;
 }
 
-/* Computes the normal of a triangle; its length is twice the triangle's area. */
+/* Computes the normal of a triangle. The length of the normal is twice the triangle's area. */
 static void cross_of(const double a[3], const double b[3], const double c[3], double out[3])
 {
     double u[3], v[3];
@@ -92,8 +97,7 @@ static void cross_of(const double a[3], const double b[3], const double c[3], do
     ebpo_vec3_cross(u, v, out);
 }
 
-/* Returns the number of triangles that have both vertices and are not removed; 2 if there are more.
- */
+/* Returns the number of remaining triangles that have both vertices, at most 2. */
 static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
 {
     unsigned count = 0;
@@ -114,7 +118,8 @@ static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
     return count;
 }
 
-/* Adds a plane to both quadrics for the open edge from a to b of a triangle with this normal. */
+/* Adds the plane of an open edge to the quadrics of its vertices `a` and `b`. `normal`: unit normal
+ * of the edge's triangle. */
 static void add_open_edge(simplifier *s, uint32_t a, uint32_t b, const double normal[3])
 {
     double edge[3], n[3];
@@ -130,7 +135,8 @@ static void add_open_edge(simplifier *s, uint32_t a, uint32_t b, const double no
     add_plane(&s->sum[b], n, d, OPEN_WEIGHT * square);
 }
 
-/* Adds the planes of triangle i to the quadrics of its vertices. */
+/* Adds the plane of triangle i, and the planes at its open edges, to the quadrics of its vertices.
+ */
 static void add_triangle(simplifier *s, uint64_t i)
 {
     const uint32_t *t = s->mesh->triangle + 3 * i;
@@ -189,7 +195,7 @@ static candidate pop_candidate(simplifier *s)
     return top;
 }
 
-/* Adds the collapse of `from` onto `to` to the heap, unless `from` is fixed. */
+/* Adds the collapse of vertex `from` onto vertex `to` to the heap, unless `from` is fixed. */
 static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
 {
     if (s->mesh->vertex[from].fixed)
@@ -226,8 +232,8 @@ static void remove_dead_corners(simplifier *s, uint32_t v)
     s->corners[v] = count;
 }
 
-/* Calls offer_collapse in both directions for each edge of a vertex; if `upwards`, only for edges
- * whose other vertex has a higher index. */
+/* Calls offer_collapse in both directions for each edge of vertex v. If `upwards` is true, omits
+ * edges whose other vertex has a lower index than v. */
 static void offer_edges(simplifier *s, uint32_t v, bool upwards)
 {
     uint32_t c = s->head[v];
@@ -249,7 +255,7 @@ static void offer_edges(simplifier *s, uint32_t v, bool upwards)
 
 /* --- collapses --- */
 
-/* Marks v and its neighbours with a new mark, s->marks. */
+/* Increases s->marks, and marks v and its neighbours with this new value. */
 static void mark_neighbours(simplifier *s, uint32_t v)
 {
     uint32_t c = s->head[v];
@@ -277,11 +283,12 @@ static bool stays_unflipped(const simplifier *s, const uint32_t t[3], uint32_t f
     return !(ebpo_vec3_dot(before, before) > 0) || dot > LEAST_COSINE * sqrt(square);
 }
 
-/* Returns true if a collapse flips no triangle and does not change the topology: each common
- * neighbour of both ends is a vertex of a triangle that has both ends. */
+/* Returns true if the collapse of `from` onto `to` flips no triangle and does not change the
+ * topology. The topology stays the same if each common neighbour of `from` and `to` is a vertex of
+ * a triangle that has both. */
 static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
 {
-    /* number of triangles that have both ends; number of common neighbours of both ends */
+    /* shared: number of triangles that have `from` and `to`; common: number of common neighbours */
     unsigned shared = 0, common = 0;
     bool open = false;
     if ((uint64_t)s->corners[from] + s->corners[to] > MOST_CORNERS)
@@ -343,8 +350,8 @@ static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
     s->age[to]++;
 }
 
-/* Takes removed triangles, and unused vertices that are not fixed, out of the mesh's arrays.
- * `new_index`: [vertices] space for new indices. */
+/* Deletes removed triangles from the mesh's arrays. Also deletes unused vertices that are not
+ * fixed. `new_index`: [vertices] space for new indices. */
 static void compact_mesh(simplifier *s, uint32_t *new_index)
 {
     ebpo_patch_mesh *m = s->mesh;

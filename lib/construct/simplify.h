@@ -12,14 +12,15 @@
 #include "core/error.h"
 
 typedef struct ebpo_patch_vertex {
-    double at[3];             /* position */
-    double normal[3];         /* sum of the normals of faces, each as long as twice the area */
-    double colour[3], weight; /* sums of colours and of their weights */
-    /* this vertex replaces vertices of the model; least and greatest index of the faces that use
-     * those vertices */
+    double at[3]; /* position */
+    /* sum of the normals of faces; the length of each normal is twice the face's area */
+    double normal[3];
+    double colour[3], weight; /* sum of weighted colours; sum of the weights */
+    /* least and greatest index of the faces of the model that use the vertices which this vertex
+     * replaces */
     uint64_t lowest, highest;
-    uint64_t key; /* key of its cell, or of the model's vertex */
-    bool fixed;   /* it is on the border of the patch and does not move */
+    uint64_t key; /* surface.c: key of the vertex's cell, or of the model's vertex */
+    bool fixed;   /* the vertex is on the border of the patch and does not move */
 } ebpo_patch_vertex;
 
 /* The triangles of a patch. Neighbours in the array should be neighbours in space. */
@@ -31,17 +32,18 @@ typedef struct ebpo_patch_mesh {
 
 void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh);
 
-/* Collapses edges until at most `target` triangles remain, or no collapse is possible without
- * flipping a triangle or changing the topology. Fixed vertices remain. Every other vertex remains,
- * or is moved onto a neighbour and removed, so there are no new positions. Removes unused vertices
- * that are not fixed. Returns EBPO_E_MEMORY. Any thread. Source: Garland and Heckbert, Surface
+/* Collapses edges until at most `target` triangles remain, or until every further collapse would
+ * flip a triangle or change the topology. Fixed vertices remain. Every other vertex remains, or is
+ * moved onto a neighbour and removed, so there are no new positions. Removes unused vertices that
+ * are not fixed. Returns EBPO_E_MEMORY. Any thread. Source: Garland and Heckbert, Surface
  * simplification using quadric error metrics, 1997. */
 EBPO_MUST_USE ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error);
 
-/* Sets *out to an upper bound of the greatest distance of a point of `a` from `b`, which must have
- * triangles. The bound is at most `known`, or it exceeds the distance by at most 5 % or by at most
- * `fine`. The caller adds the rounding error, about 2^-45 of the greatest coordinate. Returns
- * EBPO_E_MEMORY. Any thread. */
+/* Sets *out to an upper bound of the greatest distance of a point of `a` from `b`. `b` must have
+ * triangles. The function stops to improve the bound when it is at most `known`, or exceeds the
+ * distance by at most 5 % or by at most `fine`. All distances have the unit of the coordinates. The
+ * caller adds the rounding error, about 2^-45 of the greatest coordinate. Returns EBPO_E_MEMORY.
+ * Any thread. */
 EBPO_MUST_USE ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh *b,
                                               double fine, double known, double *out,
                                               ebpo_error *error);

@@ -1,14 +1,16 @@
-/* Finds the closed components of a mesh that are apart, and computes which of them bound the solid.
+/* Finds out if the closed components of a mesh are apart, and which of them bound the solid. A
+ * shell is a closed component with a volume.
  *
- * Two components are apart if their faces have no common point. Then each is completely inside or
- * outside the other one, and the winding numbers on both sides of its faces follow from the nesting
- * of components (which component is inside which). Faces are compared only if the boxes of
- * components do not decide. A first pass finds, for each component, the faces whose boxes intersect
- * the box of another component. Boxes that contain the component's own box are left out: there,
- * all faces of the component would be found, and the faces found for the outer component suffice. A
- * second pass compares the found faces with faces of other components. Both passes stop after a
- * number of steps that is proportional to the number of faces; then the components count as not
- * apart. `ebpo check` prints the counts; ebpo_measure uses ebpo_component_times. */
+ * Two components are apart if their faces have no common point. Then each component is completely
+ * inside or outside the other one, and the winding numbers on both sides of its faces follow from
+ * the nesting of components (which component is inside which). Faces are compared only if the boxes
+ * of components intersect. A first pass finds, for each component, the faces whose boxes intersect
+ * the box of another component. A box that contains the box of the component is skipped, because it
+ * would select all faces of the component; the faces of the outer component that intersect the
+ * inner box suffice to find a contact. A second pass compares the found faces with faces of other
+ * components. Both passes stop after a number of steps that is proportional to the number of faces;
+ * then the components count as not apart. `ebpo check` prints the counts; ebpo_measure uses
+ * ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -36,11 +38,11 @@ typedef struct comparing {
     uint8_t *exposed;
     uint8_t *reached;          /* [shells] 1: a face of another shell intersects this shell's box */
     ebpo_box_tree faces;       /* faces of reached shells; value: the shell */
-    uint64_t steps, steps_max; /* steps of all walks so far; their limit */
+    uint64_t steps, steps_max; /* number of compared boxes and faces so far; its limit */
     bool apart;                /* no contact was found so far, and the limit was not reached */
 } comparing;
 
-/* The walk for one face, which is compared with shells or with other faces. */
+/* The search for one face, which is compared with the boxes of shells or with other faces. */
 typedef struct visitor {
     comparing *c;
     ebpo_point_box box;
@@ -67,8 +69,8 @@ static bool is_near(void *user, const ebpo_box_node *node)
     return boxes_intersect(&((const visitor *)user)->box, node->filled->min, node->filled->max);
 }
 
-/* Marks the face and the shells whose boxes the face intersects. Returns false at the limit of
- * steps. */
+/* Compares the face with the boxes of shells. If its box intersects the box of another shell, marks
+ * the face as exposed and the other shell as reached. Returns false at the limit of steps. */
 static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;
@@ -85,7 +87,8 @@ static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
     return v->steps < v->c->steps_max;
 }
 
-/* Compares the face with faces of other shells. Returns false after a contact, or at the limit. */
+/* Compares the face with faces of other shells. Returns false after a contact, or at the limit of
+ * steps. */
 static bool visit_faces(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;
@@ -185,7 +188,8 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
     return status;
 }
 
-/* Sets s->apart to true or false. All components must be simple (is_simple). */
+/* Finds out if the components are apart, and sets s->apart. All components must be simple
+ * (is_simple). */
 static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
 {
     comparing c = { .s = s, .apart = true };
@@ -198,9 +202,9 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
     return status;
 }
 
-/* Returns true if a component is closed, and has a volume or is flat. (A component with the volume
- * 0 that is not flat bounds parts whose volumes cancel. A closed component of two faces is flat: a
- * face and its reverse.) */
+/* Returns true if a component is simple: it is closed, and has a volume or is flat. (A component
+ * with the volume 0 that is not flat bounds parts whose volumes cancel. A closed component of two
+ * faces is flat, because its faces have the same corners.) */
 static bool is_simple(const ebpo_components *c, uint64_t i)
 {
     const ebpo_found_component *component = &c->list[i];
@@ -255,7 +259,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
 
 /* --- counting --- */
 
-/* Adds a shell to the counts. Whether it is a cavity depends on the shells around it. */
+/* Adds a shell to the counts. The number of shells around it decides if it is a cavity. */
 static void count_shell(const ebpo_nesting *n, const ebpo_shell *shell, ebpo_shells *made)
 {
     bool inwards = ebpo_shell_faces_inwards(n, shell), cavity = ebpo_shell_is_cavity(shell);
@@ -264,7 +268,8 @@ static void count_shell(const ebpo_nesting *n, const ebpo_shell *shell, ebpo_she
     made->nested += !inwards && cavity;
 }
 
-/* Sets, for each rule, the volume of the solid minus the integral of the winding number. */
+/* Sets volume_difference for each rule: the volume of the solid minus the integral of the winding
+ * number over space. */
 static void set_volume_differences(const ebpo_solid_shells *s, ebpo_shells *made)
 {
     ebpo_mesh_frame frame = ebpo_mesh_frame_of(s->mesh);

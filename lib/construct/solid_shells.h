@@ -1,5 +1,5 @@
-/* Finds the shells of a mesh (its closed components), and which of them bound the solid of a
- * winding rule (which says which winding numbers count as inside). */
+/* Finds the shells of a mesh (its closed components with a volume), and which of them bound the
+ * solid. A winding rule defines which winding numbers count as inside the solid. */
 #ifndef EBPO_CONSTRUCT_SOLID_SHELLS_H
 #define EBPO_CONSTRUCT_SOLID_SHELLS_H
 
@@ -13,10 +13,10 @@ typedef struct ebpo_solid_shells {
     /* result of ebpo_mesh_find_shells; the nesting uses it as `of_face` of its components */
     uint32_t *closed;
     ebpo_nesting nesting; /* which shells are inside which others */
-    uint32_t *shell_of;   /* [component] index of its shell; EBPO_NO_INDEX: the component has no
-                           * volume */
-    bool apart; /* every component is closed, and faces of two different components have no common
-                 * point */
+    /* [component] index of its shell; EBPO_NO_INDEX: the component is open or has no volume */
+    uint32_t *shell_of;
+    /* every component is closed, and faces of two different shells have no common point */
+    bool apart;
 } ebpo_solid_shells;
 
 /* Finds the components and their nesting, and sets `apart`. Takes as long as
@@ -28,9 +28,10 @@ EBPO_MUST_USE ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const e
 void ebpo_solid_shells_count(const ebpo_solid_shells *shells, ebpo_shells *out);
 void ebpo_solid_shells_free(ebpo_solid_shells *shells);
 
-/* Returns 1 if the faces of a component bound the solid, -1 if they bound it with the opposite
- * orientation, 0 if they do not bound it. `apart` must be true. An integral over the solid's
- * surface is the integral over all faces, with these factors. */
+/* Returns 1 if the faces of a component bound the solid, -1 if they bound the solid with the
+ * opposite orientation, and 0 if they do not bound it. Returns 1 for a component without volume.
+ * `apart` must be true. An integral over the solid's surface is the sum of the integrals over the
+ * components, each multiplied by this factor. */
 int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, ebpo_rule rule);
 
 #endif

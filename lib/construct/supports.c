@@ -1,14 +1,15 @@
-/* Computes the support of the solid in a cell: the greatest n . xi over the mesh vertices in the
- * cell, the points where the mesh crosses cell faces, and the corners of the cell that are inside
- * the solid. The support is the offset of a plane with normal n.
+/* Computes the support of the solid in a cell along a direction n: the greatest n . x over the
+ * points x of the solid in the cell. It is sufficient to test the mesh vertices in the cell, the
+ * points where faces are cut by cell faces ("crossings"), and the corners of the cell that are
+ * inside the solid. The support is the offset of a plane with the normal n.
  *
  * If there are few vertices, all points are gathered, each once, and searched in stretches (32
- * consecutive points that share a box, sweep.h). If there are many, only crossings and corners are
- * gathered, and the vertices are searched by a hierarchy of boxes around ranges of vertices along
- * the Morton curve. Rounding is monotone: the bound of a box is computed by the same operations in
- * the same order as the values of points, so it is never less than the value of a point in the box,
- * and no search skips the greatest point. A search stops early when the support is so large that
- * the plane would not be worth storing. */
+ * consecutive points that share a box, sweep.h). If there are many vertices, only crossings and
+ * corners are gathered. Then the vertices are searched by a hierarchy of boxes around ranges of
+ * vertices along the Morton curve. The bound of a box is computed by the same operations in the
+ * same order as the values of points, and rounding is monotone. So the bound is never less than the
+ * value of a point in the box, and no search skips the greatest point. A search stops early when
+ * the support is so large that the plane would not be worth storing. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -68,7 +69,7 @@ void ebpo_bounds_free(ebpo_bounds *bounds)
     bounds->levels = 0;
 }
 
-/* A search for the vertex of begin .. end - 1 with the greatest n . xi. */
+/* A search, among the vertices begin .. end - 1, for the vertex with the greatest n . x. */
 typedef struct vertex_search {
     const ebpo_builder *b;
     double corner[3], size[3]; /* lowest corner and size of the cell */
@@ -78,7 +79,8 @@ typedef struct vertex_search {
     uint64_t best_vertex; /* vertex with this value; EBPO_NO_VERTEX: none */
 } vertex_search;
 
-/* Returns the greatest n . xi in a box; xi: the point in cell coordinates. */
+/* Returns the greatest n . x in a box, where x is in cell coordinates. `low`, `high`: the box in
+ * the model's coordinates. */
 static double bound_value(const vertex_search *q, const double low[3], const double high[3])
 {
     double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]),
@@ -88,7 +90,8 @@ static double bound_value(const vertex_search *q, const double low[3], const dou
            q->n[2] * ((z - q->corner[2]) / q->size[2]);
 }
 
-/* Searches a block of 16^level vertices (level 0: a vertex). */
+/* Searches a block of 16^level consecutive vertices. At level 0, `block` is the index of a vertex.
+ */
 static void visit_block(vertex_search *q, int level, uint64_t block)
 {
     uint64_t width = 1;
@@ -114,9 +117,9 @@ static void visit_block(vertex_search *q, int level, uint64_t block)
         visit_block(q, level - 1, i);
 }
 
-/* Returns the greatest n . xi over the vertices begin .. end - 1, in coordinates of the cell, but
- * at least `least`. Sets *vertex to the vertex with this value, or to EBPO_NO_VERTEX if no value
- * exceeds `least`. */
+/* Returns the greatest n . x over the vertices begin .. end - 1 in cell coordinates, but at least
+ * `least`. Sets *vertex to the vertex with this value, or to EBPO_NO_VERTEX if no value exceeds
+ * `least`. */
 static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
                              uint64_t begin, uint64_t end, double least, uint64_t *vertex)
 {
@@ -128,7 +131,7 @@ static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double
         q.size[k] = b->box.size[k] / (double)(1u << cell.level);
         q.n[k] = n[k];
     }
-    /* start at the level where the range has a few blocks, not at the top */
+    /* start at the deepest level at which the range still has few blocks */
     int level = 0;
     uint64_t width = 1;
     while (level < b->bounds.levels && width * EBPO_BOUNDS_FAN <= end - begin) {
@@ -167,9 +170,9 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
 
 /* --- the points of a node --- */
 
-/* FEW_VERTICES: the vertices of a node with more vertices are searched by boxes. TABLE_MAX: maximum
- * size of the hash table. MANY_POINTS: a search among more points releases pages of the workspace
- * first. */
+/* FEW_VERTICES: if a node has more vertices, they are not gathered but searched by boxes.
+ * TABLE_MAX: maximum size of the hash table. MANY_POINTS: if there are more points, pages of the
+ * workspace are released before a search. */
 enum { FEW_VERTICES = 4096, TABLE_MAX = 1 << 16, MANY_POINTS = 1 << 15 };
 
 /* Returns true if point i has the coordinates x. */
@@ -179,9 +182,10 @@ static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
     return p[0][i % 4] == x[0] && p[1][i % 4] == x[1] && p[2][i % 4] == x[2];
 }
 
-/* Returns true if there is a point with the coordinates x, and raises its error bound to `error`.
- * If not, enters the index of the next point, which the caller must add, in the table. When the
- * table is half full, always returns false. */
+/* Returns true if there is a point with the coordinates x, and raises the error bound of this point
+ * to at least `error`. Otherwise returns false and enters the index of the next point in the table;
+ * then the caller must add this point. If the table is half full, returns false and enters nothing.
+ */
 static bool known_point(ebpo_supports *s, const double x[3], double error)
 {
     uint64_t bits[3], at;
@@ -203,8 +207,8 @@ static bool known_point(ebpo_supports *s, const double x[3], double error)
     return true;
 }
 
-/* Adds a point. `slack`: upper bound of the rounding errors of its coordinates. Returns false when
- * out of memory. */
+/* Adds a point, unless there is an equal point. `slack`: upper bound of the rounding errors of its
+ * coordinates. Returns false when out of memory. */
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
 {
     if (!ebpo_array_grow_late(s->workspace, &s->point, &s->capacity, s->count / 4 + 1,
@@ -235,8 +239,8 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
     for (uint64_t i = begin; i < end; i++) {
         double p[3];
         ebpo_mesh_position(b->mesh, i, p);
-        /* error bound 0: these two rounding errors of values up to 1 are far below the margin of
-         * ebpo_plane_code_offset */
+        /* the error bound is 0, because the rounding errors of the subtraction and the division,
+         * for values up to 1, are far below the margin of ebpo_plane_code_offset */
         if (!add_point(s,
                        (const double[3]){ (p[0] - corner[0]) / size[0],
                                           (p[1] - corner[1]) / size[1],
@@ -247,12 +251,12 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
     return true;
 }
 
-/* Adds the points of the faces that cross cell faces: the corners of their parts in the cell.
+/* Adds the crossings: for each face that crosses a cell face, the corners of its part in the cell.
  * Returns false when out of memory. */
 static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebpo_build_detail *d)
 {
-    /* number of faces after which pages of the workspace are released; the faces of the top are in
-     * different parts of the workspace's files */
+    /* number of faces after which pages of the workspace are released; smaller for the top, whose
+     * faces are on many different pages */
     const uint64_t release_faces = branch->list ? 1024 : 32;
     EBPO_FOR_ITEMS_EVERY(s->workspace, release_faces, i, d->cross_begin, d->cross_end) {
         ebpo_triangle face;
@@ -266,7 +270,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     return true;
 }
 
-/* Clears the hash table and sets its size for about `points` points. Returns false when out of
+/* Clears the hash table, and chooses its size for about `points` points. Returns false when out of
  * memory. */
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
@@ -295,8 +299,8 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
-    /* Corners come first: they have great values, so searches along directions of useless planes
-     * stop early. */
+    /* Corners come first. Their values are large, so a search stops early if its plane is useless.
+     */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 &&
@@ -320,7 +324,8 @@ static void locate_point(const ebpo_supports *s, uint64_t first, const double n[
     }
 }
 
-/* Raises *support to the maximum over the points, and sets `where` if it has been raised. */
+/* Raises *support to the maximum over the gathered points. If *support was raised, sets `where` to
+ * the point of the maximum. */
 static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support,
                          double where[3])
 {
@@ -381,7 +386,8 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     among_points(s, n, enough, &support, where);
     if (s->begin >= s->end || support >= enough)
         return support;
-    ebpo_release_pages(s->workspace); /* so many vertices are spread over the whole file */
+    /* the vertices are so many that their pages are in different parts of the workspace's files */
+    ebpo_release_pages(s->workspace);
     uint64_t vertex;
     double p[3] = { 0, 0, 0 };
     support = bounds_support(s->b, s->cell, n, s->begin, s->end, support, &vertex);

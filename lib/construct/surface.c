@@ -1,21 +1,23 @@
-/* Builds the part `surface`: a patch (a coarse surface for the faces below a node) for the root,
- * and for the children of each node that has a patch and many faces (format-spec/surface.md).
+/* Builds the part `surface` of a file (format-spec/surface.md). A patch is a coarse surface for the
+ * faces below a node. The root has a patch, and so have the children of each node that has a patch
+ * and many faces.
  *
  * The faces that are new below a node (no earlier leaf lists them) are a range of the model's
  * faces. If there are no patches below a node, the node's patch is made from these faces; otherwise
  * it is made from the patches of the node's children. Each patch has about a quarter as many
  * triangles as the faces or patches that it is made from.
  *
- * A vertex is on the border of a patch if faces outside the patch use it too. Each border vertex is
- * replaced by the vertex of its cell: of the cells EBPO_PATCH_CELLS levels below the node, the cell
- * that contains the border vertex. The vertex of a cell is at the mean of the model's vertices that
- * are in the cell and on borders at the node's level. This mean depends on the model only, so
- * neighbouring patches have the same vertex. Vertices on borders do not move when a patch is
- * simplified.
+ * A vertex is on the border of a patch if faces that do not belong to the patch also use the
+ * vertex. Each border vertex is replaced by the vertex of its cell. Its cell is the cell
+ * EBPO_PATCH_CELLS levels below the node that contains the border vertex. The vertex of a cell is
+ * at the mean of the model's vertices that are in the cell and on borders at the node's level. This
+ * mean depends on the model only, so neighbouring patches have the same vertex. Vertices on borders
+ * do not move when a patch is simplified.
  *
- * The error of a patch is the distance between the patch and the surface it is made from, in both
- * directions, plus the greatest error of that surface. Nodes with at most TASK_FACES faces, and all
- * nodes below them, are built in parallel; then the nodes above them are built. */
+ * The error of a patch bounds its distance from the model. It is the distance between the patch and
+ * the surface from which the patch is made, in both directions, plus the error of that surface. The
+ * model's faces have the error 0. Nodes with at most TASK_FACES faces, and all nodes below them,
+ * are built in parallel; then the nodes above them are built. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -40,33 +42,35 @@
 #include "mesh/mesh_parts.h"
 
 enum {
-    LEAST_FACES = 2048,           /* a model with fewer faces has no patches */
-    MOST_FACES = 8192,            /* a node with more faces has patches below it */
-    TASK_FACES = 1 << 18,         /* greatest number of faces of a parallel task */
-    REDUCTION = 4,                /* triangles before, divided by triangles after simplification */
+    LEAST_FACES = 2048,   /* a model with fewer faces has no patches */
+    MOST_FACES = 8192,    /* a node with more faces has patches below it */
+    TASK_FACES = 1 << 18, /* greatest number of faces of a parallel task */
+    /* number of triangles before simplification, divided by the number afterwards */
+    REDUCTION = 4,
     LEVELS = EBPO_PATCH_LEVEL + 1 /* number of levels with patches */
 };
 static const double LEAST_WEIGHT = 1e-12; /* weight of a face without area */
 
-/* A node with a patch. Nodes are depth first. */
+/* A node with a patch. The array of nodes is in depth-first order. */
 typedef struct patch_node {
     ebpo_cell cell;
-    uint64_t first, end;          /* faces first .. end - 1 are new below the node */
-    uint64_t after;               /* the next node that is not below this one */
-    ebpo_patch_mesh mesh;         /* the patch, until the parent's patch is made */
-    ebpo_patch_rows rows;         /* the patch as in the file */
-    double error;                 /* scaled like coordinates; INFINITY: the node has no patch */
+    uint64_t first, end;  /* faces first .. end - 1 are new below the node */
+    uint64_t after;       /* index of the next node that is not below this one */
+    ebpo_patch_mesh mesh; /* the patch, until the parent's patch is made */
+    ebpo_patch_rows rows; /* the encoded patch, as the file stores it */
+    /* in scaled coordinates (surface_builder.exponent); INFINITY: the node has no patch */
+    double error;
     uint64_t triangles, vertices; /* their numbers in `rows` */
     bool made;                    /* the node was processed */
     bool stored;                  /* the file stores the patch */
-    bool collapsed;               /* the patch is a point (add_point) */
+    bool collapsed;               /* all triangles vanished, so the patch is a point (add_point) */
 } patch_node;
 
-/* The vertex that replaces the border vertices in a cell, as sums over the corners of faces at
- * these vertices. */
+/* The vertex that replaces the border vertices in a cell. Its fields are sums over all corners of
+ * faces at these border vertices, weighted by the faces' areas. */
 typedef struct cell_vertex {
     uint64_t key; /* cell_key; UINT64_MAX: an empty slot */
-    double at[3]; /* positions in the root cell, 0 to 1 */
+    double at[3]; /* weighted sum of positions; coordinates are 0 to 1 in the root cell */
     double normal[3], colour[3], weight;
 } cell_vertex;
 
@@ -76,8 +80,8 @@ typedef struct cell_table {
     uint64_t slots, count;
 } cell_table;
 
-/* A range of faces that no border of a level divides: the faces of a node with a patch, or the
- * faces between two nodes with patches. */
+/* A range of the model's faces, for one level: the faces of a node with a patch, or the faces
+ * between two such nodes. No border between patches of this level is inside the range. */
 typedef struct face_interval {
     uint64_t first, end;
 } face_interval;
@@ -85,8 +89,8 @@ typedef struct face_interval {
 typedef struct surface_builder {
     ebpo_tree *tree;
     ebpo_box box;
-    /* coordinates are relative to the origin and divided by 2^exponent: the longest side of the
-     * box is 1 to 2 */
+    /* scaled coordinates are relative to the box's origin and divided by 2^exponent, so the longest
+     * side of the box is 1 to 2 */
     int exponent;
     double size[3]; /* scaled size of the box */
     unsigned threads;
@@ -94,14 +98,16 @@ typedef struct surface_builder {
     uint64_t count, capacity;
     face_interval *interval[LEVELS]; /* ascending; together they contain all faces */
     uint64_t interval_count[LEVELS];
-    cell_table table[LEVELS]; /* vertices of the cells on borders of patches of this level */
-    uint32_t *highest;        /* [vertices] last face that uses the vertex */
-    uint32_t *lowest;         /* [vertices] first face that uses the vertex */
+    /* [level] vertices of the cells that contain border vertices of patches of this level */
+    cell_table table[LEVELS];
+    uint32_t *highest; /* [vertices] last face that uses the vertex */
+    uint32_t *lowest;  /* [vertices] first face that uses the vertex */
     ebpo_colour_column colour[EBPO_COLOUR_CHANNELS];
-    bool coloured, by_face; /* by_face: the columns are colours of faces, not of vertices */
-    uint64_t *task;         /* [task_count] nodes that are built in parallel, each with all below */
+    bool coloured, by_face; /* by_face: `colour` has the colours of faces, not of vertices */
+    /* [task_count] indices of nodes; a parallel task builds such a node with all nodes below */
+    uint64_t *task;
     uint64_t task_count;
-    /* while nodes are listed: [level] index of the next group and leaf */
+    /* [level] indices of the next group and of the next leaf, while list_nodes runs */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
     bool short_of_memory;
 } surface_builder;
@@ -121,8 +127,8 @@ static bool add_node(surface_builder *b, ebpo_cell cell, uint64_t first, uint64_
 }
 
 /* Lists a gray node if it has faces. If it has more than MOST_FACES faces, also lists the nodes
- * with faces below it. `first`: first new face of the node. Returns the end of the node's faces.
- * Recursive, one call for each level. */
+ * with faces below it. `first`: first new face of the node. Returns the end of the node's range of
+ * new faces. The function is recursive; its depth is the number of levels. */
 static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
 {
     int below = cell.level + 1;
@@ -174,13 +180,13 @@ static bool list_intervals(surface_builder *b)
     return true;
 }
 
-/* Returns the key of a cell; 21 bits for each index. */
+/* Returns the key of the cell with the indices `at` along the axes; each index takes 21 bits. */
 static uint64_t cell_key(const uint32_t at[3])
 {
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
 }
 
-/* Returns the key of the cell that contains a point, for the borders of patches at a level. The
+/* Returns the key of the cell that contains a point, EBPO_PATCH_CELLS levels below node_level. The
  * coordinates of the point are 0 to 1 in the root cell. */
 static uint64_t key_of_point(const double unit[3], int node_level)
 {
@@ -235,8 +241,8 @@ static cell_vertex *enter_cell(cell_table *table, uint64_t key)
 typedef struct scaled_face {
     double corner[3][3]; /* scaled coordinates */
     double unit[3][3];   /* coordinates in the root cell, 0 to 1 */
-    double normal[3];    /* its length is twice the area */
-    double weight;       /* this length plus LEAST_WEIGHT */
+    double normal[3];    /* the length of this vector is twice the face's area */
+    double weight;       /* length of `normal` plus LEAST_WEIGHT */
 } scaled_face;
 
 static void get_face(const surface_builder *b, uint64_t face, scaled_face *out)
@@ -257,7 +263,8 @@ static void get_face(const surface_builder *b, uint64_t face, scaled_face *out)
     out->weight = ebpo_vec3_length(out->normal) + LEAST_WEIGHT;
 }
 
-/* Sets `out` to the colour of a vertex, or of a face if by_face; to zeros without colours. */
+/* Sets `out` to the colour of `vertex`, or of `face` if b->by_face is true. If the model has no
+ * colours, sets it to zeros. */
 static void get_colour(const surface_builder *b, uint64_t face, uint32_t vertex, double out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -270,7 +277,8 @@ static bool is_on_border(const surface_builder *b, uint32_t vertex, face_interva
     return b->lowest[vertex] < inside.first || b->highest[vertex] >= inside.end;
 }
 
-/* Adds corner k of a face to the vertex of the corner's cell. Returns false when out of memory. */
+/* Adds corner k of a face to the vertex of the cell that contains this corner. Returns false when
+ * out of memory. */
 static bool add_corner(surface_builder *b, int level, uint64_t face, const scaled_face *f, int k)
 {
     cell_vertex *cell = enter_cell(&b->table[level], key_of_point(f->unit[k], level));
@@ -287,12 +295,12 @@ static bool add_corner(surface_builder *b, int level, uint64_t face, const scale
     return true;
 }
 
-/* At each level, adds the corners of faces that are on borders of the level to the vertices of
- * their cells. Returns false when out of memory. */
+/* For each level, adds all corners of faces that are on a border between patches of this level to
+ * the vertices of their cells. Returns false when out of memory. */
 static bool add_borders(surface_builder *b)
 {
     const ebpo_mesh *mesh = &b->tree->mesh;
-    uint64_t current[LEVELS] = { 0 }; /* [level] interval of the face */
+    uint64_t current[LEVELS] = { 0 }; /* [level] index of the interval that contains the face */
     EBPO_FOR_ITEMS(b->tree->workspace, face, 0, mesh->face_count) {
         const uint32_t *corner = mesh->faces + 3 * face;
         scaled_face f;
@@ -403,7 +411,7 @@ static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
     return true;
 }
 
-/* Gives a vertex the position, normal and colour of the vertex of a cell. */
+/* Sets position, normal and colour of `v` to those of the vertex of a cell. */
 static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int node_level,
                             uint64_t key)
 {
@@ -430,8 +438,8 @@ static void widen_uses(ebpo_patch_vertex *v, uint64_t lowest, uint64_t highest)
     v->highest = highest > v->highest ? highest : v->highest;
 }
 
-/* Adds the faces first .. end - 1 of the model to a mesh; also those with repeated corners, because
- * the error bounds their distances, too. Returns false when out of memory. */
+/* Adds the faces first .. end - 1 of the model to a mesh. Also adds faces with repeated corners,
+ * because the error must bound their distance, too. Returns false when out of memory. */
 static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t first, uint64_t end)
 {
     const uint32_t *corner = b->tree->mesh.faces + 3 * first;
@@ -490,13 +498,13 @@ static bool add_patch(ebpo_patch_mesh *mesh, key_table *table, const ebpo_patch_
     return made;
 }
 
-/* Returns true if a node has a patch with area; false if all its triangles collapse when border
- * vertices are replaced by vertices of cells. */
+/* Returns true if a node has a patch with triangles. Returns false if there is no patch, or if all
+ * triangles vanished when border vertices were replaced by vertices of cells. */
 static bool has_patch(const patch_node *node) { return isfinite(node->error) && !node->collapsed; }
 
-/* Adds the faces of the children without has_patch to the mesh `mesh`, from which the error is
- * measured. The node's patch is made without them, but its error bounds their distance from it.
- * Returns false when out of memory. */
+/* Adds the faces of the children for which has_patch is false to `mesh`. The node's patch is made
+ * without these faces, but its error must also bound their distance from the patch, and the error
+ * is measured from `mesh`. Returns false when out of memory. */
 static bool add_collapsed_children(const surface_builder *b, const patch_node *node,
                                    ebpo_patch_mesh *mesh)
 {
@@ -542,9 +550,9 @@ static uint64_t key_of_vertex(const surface_builder *b, uint32_t vertex, int nod
     return key_of_point(p, node_level);
 }
 
-/* Makes the mesh `to` from `from`: replaces the vertices on the border of a node's patch by the
- * vertices of their cells, and omits triangles that then have repeated corners. Returns false when
- * out of memory. */
+/* Copies the mesh `from` to `to`, and replaces the vertices on the border of the node's patch by
+ * the vertices of their cells. Omits triangles that have repeated corners after this. Returns false
+ * when out of memory. */
 static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_patch_mesh *from,
                         ebpo_patch_mesh *to)
 {
@@ -557,7 +565,8 @@ static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_p
         uint64_t key = UINT64_MAX;
         if (border && old->key & MODEL_VERTEX) {
             key = key_of_vertex(b, (uint32_t)old->key, node->cell.level);
-        } else if (border) { /* the old key is of a cell one level finer: take its parent */
+        } else if (border) { /* the old key is the key of a cell one level deeper; the new key is
+                              * the key of this cell's parent */
             uint32_t at[3] = { (old->key & 0x1fffff) >> 1, (old->key >> 21 & 0x1fffff) >> 1,
                                (uint32_t)(old->key >> 43) };
             key = cell_key(at);
@@ -587,9 +596,9 @@ static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_p
     return made;
 }
 
-/* Moves the vertices to the grid of the patch, and sets `point` to their coordinates in steps of
- * the grid, relative to the node's lowest corner. Returns false if a vertex is too far from the
- * node for 16 bits. */
+/* Rounds the vertices to the grid of the patch. Sets `point` to their coordinates in steps of this
+ * grid, relative to the lowest corner of the node's cell. Returns false if a vertex is too far from
+ * the node for 16 bits. */
 static bool move_to_grid(const surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                          int16_t *point)
 {
@@ -608,7 +617,7 @@ static bool move_to_grid(const surface_builder *b, const patch_node *node, ebpo_
     return near;
 }
 
-/* Encodes the patch of a node as in the file. */
+/* Sets node->rows to the encoded patch, as the file stores it. `point`: result of move_to_grid. */
 static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const int16_t *point,
                                ebpo_error *error)
 {
@@ -637,26 +646,27 @@ static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const
     return status;
 }
 
-/* Sets the error of a node's patch. `from`: the surface that it was made from; `before`: the error
- * of this surface. */
+/* Sets the error of a node's patch. `from`: the surface from which the patch was made. `before`:
+ * the error of this surface. */
 static ebpo_status bound_error(const surface_builder *b, patch_node *node,
                                const ebpo_patch_mesh *from, double before, ebpo_error *error)
 {
     double fine = ldexp(1, -node->cell.level - EBPO_PATCH_GRID - 1), there = 0, back = 0,
-           greatest = 0; /* absolute coordinate */
+           greatest = 0; /* greatest: the greatest absolute coordinate of the box */
     ebpo_status status = ebpo_bound_distance(from, &node->mesh, fine, 0, &back, error);
     if (status == EBPO_OK)
         status = ebpo_bound_distance(&node->mesh, from, fine, back, &there, error);
     for (int k = 0; k < 3; k++)
         greatest = fmax(greatest, fabs(b->box.origin[k]) + b->box.size[k]);
-    /* more than the rounding errors of positions and distances */
+    /* the last two terms are more than the rounding errors of positions and distances */
     node->error = before + fmax(there, back) + ldexp(greatest, -b->exponent) * 0x1p-44 + 0x1p-40;
     return status;
 }
 
-/* Adds a vertex without triangles at each border vertex whose edges all have two triangles. Readers
- * treat vertices without triangles as border vertices; otherwise they would not recognise such a
- * border vertex. Returns false when out of memory. */
+/* Readers find the border vertices of a patch by edges that have only one triangle. If all edges of
+ * a border vertex have two triangles, this function adds a vertex without triangles at the same
+ * position. Readers treat vertices without triangles as border vertices, too. Returns false when
+ * out of memory. */
 static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
 {
     uint64_t count = mesh->vertex_count;
@@ -675,13 +685,13 @@ static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
     return made;
 }
 
-/* Makes a patch a point, a triangle with three equal corners, if its triangles all collapse into
- * the vertices of cells on its border. So the node has a patch, and its siblings can have theirs.
- */
+/* Makes a patch that is a point: a triangle with three equal corners. This is done if all triangles
+ * of a patch vanish because their corners are replaced by vertices of cells. The node needs a
+ * patch, because patches of siblings are stored only if all siblings have one. */
 static bool add_point(ebpo_patch_mesh *mesh)
 {
     bool made = add_triangle(mesh, (uint32_t[3]){ 0, 0, 0 }) && add_hidden_vertices(mesh);
-    while (made && mesh->vertex_count < 3) { /* the least number */
+    while (made && mesh->vertex_count < 3) { /* a patch has at least three vertices */
         made = ebpo_grow(&mesh->vertex, &mesh->vertex_capacity, mesh->vertex_count + 1,
                          sizeof *mesh->vertex);
         if (made)
@@ -721,7 +731,7 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
         if (status == EBPO_OK && node->stored)
             status = encode_rows(b, node, point, error);
     }
-    if (node->collapsed) { /* the point is no part of the parent's surface */
+    if (node->collapsed) { /* the parent's patch is made without this point */
         node->mesh.triangle_count = 0;
         node->mesh.vertex_count = vertices;
     }
@@ -730,7 +740,8 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
     return status;
 }
 
-/* Makes the patches of a node and of all nodes below it. Recursive, one call for each level. */
+/* Makes the patches of a node and of all nodes below it. The function is recursive; its depth is
+ * the number of levels. */
 static ebpo_status make_below(surface_builder *b, uint64_t i, ebpo_error *error)
 {
     patch_node *node = &b->node[i];
@@ -774,7 +785,8 @@ static int by_octcode(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Appends a patch to the arrays of `to`. `step`: unit of errors in the file, scaled. */
+/* Appends a patch to the arrays of `to`. `step`: unit of errors in the file, in scaled coordinates.
+ */
 static void copy_patch(ebpo_surface *to, const patch_node *node, double step)
 {
     uint64_t *row = to->patch + EBPO_PATCH_COLUMNS * to->patch_count++, v = to->vertex_count;
@@ -795,9 +807,9 @@ static void copy_patch(ebpo_surface *to, const patch_node *node, double step)
     to->vertex_count += node->vertices;
 }
 
-/* Clears `stored` for node i if `wanted` is false or if its error is too large for the file. Clears
- * it for all nodes below, unless node i is stored and all of its children have patches that can be
- * stored. */
+/* Decides if the file stores the patches of node i and of the nodes below. Clears `stored` of node
+ * i if `wanted` is false or if the error is too large for the file. The patches of its children are
+ * stored only if node i is stored and all children have patches that can be stored. */
 static void select_patches(const surface_builder *b, uint64_t i, double step, bool wanted)
 {
     bool all = wanted;
@@ -866,7 +878,8 @@ ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads, const ebpo_pro
     const ebpo_attributes *attributes = tree->mesh.attributes;
     ebpo_status status = EBPO_OK;
     frexp(ebpo_patch_error_step(&tree->info), &b.exponent);
-    b.exponent += 31; /* the longest side, 2^32 steps of the error, becomes 1 to 2 */
+    /* the longest side of the box is 2^32 steps of the error, so its scaled length is 1 to 2 */
+    b.exponent += 31;
     for (int k = 0; k < 3; k++)
         b.size[k] = ldexp(b.box.size[k], -b.exponent);
     b.threads = ebpo_thread_count(threads);
@@ -902,7 +915,8 @@ ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads, const ebpo_pro
 
 /* --- files --- */
 
-/* Adds the surface to a tree that can have one and has none. */
+/* Adds the surface to a tree that has the mesh and no pruned nodes, unless the tree already has its
+ * surface. */
 static ebpo_status add_surface(ebpo_tree *tree, unsigned threads, ebpo_error *error)
 {
     const ebpo_info *info = &tree->info;

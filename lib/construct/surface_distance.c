@@ -1,14 +1,14 @@
 /* Bounds the greatest distance of the points of a surface from another surface.
  *
- * The distance of a point from one triangle is a convex function, so over another triangle its
- * maximum is at a corner. Over a triangle of the first surface, the distance is therefore at most
- * the greatest distance of the triangle's corners from one triangle of the second surface. It is
- * also at most the distance of the triangle's centre plus its radius (the greatest distance of a
- * corner from the centre). The triangle is cut until one of these bounds is close enough to the
- * greatest distance of a point that was found so far. It is cut by the sides of the prism over a
- * near triangle of the second surface: in planes that both surfaces divide into slivers, halving
- * alone would need very many halves until each is near one triangle. If this is not possible, it is
- * halved. The second surface is stored in a complete binary tree of boxes. */
+ * The distance of a point from a fixed triangle is a convex function of the point, so over another
+ * triangle it is greatest at a corner. Let T be a triangle of the first surface. The distance of
+ * the points of T from the second surface has two upper bounds: the greatest distance of the
+ * corners of T from one triangle of the second surface; and the distance of the centre of T plus
+ * the radius of T (the greatest distance of a corner from the centre). T is cut until one of these
+ * bounds is close enough to the greatest distance of a point that was found so far. If possible, T
+ * is cut by the sides of the prism over a near triangle of the second surface; otherwise it is
+ * halved. Halving alone would make very many parts if both surfaces divide a plane into slivers.
+ * The second surface is stored in a complete binary tree of boxes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,11 +20,11 @@
 #include "geometry/vec3.h"
 
 /* LEAF_TRIANGLES: number of triangles of a leaf of the box tree. DEEPEST: maximum number of times
- * that a triangle is cut. PRISM_DEEPEST: triangles that were cut so many times are only halved,
- * because each cut at a prism moves points by a rounding error. SAMPLED: the distance of a vertex
- * of every SAMPLED-th triangle is computed first. */
+ * that a triangle is cut. PRISM_DEEPEST: after this number of cuts, triangles are only halved,
+ * because each cut by a prism moves points by a rounding error. SAMPLED: at the beginning, the
+ * distance of one vertex of every SAMPLED-th triangle is computed. */
 enum { LEAF_TRIANGLES = 4, DEEPEST = 64, PRISM_DEEPEST = 20, SAMPLED = 8 };
-/* allowed ratio of the bound and the greatest distance of a point */
+/* allowed ratio of the bound and the greatest distance of a point that was found */
 static const double CLOSE_ENOUGH = 1.05;
 
 typedef struct bounds {
@@ -34,8 +34,8 @@ typedef struct bounds {
 /* The box tree of a surface. */
 typedef struct search {
     const ebpo_patch_mesh *mesh;
-    /* [2 * leaves] node 1 is the root; node i has the children 2 i and 2 i + 1; the nodes from
-     * `leaves` on are leaves */
+    /* [2 * leaves] boxes. Node 1 is the root, node i has the children 2*i and 2*i+1, and the nodes
+     * from `leaves` on are leaves; node 0 is not used */
     bounds *node;
     uint64_t leaves; /* number of leaves, a power of two */
 } search;
@@ -53,7 +53,7 @@ static void get_corner(const ebpo_patch_mesh *mesh, uint64_t triangle, int k, do
 
 static double clamp_share(double t) { return t < 0 ? 0 : t > 1 ? 1 : t; }
 
-/* Returns the squared distance of p from the segment of the points a + t d, 0 <= t <= 1. */
+/* Returns the squared distance of p from the segment of the points a + t d with 0 <= t <= 1. */
 static double segment_square(const double p[3], const double a[3], const double d[3])
 {
     double v[3], length = ebpo_vec3_dot(d, d);
@@ -64,8 +64,8 @@ static double segment_square(const double p[3], const double a[3], const double 
     return ebpo_vec3_dot(v, v);
 }
 
-/* Returns the squared distance of p from a point of the triangle that is nearest to p, except for
- * rounding errors. */
+/* Returns the squared distance of p from a point of triangle t. Except for rounding errors, this
+ * point is the nearest one to p. */
 static double triangle_square(const double p[3], const double t[3][3])
 {
     double edge[3][3], n[3], v[3];
@@ -180,7 +180,8 @@ static hit find_nearest(const search *s, const double p[3], uint64_t guess, doub
     return best;
 }
 
-/* Returns the greatest squared distance of three points from a triangle. */
+/* Returns the greatest squared distance of the three points `p` from a triangle of the second
+ * surface. */
 static double corners_square(const search *s, uint64_t triangle, double p[3][3])
 {
     return ebpo_max3(square_to(s, triangle, p[0]), square_to(s, triangle, p[1]),
@@ -191,28 +192,30 @@ typedef struct bounding {
     search to;          /* the second surface */
     double point_most;  /* greatest distance of a point that was found so far */
     double fine, known; /* as for ebpo_bound_distance */
-    double bound;       /* bound of the triangles so far */
-    uint64_t guess;     /* a triangle of the second surface that was near the last triangle */
+    double bound;       /* upper bound of the distance over the triangles so far */
+    /* a triangle of the second surface that was near the triangle processed last */
+    uint64_t guess;
 } bounding;
 
-/* Returns the greatest bound that is close enough to the greatest distance of a point so far. */
+/* Returns the greatest value that is sufficient as a bound, for the greatest distance of a point so
+ * far. */
 static double enough_of(const bounding *b)
 {
     return fmax(b->known, fmax(b->point_most * CLOSE_ENOUGH, b->point_most + b->fine));
 }
 
-/* Maximum number of a polygon's corners. A plane cuts a polygon of n corners into parts of at most
- * 3 n / 2 corners, because rounding errors can make the corners of a thin polygon alternate between
- * the sides. So after the first, second and third plane, a part of a triangle has at most 4, 6 and
- * 9 corners. */
+/* Maximum number of a polygon's corners. Rounding errors can make the corners of a thin polygon
+ * alternate between the sides of a plane. So a plane can cut a polygon of n corners into parts of
+ * up to 3 n / 2 corners. After the first, second and third plane, a part of a triangle has at most
+ * 4, 6 and 9 corners. */
 enum { CORNERS = 9 };
 typedef struct polygon {
     int count;
     double at[CORNERS][3];
 } polygon;
 
-/* Cuts a polygon by the plane through the point `on` with normal n. Appends the part in direction n
- * to `front`, and the other part to `back`; both are empty before. */
+/* Cuts a polygon by the plane through the point `on` with normal n. Adds the part in direction n to
+ * `front`, and the other part to `back`. Both must be empty before the call. */
 static void cut_polygon(const polygon *p, const double n[3], const double on[3], polygon *front,
                         polygon *back)
 {
@@ -238,7 +241,8 @@ static void cut_polygon(const polygon *p, const double n[3], const double on[3],
 
 static void bound_triangle(bounding *b, double p[3][3], int depth);
 
-/* Cuts a polygon into triangles and bounds the distance over them. */
+/* Cuts a polygon into triangles, and bounds the distance over these triangles. `depth`: number of
+ * cuts before. */
 static void bound_polygon(bounding *b, const polygon *p, int depth)
 {
     for (int i = 2; i < p->count; i++) {
@@ -250,11 +254,12 @@ static void bound_polygon(bounding *b, const polygon *p, int depth)
     }
 }
 
-/* Cuts triangle p by the sides of the prism over triangle `near`: the three planes that contain its
- * edges and are perpendicular to it. The part inside the prism is bounded by the distances of its
- * corners from `near`. The parts outside are bounded as further triangles. Returns false and
- * changes nothing if the centre of p is outside the prism (then the part inside may be empty), or
- * if a corner of the part inside is too far from `near`. */
+/* Cuts triangle p by the sides of the prism over triangle `near`. These are the three planes that
+ * contain the edges of `near` and are perpendicular to it. The part of p inside the prism is
+ * bounded by the distances of its corners from `near`. The parts outside the prism are divided into
+ * triangles, which are bounded by bound_triangle. Returns false and changes nothing if the centre
+ * of p is outside the prism, because the part inside may then be empty. Returns false also if a
+ * corner of the part inside is too far from `near`. */
 static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], uint64_t near,
                            int depth)
 {
@@ -339,8 +344,8 @@ static void bound_triangle(bounding *b, double p[3][3], int depth)
     }
 }
 
-/* Bounds the distance over triangle t of `a`. First tries the triangles of `b` that were near the
- * neighbours of t: `near` has a triangle for each vertex of `a`, or UINT64_MAX. */
+/* Bounds the distance over triangle t of `a`. First tries the triangles of the second surface that
+ * were near the neighbours of t. `near`: [vertex of a] such a triangle, or UINT64_MAX. */
 static void bound_from_neighbours(bounding *b, const ebpo_patch_mesh *a, uint64_t t, uint64_t *near)
 {
     const uint32_t *corners = a->triangle + 3 * t;
@@ -380,7 +385,8 @@ ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh 
     }
     for (uint64_t v = 0; v < a->vertex_count; v++)
         near[v] = UINT64_MAX;
-    /* distances of some points first, so that few triangles are cut without need */
+    /* the distances of some points are computed first: a greater point_most means that fewer
+     * triangles are cut */
     for (uint64_t t = 0; t < a->triangle_count; t += SAMPLED) {
         uint32_t v = a->triangle[3 * t];
         hit h = find_nearest(&all.to, a->vertex[v].at, all.guess, 0);

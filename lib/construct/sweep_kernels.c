@@ -1,7 +1,7 @@
-/* The two kernels of sweep.h, four doubles at a time: the first finds the planes that a point is
- * above, the second finds the greatest value among points. meson.build compiles this file once for
- * each instruction set. The operations and their order are the same in each variant, so the results
- * are the same; core/cpu.h chooses the variant. */
+/* Implements the two kernels of sweep.h, which process four doubles at a time. The first kernel
+ * finds the planes below a point. The second kernel finds the greatest value among points.
+ * meson.build compiles this file once for each instruction set. The operations and their order are
+ * the same in each variant, so the results are the same; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"
@@ -14,7 +14,8 @@ typedef v4d v4d_stored __attribute__((aligned(8), may_alias));
 
 static v4d load_four(const double *at) { return *(const v4d_stored *)at; }
 
-/* Adds first + i to the list for each bit i. Returns the new count. */
+/* Adds first + i to the list for each bit i that is set in `bits`. Returns the new count, which
+ * also counts elements beyond `capacity`. */
 static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int count)
 {
     for (; bits; bits &= bits - 1, count++)

@@ -1,11 +1,12 @@
 /* Computes envelopes as in the theses, for comparison: the volume and the number of planes of each
  * level, without a file.
  *
- * In a file, a node has at most 255 planes, and candidates with equal normals are dropped before a
- * percentage of the candidates is chosen. Neither thesis has these limits (BP 2008, 3.5.1: 2,955
- * planes at a root). Here, all candidates of a node count, in the order of the node's faces or
- * children, and polytopes have any number of faces. Normals are rounded as in files, offsets are
- * not. Leaves are made by one of three criteria (BP 2008, 3.3.1, algorithm 4). */
+ * A candidate is a plane that may be chosen. In a file, a node has at most 255 planes, and only one
+ * of several candidates with equal normals is kept before a percentage of the candidates is chosen.
+ * The theses do not have these limits (BP 2008, 3.5.1: 2,955 planes at a root). Here, all
+ * candidates of a node are kept, in the order of the node's faces or children, and polytopes have
+ * any number of faces. Normals are rounded as in files; offsets are not rounded. Leaves are made by
+ * one of three criteria (BP 2008, 3.3.1, algorithm 4). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -34,8 +35,8 @@ bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t
     return b->thesis->coalesce == EBPO_COALESCE_MEAN ? sum < limit * leaves : sum < limit;
 }
 
-/* Cuts the envelope by the chosen candidates. Sets chosen[i] to false for the candidates that cut
- * nothing off. Returns the number of candidates that are still chosen, or -1 when out of memory. */
+/* Cuts the envelope by the chosen candidates. Sets chosen[i] to false if candidate i cuts nothing
+ * off. Returns the number of candidates that are still chosen, or -1 when out of memory. */
 static int64_t cut_by_chosen(ebpo_large_polytope *envelope, const ebpo_choice *choice, bool *chosen)
 {
     int64_t planes = 0;
@@ -57,8 +58,8 @@ static int64_t cut_by_chosen(ebpo_large_polytope *envelope, const ebpo_choice *c
     return planes;
 }
 
-/* Adds to `out` the corners of those faces of the envelope that planes made (tag >= 0), and not
- * those of the cell's faces. Returns false when out of memory. */
+/* Adds to `out` the corners of those faces of the envelope that planes made (tag >= 0). Corners
+ * that only faces of the cell have (tag < 0) are not added. Returns false when out of memory. */
 static bool give_corners(const ebpo_large_polytope *envelope, ebpo_handover *out)
 {
     const ebpo_large_shape *s = &envelope->now;
@@ -85,8 +86,8 @@ static bool give_planes(const bool *chosen, const ebpo_handover *given, ebpo_han
     return true;
 }
 
-/* Adds a leaf, or a gray node if `leaf_faces` is 0, to the sums of its level. `share`: volume of
- * the envelope in cells. */
+/* Adds a node to the sums of its level. `leaf_faces`: number of faces of a leaf; 0 for a gray node.
+ * `share`: volume of the node's envelope, divided by the volume of its cell. */
 static void add_node(const ebpo_builder *b, ebpo_thesis_level *l, int level, uint64_t leaf_faces,
                      uint64_t planes, double share)
 {

@@ -2,10 +2,12 @@
  * face misses the cell, and clips the face to the cell.
  *
  * All tests use a bound of the rounding error and are conservative, so no exact arithmetic is
- * needed. (If a list has a face that does not touch the cell, this costs little time; if a face is
- * missing, the file is wrong.) The tests use the face's bounding box, its plane, and the cross
- * products of its edges with the axes (separating axes). Clipping enlarges the cell by the bound,
- * so that the clipped polygon of a face that touches the closed cell is never empty. */
+ * needed: a test may keep a face that does not touch the cell, but never drops a face that touches
+ * it. (If the list of a cell has a face that does not touch the cell, this costs little time. If a
+ * face were missing, the file would be wrong.) The tests use the face's bounding box, its plane,
+ * and the cross products of its edges with the axes (separating axes). Clipping enlarges the cell
+ * by the bound, so that the clipped polygon of a face that touches the closed cell is never empty.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,9 +17,9 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
-/* Converts a face to cell coordinates, and returns the greatest absolute coordinate, at least 1.
- * Corners and sizes of cells are exact, so a coordinate has one rounding in the subtraction and one
- * in the division. */
+/* Converts a face to cell coordinates `x`. Returns their greatest absolute value, or 1 if this is
+ * greater. Corners and sizes of cells are exact, so a coordinate is rounded only twice: in the
+ * subtraction and in the division. */
 static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                       double x[3][3])
 {
@@ -34,11 +36,11 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return greatest;
 }
 
-/* Returns the slack: the bound of the rounding error of a coordinate. `greatest` (M in the
- * following) is the result of to_cell. With u = 2^-53, the errors are 2.01 u M from to_cell and
- * at most 8 u M for each of six clips; 128 u M is more than their sum. The slack is the same for
- * all faces with coordinates up to 2, so that a common point of two faces is computed identically
- * from both. */
+/* Returns the slack: an upper bound of the rounding error of a coordinate. `greatest`: result of
+ * to_cell, M in the following. With u = 2^-53, the error of to_cell is at most 2.01 u M, and the
+ * error of each of six clips is at most 8 u M. The value 128 u M is more than the sum of these
+ * errors. The slack is the same for all faces with coordinates up to 2, so that a common point of
+ * two faces is computed identically from both. */
 static double slack_for(double greatest) { return greatest <= 2 ? 0x1p-45 : greatest * 0x1p-46; }
 
 /* Clips a polygon by the half-space of the points with sign * x[axis] <= limit. Returns the number
@@ -56,7 +58,9 @@ static int clip_cell_face(double in[9][3], int count, int axis, double sign, dou
             kept++;
         }
         if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
-            bool back = da > 0; /* interpolate from the inner end, whatever the edge's direction */
+            /* interpolates from the end inside the half-space, so that the result does not depend
+             * on the edge's direction */
+            bool back = da > 0;
             const double *from = back ? b : a, *to = back ? a : b;
             double t = back ? db / (db - da) : da / (da - db);
             for (int k = 0; k < 3; k++)
@@ -90,7 +94,7 @@ int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle 
     return count;
 }
 
-/* A face in cell coordinates, for tests of separating axes. */
+/* A face in cell coordinates, for tests of separating axes: corners, edges and normal. */
 typedef struct separation {
     double x[3][3], edge[3][3], normal[3];
     double greatest; /* greatest absolute coordinate, at least 1 */
@@ -104,10 +108,11 @@ static void separation_prepare(separation *s)
     ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
 }
 
-/* Returns true if the plane of the face, or a cross product of one of its edges with an axis,
- * separates the face from the cube around `centre` whose sides have the length 2 * half. The
- * rounding errors, with coordinates up to M and u = 2^-53, are 4 u M for edges, below 64 u M^2 for
- * cross products, and below 512 u M^3 for the plane; the tolerances are upper bounds. */
+/* Returns true if the plane of the face, or a plane whose normal is the cross product of one of its
+ * edges with an axis, separates the face from the cube around `centre` whose sides have the length
+ * 2 * half. Let M be the greatest coordinate and u = 2^-53. The rounding errors are at most 4 u M
+ * for edges, 64 u M^2 for cross products, and 512 u M^3 for the plane. The tolerances in this
+ * function are at least as large. */
 static bool is_separated(const separation *s, const double centre[3], double half)
 {
     double m = s->greatest, tolerance = 0x1p-44 * m * m * m;
@@ -133,8 +138,8 @@ static bool is_separated(const separation *s, const double centre[3], double hal
     return false;
 }
 
-/* Returns a mask of the octants that the face's bounding box touches, by comparing coordinates with
- * the exact planes between the octants. */
+/* Returns a mask of the octants that the face's bounding box touches. The face's coordinates are
+ * compared with the exact coordinates of the planes between the octants. */
 static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
     static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
