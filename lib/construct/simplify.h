@@ -40,7 +40,7 @@ void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh);
 EBPO_MUST_USE ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error);
 
 /* Sets *out to an upper bound of the greatest distance of a point of `a` from `b`. `b` must have
- * triangles. The function stops to improve the bound when it is at most `known`, or exceeds the
+ * triangles. The function stops improving the bound when it is at most `known`, or exceeds the
  * distance by at most 5 % or by at most `fine`. All distances have the unit of the coordinates. The
  * caller adds the rounding error, about 2^-45 of the greatest coordinate. Returns EBPO_E_MEMORY.
  * Any thread. */

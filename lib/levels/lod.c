@@ -1,12 +1,13 @@
 /* Computes the polygons of a level: the envelopes of its nodes, as triangles.
  *
- * The walk goes from the root down; each node's envelope is cut from the parent's envelope by the
- * node's planes. A leaf's planes come from the file, or from its faces (construct/leaf_planes.c),
- * or the leaf keeps the part of its parent's envelope in its cell. One thread first walks the top
- * of the tree, down to the split level; all threads then walk the independent subtrees below this
- * level. The split level depends only on the tree, and the results of the walks are joined in a
- * fixed order (by level, then by octcode, the locational code). So the number of threads does not
- * change the result.
+ * The nodes are visited from the root down. Each node's envelope is cut from the parent's envelope
+ * by the node's planes. A leaf's planes come from the file, or are derived from its faces
+ * (construct/leaf_planes.c). If the file has neither, the leaf's envelope is the part of its
+ * parent's envelope in its cell. First, one thread visits the nodes down to the split level. Then
+ * all threads visit the independent subtrees below this level. The visit of such a part of the tree
+ * is called a walk. The split level depends only on the tree, and the results of the walks are
+ * joined in a fixed order (by level, then by octcode, the locational code). So the number of
+ * threads does not change the result.
  *
  * Sections: polyhedra as triangles; the model, which a walk reads; leaves; colours of nodes; the
  * walk. */
@@ -47,8 +48,8 @@ static void polyhedra_free(ebpo_polyhedra *piece)
     piece->node_count = piece->node_capacity = piece->polygon_count = piece->polygon_capacity = 0;
 }
 
-/* Appends a polygon as a fan of triangles. `loop` has the polygon's vertices as indices in the
- * polytope, `new_index` the indices of these vertices in the piece. */
+/* Appends a polygon as a fan of triangles. `loop`: [corners] the polygon's vertices as indices in
+ * the polytope. `new_index`: [vertex of the polytope] index in the piece. */
 static void add_fan(ebpo_polyhedra *piece, const uint32_t *new_index, const uint16_t *loop,
                     int corners)
 {
@@ -236,7 +237,7 @@ static uint64_t count_listed(const ebpo_lod_model *model)
     return count;
 }
 
-/* Writes the file indices of the faces in the lists of all leaves to `out`. */
+/* Writes the faces in the lists of all leaves to `out`, as indices in the file. */
 static void list_faces(const ebpo_lod_model *model, uint32_t *out)
 {
     for (int i = 0; i <= model->target; i++) {
@@ -257,7 +258,7 @@ static int compare_indices(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sorts indices and removes repetitions. Returns how many different indices there are. */
+/* Sorts indices, and removes repeated ones. Returns the number of different indices. */
 static uint64_t sort_unique(uint32_t *indices, uint64_t count)
 {
     uint64_t kept = 0;
@@ -268,15 +269,15 @@ static uint64_t sort_unique(uint32_t *indices, uint64_t count)
     return kept;
 }
 
-/* Returns the position of an index in a sorted array, or UINT32_MAX if the array does not have it.
- */
+/* Returns the position of `index` in a sorted array, or UINT32_MAX if the array does not contain
+ * it. */
 static uint32_t position_of(uint32_t index, const uint32_t *sorted, uint64_t count)
 {
     const uint32_t *at = bsearch(&index, sorted, count, sizeof *sorted, compare_indices);
     return at ? (uint32_t)(at - sorted) : UINT32_MAX;
 }
 
-/* Reads the faces of out->picked and their vertices as out->mesh. */
+/* Sets out->mesh to the faces that out->picked lists, with only their vertices. */
 static ebpo_status pick_mesh(ebpo_lod_model *out, ebpo_chunks *chunks, unsigned threads,
                              ebpo_error *error)
 {
@@ -372,8 +373,9 @@ static bool copy_face(const ebpo_lod_model *model, uint64_t face, ebpo_triangle 
     return true;
 }
 
-/* Collects the leaf's faces in order of ascending indices, as the construction did. Referenced
- * faces (which an earlier leaf of the file lists, too) have lower indices than new faces. */
+/* Collects the leaf's faces in the order of ascending indices in the file, as the construction did.
+ * Referenced faces (faces that an earlier leaf of the file also lists) have lower indices than new
+ * faces, so they come first. */
 ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                 ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error)
 {
@@ -425,9 +427,8 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
                           ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
                                                     winding[leaf], scratch->faces, count)
                           : 0;
-    /* The 0 is epsilon, the smallest effect of a plane that is kept. Derived planes need no
-     * storage, so no plane is omitted. The volumes in the file's header are computed in this way.
-     */
+    /* epsilon is 0: derived planes need no storage, so no plane is omitted because it removes
+     * little volume. The volumes in the file's header are computed in the same way. */
     *plane_count =
         ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
     return EBPO_OK;
@@ -454,8 +455,8 @@ static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint
 
 /* --- colours of nodes --- */
 
-/* Finds the colour of the last gray node on the path from the root to a node. This gray node is the
- * node itself or its parent. Returns false if the file has no colour for the gray node. */
+/* Finds the colour of a node: its own colour if the node is gray, and otherwise the colour of its
+ * parent. Returns false if the file has no such colour. */
 static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
 {
     int depth = ebpo_cell_of_octcode(octcode).level;
@@ -522,12 +523,13 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
 
 /* --- the walk --- */
 
-/* A level with this many gray nodes has enough subtrees to keep all threads busy. */
+/* The split level is the first level with at least this number of gray nodes, so that there are
+ * enough subtrees for all threads. */
 enum { SEEDS_WANTED = 128 };
 
-/* For each node on the path to the current node, parts of its envelope: a half (cut at the middle
- * of the cell along z), a quarter (cut also along y), and an eighth (also along x). They are too
- * large for the stack. */
+/* For each node on the path to the current node, three parts of its envelope: a half (cut at the
+ * middle of the cell along z), a quarter (also cut along y), and an eighth (also cut along x). They
+ * are too large for the stack. */
 typedef ebpo_polytope path_halves[EBPO_LEVELS_MAX][3];
 
 /* A gray node at the split level, where the walk of a subtree begins. */
@@ -544,7 +546,8 @@ typedef struct job {
     int split;       /* level at which the first walk creates seeds */
     seed *seeds;
     uint64_t seed_count;
-    /* [1 + seed_count] the pieces of the walk from the root, then of the walk from each seed */
+    /* [1 + seed_count] results of the walk from the root, then of the walk from each seed; one
+     * piece (levels/lod.h) for each level */
     ebpo_polyhedra (*pieces)[EBPO_LEVELS_MAX];
     ebpo_leaf_scratch *scratch; /* [threads] */
     path_halves *halves;        /* [threads] */
@@ -554,7 +557,7 @@ typedef struct job {
 
 typedef struct walker {
     job *j;
-    ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] the walk's piece of each level */
+    ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] result of the walk, one piece for each level */
     ebpo_leaf_scratch *scratch;
     ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] see path_halves */
     int seed_level; /* gray nodes of this level become seeds; -1: the walk makes no seeds */
@@ -576,15 +579,16 @@ static ebpo_status add_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cel
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent);
 
-/* Returns true for a pruned node (whose children are not in the file). Its envelope
- * represents it at all deeper levels. Always false at the target level. `gray` is the node's rank
- * among the gray nodes of `level`. */
+/* Returns true if a node above the target level is pruned (its children are not in the file). At
+ * all deeper levels, the envelope of a pruned node takes the place of its children's envelopes.
+ * `gray` is the node's rank among the gray nodes of `level`. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;
 }
 
-/* Visits a gray node; `envelope` is the part of the parent's envelope in its cell. */
+/* Visits a gray node. On entry, `envelope` is the part of the parent's envelope in the node's cell;
+ * the function cuts this polytope. */
 static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_polytope *envelope)
 {
     const ebpo_level *level = &w->j->model->level[cell.level];
@@ -604,7 +608,8 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
     return visit_group(w, gray, cell, envelope);
 }
 
-/* Visits a gray node or leaf; `envelope` is the part of the parent's envelope in its cell. */
+/* Visits a gray node or leaf, given by its group and octant. On entry, `envelope` is the part of
+ * the parent's envelope in the node's cell; the function cuts this polytope. */
 static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_cell cell,
                               ebpo_polytope *envelope)
 {
@@ -639,8 +644,9 @@ static ebpo_status visit_root(walker *w)
     }
 }
 
-/* Visits the eight children of a node in octant order. Their envelopes are cut from the parent's
- * envelope along z, y and x; siblings share these halves, as in the construction. */
+/* Visits the eight children of a node in octant order. `group`: index of their group in its level.
+ * The children's envelopes are cut from the parent's envelope along z, y and x. Siblings share the
+ * halves and quarters, as in the construction. */
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent)
 {
@@ -672,8 +678,8 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
     for (uint64_t i = begin; i < end; i++) {
         walker w = { j, j->pieces[1 + i], &j->scratch[worker], j->halves[worker], -1, error };
         seed *s = &j->seeds[i];
-        /* The seeds are all gray nodes of their level in octcode order, so the children of seed i
-         * are group i of the next level. */
+        /* The seeds are all gray nodes of the split level in the order of octcodes, so the children
+         * of seed i are group i of the next level. */
         ebpo_status status = is_pruned(j->model, s->cell.level, i)
                                  ? add_polytope(&w, &s->envelope, s->cell, EBPO_GRAY)
                                  : visit_group(&w, i, s->cell, &s->envelope);
@@ -718,7 +724,7 @@ static ebpo_status job_walk(job *j, unsigned threads, const ebpo_progress *progr
 }
 
 /* Joins the pieces, level by level. Within a level, the piece of the walk from the root comes
- * first. The pieces of the seeds follow in the order of the seeds. */
+ * first. The pieces of the walks from the seeds follow, in the order of the seeds. */
 static ebpo_status job_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                             ebpo_error *error)
 {
@@ -762,8 +768,8 @@ void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
 }
 
 /* Sets the winding numbers of leaves and black nodes. `nodes` is sorted by level, then by octcode,
- * and has every leaf and black node of a level. So the number of leaves (or black nodes) before a
- * node in its level is the node's rank. */
+ * and has every leaf and every black node of these levels. So the rank of a leaf is the number of
+ * leaves before it in its level; the same is true for black nodes. */
 static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     uint64_t leaf = 0, black = 0;

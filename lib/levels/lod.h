@@ -1,5 +1,5 @@
-/* Declares what the computation of a level's polygons (lod.c) shares with other files: polyhedra as
- * triangles, the model that a walk reads, and the planes of leaves. */
+/* Declares data and functions of lod.c, which computes the polygons of a level, for other files:
+ * polyhedra as triangles, the model that is read, and the planes of leaves. */
 #ifndef EBPO_LEVELS_LOD_H
 #define EBPO_LEVELS_LOD_H
 
@@ -13,7 +13,8 @@
 
 /* --- polyhedra as triangles, collected piece by piece and joined in a fixed order --- */
 
-/* A piece: the polyhedra of the nodes that one walk of the octree visits at one level. */
+/* A piece: the polyhedra of nodes of one level, in the order in which one thread visits the nodes.
+ */
 typedef struct ebpo_polyhedra {
     double *xyz;     /* [vertex_count][3] */
     uint32_t *faces; /* [face_count][3], indices within the piece */
@@ -22,25 +23,27 @@ typedef struct ebpo_polyhedra {
     ebpo_lod_node *nodes; /* [node_count] nodes with polyhedra */
     uint8_t *corners;     /* [polygon_count] number of corners of each polygon */
     uint64_t node_count, node_capacity, polygon_count, polygon_capacity;
-    double volume; /* of all polyhedra, in model units */
+    double volume; /* volume of all polyhedra, in the cubed unit of the model */
 } ebpo_polyhedra;
 
-/* Appends the polytope (cell coordinates) of a cell's node as triangle fans. With `cell_faces`
+/* Appends the polytope of a node to the piece, with its polygons as triangle fans. `p`: the
+ * polytope in cell coordinates. `cell`, `type`: cell and type of the node. If `cell_faces` is
  * false, omits the polygons on cell faces. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p,
                                              const ebpo_box *box, ebpo_cell cell,
                                              ebpo_node_type type, bool cell_faces,
                                              ebpo_error *error);
 
-/* Joins `count` pieces, in order, to a mesh of double vertices, and frees the pieces. Returns
- * EBPO_E_LIMIT for more than 2^32 - 2 vertices or faces. `nodes` may be NULL; otherwise all pieces
- * must have nodes. Winding numbers in `nodes` are 0. */
+/* Joins `count` pieces, in order, to a mesh with double coordinates, and frees the pieces. Returns
+ * EBPO_E_LIMIT for more than 2^32 - 2 vertices or faces. `nodes`: gets the nodes of all pieces,
+ * with winding numbers of 0; NULL if nodes are not wanted. If it is not NULL, `wants_nodes` must be
+ * true in all pieces. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *nodes,
                                               ebpo_polyhedra *const *pieces, uint64_t count,
                                               ebpo_error *error);
 
 /* --- the model: levels, ranks (positions of nodes in the arrays of a level), and the faces from
- * which leaf planes are derived; a walk only reads it --- */
+ * which leaf planes are derived; several threads may read it at the same time --- */
 
 typedef enum ebpo_leaf_source {
     EBPO_LEAF_STORED,  /* planes from the file */
@@ -57,9 +60,9 @@ typedef struct ebpo_lod_model {
     ebpo_leaf_source leaf_source;
     ebpo_level level[EBPO_LEVELS_MAX];       /* [target + 1] */
     ebpo_level_ranks ranks[EBPO_LEVELS_MAX]; /* [target + 1] */
-    ebpo_mesh mesh;                          /* empty except for EBPO_LEAF_DERIVED */
-    /* [mesh.face_count] indices in the file of the faces of `mesh`, ascending, if `mesh` has only
-     * the faces that leaves list; NULL: `mesh` has all faces of the file */
+    ebpo_mesh mesh;                          /* empty unless leaf_source is EBPO_LEAF_DERIVED */
+    /* NULL: `mesh` has all faces of the file. Otherwise `mesh` has only the faces that leaves list,
+     * and this array, [mesh.face_count], has their indices in the file, ascending */
     uint32_t *picked;
 } ebpo_lod_model;
 
@@ -69,32 +72,35 @@ EBPO_MUST_USE ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_fi
                                               ebpo_error *error);
 void ebpo_lod_model_free(ebpo_lod_model *model);
 
-/* Returns the model in the form in which cursors and searches read nodes. */
+/* Returns the model's levels and ranks as the structure from which cursors and searches read nodes.
+ */
 static inline ebpo_level_nodes ebpo_lod_model_nodes(const ebpo_lod_model *model)
 {
     return (ebpo_level_nodes){ model->level, model->ranks, model->target + 1 };
 }
 
-/* Scratch memory for the faces of one leaf; each thread needs its own. Initialise with zeros; free
- * with free(faces). */
+/* Work space for the faces of one leaf; each thread needs a separate one. Initialise it with zeros,
+ * and free it with free(faces). */
 typedef struct ebpo_leaf_scratch {
     ebpo_triangle *faces;
     uint64_t capacity;
 } ebpo_leaf_scratch;
 
-/* Collects the triangles that a leaf lists, in scratch->faces. leaf: its rank among the leaves of
- * the cell's level. */
+/* Sets scratch->faces to the faces that a leaf lists, and *count to their number. `leaf`: rank of
+ * the leaf among the leaves of the cell's level. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell,
                                               uint64_t leaf, ebpo_leaf_scratch *scratch,
                                               uint64_t *count, ebpo_error *error);
 
-/* Returns which corners of a leaf are inside the solid (bit i: corner i), for ebpo_leaf_planes.
- * `winding` is the winding number at the lowest corner of the leaf. */
+/* Returns a mask for ebpo_leaf_planes: bit i is set if corner i of a leaf's cell is inside the
+ * solid. `winding`: winding number at the lowest corner of the cell. `faces`: [count] the leaf's
+ * faces. */
 unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
                                  int32_t winding, const ebpo_triangle *faces, uint64_t count);
 
-/* Derives the planes of a leaf from its faces, as the codes codes[0 .. *plane_count - 1]. On entry
- * `envelope` is the parent's envelope cut to the leaf's cell, on return the leaf's envelope. */
+/* Derives the planes of a leaf from its faces, and writes their codes to codes[0 .. *plane_count -
+ * 1]. On entry, `envelope` is the parent's envelope cut to the leaf's cell; on return, it is the
+ * leaf's envelope. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell,
                                                uint64_t leaf, ebpo_leaf_scratch *scratch,
                                                ebpo_polytope *envelope,

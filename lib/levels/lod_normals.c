@@ -1,15 +1,16 @@
 /* Computes normals for the polygons of a level, for shading.
  *
- * A polygon on a plane of its node's envelope (a "plane polygon") is nearly parallel to the surface
- * and keeps the plane's direction. A polygon on a cell face is a step between two envelopes and
- * does not represent the surface. It gets the direction of the plane polygons around it.
+ * A polygon on a plane of its node's envelope (a "plane polygon") is nearly parallel to the
+ * surface, so its normal is the plane's normal. A polygon on a cell face is a step between two
+ * envelopes and does not represent the surface, so its normal is computed from the plane polygons
+ * around it.
  *
- * The directions for cell faces are computed in six passes, one for each side of cells (lower x,
- * upper x, ...). In each pass, every corner of every drawn cell gets a normal: the mean of the
- * normals, weighted by area, of the plane polygons of the nodes around the corner. The mean only
- * includes polygons that face the side of this pass, so polygons on the other side of a thin part
- * are ignored. A polygon on this side of a cell gets a normal that is interpolated linearly from
- * the normals at the cell's corners. */
+ * The normals of polygons on cell faces are computed in six passes, one for each side of cells
+ * (lower x, upper x, ...). In each pass, every corner of every drawn cell gets a normal: the mean
+ * of the normals, weighted by area, of the plane polygons of the nodes around the corner. The mean
+ * includes only polygons whose normals point to the side of this pass, so polygons on the other
+ * side of a thin part are ignored. A polygon on this side of a cell gets a normal that is
+ * interpolated linearly from the normals at the cell's corners. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -26,16 +27,18 @@
 
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 
-static const uint32_t none = UINT32_MAX; /* not a corner index */
+static const uint32_t none = UINT32_MAX; /* no index of a corner */
 /* A polygon faces a side if the cosine of the angle between the polygon's normal and the side's
- * outward normal is greater than this. The value is below 0, so a polygon may be turned away
- * slightly. */
+ * outward normal is greater than this value. The value is below 0, so the angle may be slightly
+ * more than 90 degrees. */
 static const double least_cosine = -0.3;
 
 typedef struct polygon {
-    double area[3]; /* normal; its length is twice the polygon's area */
+    /* area vector: the polygon's normal, whose length is twice the polygon's area */
+    double area[3];
     double middle[3];
-    int side; /* 2 * axis, plus 1 for the upper side; or ON_PLANE */
+    /* side of the cell: 2 * axis, plus 1 for the upper side; ON_PLANE: the polygon is on a plane */
+    int side;
 } polygon;
 
 typedef struct lighting {
@@ -43,14 +46,16 @@ typedef struct lighting {
     const ebpo_lod_nodes *nodes;
     polygon *polygons;             /* [polygon_count] */
     uint32_t (*corner_of_node)[8]; /* [node_count] index of each corner of the node's cell */
-    double (*sum)[4]; /* [corner_count] current pass: 0 to 2: sum of area vectors; 3: of lengths */
-    uint64_t *keys;   /* [corner_count] positions (position_key) */
+    /* [corner_count] in the current pass: sum of area vectors (0 to 2), sum of their lengths (3) */
+    double (*sum)[4];
+    uint64_t *keys; /* [corner_count] positions (position_key) */
     uint64_t corner_count, key_capacity;
 } lighting;
 
 /* --- polygons --- */
 
-/* Adds the area vector of a triangle: its normal, with twice the triangle's area as length. */
+/* Adds the area vector of a triangle to `area`: the triangle's normal, whose length is twice the
+ * triangle's area. */
 static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double area[3])
 {
     const double *a = mesh->xyz64 + 3 * (uint64_t)face[0], *b = mesh->xyz64 + 3 * (uint64_t)face[1],
@@ -68,9 +73,9 @@ static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsi
     return mesh->xyz64 + 3 * (uint64_t)v;
 }
 
-/* Returns the side of the cell that a polygon is on, or ON_PLANE. Corners on a cell face have
- * exactly the cell face's coordinate. The root cell has no neighbours, so polygons on its cell
- * faces count as planes. */
+/* Returns the side of the cell that contains a polygon, or ON_PLANE. Corners on a cell face have
+ * exactly the cell face's coordinate. There is no neighbour beyond a side of the root cell, so
+ * polygons on these sides count as plane polygons. */
 static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, const uint32_t *face,
                    unsigned corners)
 {
@@ -120,11 +125,12 @@ static uint64_t position_key(ebpo_cell cell, unsigned corner)
     return key;
 }
 
-/* Assigns an index to every corner position, and sets the corner indices of each node. Returns
- * false when out of memory. */
+/* Assigns an index to every position of a corner, and sets corner_of_node. Returns false when out
+ * of memory. */
 static bool number_corners(lighting *l)
 {
-    /* eight corners for each node; at most three quarters of the slots are used */
+    /* there are at most eight corners for each node, which fill at most three quarters of the slots
+     */
     uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), slot;
     uint32_t *table = ebpo_alloc(slots, sizeof *table);
     bool complete = table != NULL;
@@ -152,8 +158,8 @@ static bool number_corners(lighting *l)
 
 /* --- normals at the corners, for one side of cells --- */
 
-/* Sums the area vectors of a node's plane polygons that face a side in out[0..2], and the lengths
- * of these vectors in out[3]. */
+/* Sums over those plane polygons of a node that face a side. Sets out[0..2] to the sum of their
+ * area vectors, and out[3] to the sum of the lengths of these vectors. */
 static void sum_node(const polygon *p, uint32_t count, int side, double out[4])
 {
     double sign = side % 2 ? 1 : -1;
@@ -168,8 +174,7 @@ static void sum_node(const polygon *p, uint32_t count, int side, double out[4])
     }
 }
 
-/* Sums, for each corner, the normals of the plane polygons that face a side, over all nodes around
- * the corner. */
+/* Sets l->sum: for each corner, the sums of sum_node over all nodes around the corner. */
 static void sum_side(lighting *l, int side)
 {
     const polygon *p = l->polygons;
@@ -203,8 +208,8 @@ static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t corne
     }
 }
 
-/* Sets `out` to the direction, scaled to a length of 1. A direction of length 0 does not change
- * `out`. */
+/* Sets `out` to the direction, scaled to a length of 1. If the direction has the length 0, does not
+ * change `out`. */
 static void put_normal(const double direction[3], float out[3])
 {
     double length = sqrt(ebpo_vec3_dot(direction, direction));
@@ -242,7 +247,7 @@ static ebpo_status lighting_prepare(lighting *l, ebpo_error *error)
                                          nodes * (sizeof *l->corner_of_node + 8 * sizeof *l->sum));
 }
 
-/* Checks that the mesh has the triangles of these nodes. */
+/* Checks that the mesh has as many triangles as the polygons of the nodes. */
 static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
                                ebpo_error *error)
 {

@@ -2,15 +2,16 @@
  * programs that show or process a model while it arrives.
  *
  * Of a completed level, only the node types and the colours stay in memory, and the planes if
- * polygons are requested. These arrays are enough to walk down to the nodes of the next level. The
- * depth-first walk from the root visits groups (eight siblings), nodes of each type and planes of a
- * level in the order in which the file stores them. So the number of items visited before an item
- * is its position in the stored array, and no tables of positions are needed.
+ * polygons are requested. These arrays are enough to find the nodes of the next level by a
+ * depth-first walk from the root. The walk visits the groups (eight siblings) of a level, its nodes
+ * of each type and its planes in the order in which the file stores them. So the position of an
+ * item in its stored array is the number of such items that were visited before, and no tables of
+ * positions are needed.
  *
- * Half-spaces and polygons are converted from cell coordinates to model coordinates with bounded
- * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
- * Points on cell faces get the faces' exact coordinates, so that neighbours agree to the last bit.
- */
+ * Half-spaces and polygons are converted from cell coordinates to model coordinates. The offset of
+ * a half-space is enlarged by a bound of the rounding errors, so each point of the cell in the
+ * half-space of a plane's code is also in the delivered half-space. Points on cell faces get the
+ * faces' exact coordinates, so that neighbours agree to the last bit. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -32,16 +33,18 @@
 
 /* --- from cell to model coordinates --- */
 
-/* Let corner be the lowest corner of the cell, size its sides, t its shortest side, and
- * N = t n / size (for each coordinate). Then the half-space is
+/* Let p be a point in the model's coordinates, corner the lowest corner of the cell, size the
+ * lengths of its sides, t its shortest side, and N = t n / size (for each coordinate). Then the
+ * half-space of the plane code (n, d) is
  *     N . (p - corner) <= t d / 4096.
  * For any normal a, any factor f > 0, and p in the cell:
  *     a . p = a . corner + f N . (p - corner) + (a - f N) . (p - corner)
  *          <= a . corner + f t d / 4096 + sum |a - f N| size.
  * Here f is the computed 1 / |N| and a is the computed f N, so that |a - f N| <= 4 u |a|, where u
- * is DBL_EPSILON / 2. The other rounding errors of this function sum to less than 8 u S, where S is
- * sum |a| (|corner| + size). The evaluation of a . p adds another 4 u S. The offset is raised by
- * 32 u S, which covers all of these errors; the remaining margin covers underflow. */
+ * is DBL_EPSILON / 2. The sum of the other rounding errors of this function is less than 8 u S,
+ * where S is sum |a| (|corner| + size). A caller that evaluates a . p makes an error of at most 4 u
+ * S. The offset is raised by 32 u S, which is more than all of these errors, and by two small terms
+ * for underflow. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4])
 {
@@ -130,12 +133,13 @@ typedef struct level_walk_node {
 } level_walk_node;
 
 typedef struct level_walk {
-    /* [target + 1], owned by the caller; levels above the target provide only types, plane counts
-     * and planes */
+    /* [target + 1] owned by the caller; in levels above the target, only types, plane counts and
+     * planes are used */
     const ebpo_level *level;
-    int target, depth; /* level whose nodes are returned; level of the next visited node */
-    bool pruned;       /* the file is a subset: an empty group has no nodes */
-    struct {           /* state in each level */
+    /* target: level whose nodes are returned; depth: level of the next node to visit */
+    int target, depth;
+    bool pruned; /* the file is a subset with pruned nodes: their groups are empty */
+    struct {     /* [level] state of the walk */
         /* how many groups, nodes of each type, and planes of gray nodes and leaves were visited */
         uint64_t group, rank[4], plane, leaf_plane;
         unsigned octant; /* next octant of the group */
@@ -152,7 +156,7 @@ static void level_walk_begin(level_walk *walk, const ebpo_level *level, int targ
     walk->pruned = pruned;
 }
 
-/* Visits the next node of the level at `depth`; the caller ensures that there is one. */
+/* Visits the next node of level `depth`. The caller ensures that there is a next node. */
 static level_walk_node *visit_next_node(level_walk *w, int depth)
 {
     const ebpo_level *level = &w->level[depth];
@@ -175,12 +179,12 @@ static level_walk_node *visit_next_node(level_walk *w, int depth)
     return node;
 }
 
-/* Visits the next node of the target level; returns false after the last. */
+/* Sets *out to the next node of the target level. Returns false after the last node. */
 static bool level_walk_next(level_walk *w, level_walk_node *out)
 {
     for (;;) {
         int depth = w->depth;
-        if (w->at[depth].octant == ebpo_group_octants(depth)) { /* level 0 has one node */
+        if (w->at[depth].octant == ebpo_group_octants(depth)) { /* level 0 has one octant */
             if (depth == 0)
                 return false;
             w->at[depth].group++;
@@ -204,9 +208,8 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
     }
 }
 
-/* Returns the envelope of the last visited node at `depth`, and computes the envelopes of this
- * node's ancestors.
- */
+/* Returns the envelope of the node of level `depth` that was visited last. Computes it from the
+ * envelopes of the node's ancestors, which are kept in `e`. */
 static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
                                               ebpo_envelope_stack *e)
 {
@@ -231,19 +234,20 @@ static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level
 
 /* --- the stream --- */
 
-enum { RANGE_NODES = 4096 }; /* nodes in a range; threads work on different ranges */
+enum { RANGE_NODES = 4096 }; /* number of nodes in a range; each range is processed by one thread */
 
 struct ebpo_stream {
     const ebpo_file *file;
     const ebpo_info *info;
     ebpo_stream_options options;
     ebpo_box box;
-    int level;                        /* last level read; -1: none */
-    ebpo_level kept[EBPO_LEVELS_MAX]; /* arrays of the levels 0 to `level` that are still needed */
-    uint64_t bytes;                   /* size of the header and of the levels read so far */
+    int level; /* last level read; -1: none */
+    /* [level + 1] arrays of the levels read so far, as far as they are still needed */
+    ebpo_level kept[EBPO_LEVELS_MAX];
+    uint64_t bytes; /* size of the header and of the levels read so far */
     /* volume of the leaves and black nodes in all levels up to `level` */
     double terminal_volume;
-    level_walk walk;                /* in level `level` */
+    level_walk walk;                /* returns the nodes of level `level` */
     ebpo_envelope_stack *envelopes; /* NULL if no polygons are requested */
     ebpo_node_buffers buffers;
 };
@@ -331,14 +335,16 @@ static ebpo_status check_level(const ebpo_level *level, int number, uint64_t par
 /* --- volumes --- */
 
 typedef struct volumes {
-    double gray, terminal_volume; /* of gray nodes; of leaves and black nodes */
+    /* volume of the gray nodes; volume of the leaves and black nodes */
+    double gray, terminal_volume;
 } volumes;
 
-/* Computation of the volume of a level, in ranges of RANGE_NODES nodes. */
+/* The job of computing the volume of a level. Its tasks are ranges of RANGE_NODES nodes. */
 typedef struct job {
     const ebpo_stream *stream;
-    int target;                     /* the level */
-    level_walk *starts;             /* [ranges] walk to the first node of each range */
+    int target; /* the level */
+    /* [ranges] state of the walk before the first node of each range */
+    level_walk *starts;
     volumes *sums;                  /* [ranges] */
     ebpo_envelope_stack *envelopes; /* [threads] */
 } job;
@@ -440,7 +446,8 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     if (status != EBPO_OK)
         return status;
     volumes v = stated_volumes(s, next);
-    /* The header was checked, so the number of pruned nodes is at most the number of parents. */
+    /* The header was checked when the file was opened, so pruned_count is at most the number of
+     * parents. */
     uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1;
     status = check_level(level, next, parents, error);
     if (status == EBPO_OK && s->options.polygons) {

@@ -1,5 +1,5 @@
-/* Declares the functions that fill in the nodes that a stream returns (stream.c): half-spaces and
- * polygons in model coordinates. Subtrees (lib/query/subtree.c) return nodes in the same form. */
+/* Declares the functions that fill in an ebpo_stream_node, which a stream returns (stream.c): its
+ * half-spaces and polygons in model coordinates. lib/query/subtree.c also returns such nodes. */
 #ifndef EBPO_LEVELS_STREAM_H
 #define EBPO_LEVELS_STREAM_H
 
@@ -13,19 +13,20 @@
 
 /* --- half-spaces --- */
 
-/* Converts the half-space 4096 (n . xi) <= d of a plane code, where xi is a point in cell
- * coordinates (0 to 1), to out[0..2] . p <= out[3] with a unit normal (to 4 ulps). Every real point
- * p of the cell in the first half-space is in the second one. For a point p of doubles, this is
- * also true when the left side is evaluated in doubles, in any order. out[3] is greater than
- * necessary by about 1e-14 of the cell's coordinates. */
+/* Converts the half-space 4096 (n . x) <= d of a plane code, where x is a point in cell coordinates
+ * (0 to 1), to the half-space out[0..2] . p <= out[3] in the model's coordinates. The length of
+ * out[0..2] is 1, except for an error of 4 ulps. Every real point p of the cell that is in the
+ * first half-space is also in the second one. If the coordinates of p are doubles, the second
+ * inequality is also true when its left side is evaluated in doubles, in any order. out[3] is
+ * greater than necessary by about 1e-14 times the coordinates of the cell. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4]);
 
 /* --- filling in an ebpo_stream_node: cell, planes, polygons --- */
 
-enum { EBPO_NODE_CODES = 255 }; /* the most plane codes of a node */
+enum { EBPO_NODE_CODES = 255 }; /* maximum number of plane codes of a node */
 
-/* Buffers that a node's pointers refer to. */
+/* Buffers to which the pointers in an ebpo_stream_node refer. */
 typedef struct ebpo_node_buffers {
     double planes[EBPO_NODE_CODES][4];
     double vertices[EBPO_POLYTOPE_VERTICES][3];
@@ -39,7 +40,8 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
 /* Decodes `count` plane codes, at most EBPO_NODE_CODES, and adds their planes to the node. */
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
                           unsigned count, ebpo_node_buffers *buffers);
-/* Adds the polygons and the volume of the node's envelope, which is given in cell coordinates. */
+/* Adds the polygons and the volume of the node's envelope to the node. `envelope`: in cell
+ * coordinates. */
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box,
                             const ebpo_polytope *envelope, ebpo_node_buffers *buffers);
 

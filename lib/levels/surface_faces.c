@@ -1,10 +1,10 @@
-/* Reads the model's faces for drawing, in place of patches. A patch of the simplified surface
- * approximates the faces below a node (format/surface_patches.h).
+/* Reads faces of the model, which a viewer draws instead of patches. A patch of the simplified
+ * surface approximates the faces below a node (format/surface_patches.h).
  *
- * The corners of faces at a vertex of the model share one vertex of the result, with the mean
- * normal of the faces that were read, weighted by area. If a face's normal differs from the mean by
- * more than 40 degrees, the face's corner gets a separate vertex with the face's normal. This keeps
- * the edges of machined parts sharp. */
+ * All faces at a vertex of the model share one vertex of the result. Its normal is the mean of the
+ * normals of these faces, weighted by area. If a face's normal differs from the mean by more than
+ * 40 degrees, the face gets a separate vertex with the face's normal at this corner. This keeps the
+ * edges of machined parts sharp. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,14 +25,15 @@ static const double LEAST_COSINE = 0.766; /* cosine of 40 degrees */
 
 typedef struct faces_reader {
     ebpo_chunks *chunks;
-    ebpo_patch *out;     /* the faces as a patch */
-    uint64_t count;      /* number of faces */
-    uint32_t *face;      /* [count] indices of the faces in the file */
-    uint32_t *corner;    /* [count][3] indices in the file of the faces' vertices */
-    uint32_t *vertex;    /* [out->vertex_count] index in the file of each shared vertex */
-    double (*normal)[3]; /* [count] area vectors of faces: normals with twice the area as length */
-    double (*sum)[3];    /* [out->vertex_count] sums of the area vectors around a vertex */
-    uint8_t *colour;     /* [count][3][3] red, green, blue of each corner; NULL: no colours */
+    ebpo_patch *out;  /* the faces as a patch */
+    uint64_t count;   /* number of faces */
+    uint32_t *face;   /* [count] indices of the faces in the file */
+    uint32_t *corner; /* [count][3] indices in the file of the faces' vertices */
+    uint32_t *vertex; /* [out->vertex_count] index in the file of each shared vertex */
+    /* [count] area vectors of faces: a normal whose length is twice the face's area */
+    double (*normal)[3];
+    double (*sum)[3]; /* [out->vertex_count] sums of the area vectors around a vertex */
+    uint8_t *colour;  /* [count][3][3] red, green, blue of each corner; NULL: no colours */
 } faces_reader;
 
 /* Makes the shared vertices, in the order of their first use by a face, and sets the triangles.
@@ -106,7 +107,7 @@ static void set_unit(const double n[3], float out[3])
         out[k] = (float)(scaled[k] / length);
 }
 
-/* Gives each corner its final vertex: the shared vertex, or a separate vertex with the face's
+/* Sets the vertex of each corner of a face: the shared vertex, or a separate vertex with the face's
  * normal. */
 static void set_vertices(faces_reader *r)
 {
@@ -187,7 +188,7 @@ ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *ch
     r.vertex = ebpo_alloc(3 * r.count, sizeof *r.vertex);
     r.normal = ebpo_alloc(r.count, sizeof *r.normal);
     r.sum = ebpo_alloc_zero(3 * r.count, sizeof *r.sum);
-    /* at most 3 * count shared vertices, and 3 * count separate ones */
+    /* there are at most 3 * count shared vertices and 3 * count separate vertices */
     out->xyz = ebpo_alloc(6 * r.count, 3 * sizeof *out->xyz);
     out->normals = ebpo_alloc(6 * r.count, 3 * sizeof *out->normals);
     out->triangles = ebpo_alloc(3 * r.count, sizeof *out->triangles);

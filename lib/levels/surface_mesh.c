@@ -2,12 +2,12 @@
  * faces below a node (format/surface_patches.h).
  *
  * On its border, a patch has at most one vertex in each "border cell". The border cells are the
- * cells EBPO_PATCH_CELLS levels below the patch's node. Patches are joined from coarse to fine.
- * For a vertex on the border of a finer patch, the border cells that contain this vertex are
- * searched, coarse to fine; the vertex of the first cell that has one replaces it. Each vertex of
- * the model on the border is in a border cell with a vertex, so both sides of a border get the same
- * vertices. Vertices of the model's faces are replaced in the same way. Source:
- * format-spec/surface.md. */
+ * cells EBPO_PATCH_CELLS levels below the patch's node. Patches are joined from coarse to fine. For
+ * each vertex on the border of a finer patch, the border cells that contain this vertex are
+ * searched, from coarse to fine. The first of these cells that has a vertex gives the vertex that
+ * replaces the vertex of the finer patch. Each vertex of the model on the border is in a border
+ * cell with a vertex, so both sides of a border get the same vertices. Vertices of the model's
+ * faces are replaced in the same way. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -68,8 +68,8 @@ static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return to;
 }
 
-/* Searches the border cells that contain the point, for patches of level 0 to `levels` - 1, coarse
- * to fine. Returns the vertex of the first cell that has one, or NONE. */
+/* Searches the border cells that contain the point p, for patches of level 0 to `levels` - 1, from
+ * coarse to fine. Returns the vertex of the first cell that has a vertex, or NONE. */
 static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
 {
     for (int level = 0; level < levels; level++) {
@@ -115,8 +115,8 @@ static uint32_t join_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return j->slot[i];
 }
 
-/* Adds the triangles of a patch, except triangles of which two corners became the same vertex.
- * `mesh_vertex`: for each vertex of the patch, its vertex in the mesh. */
+/* Adds the triangles of a patch to the mesh. Omits triangles with two corners that have become the
+ * same vertex. `mesh_vertex`: [vertex of the patch] index of the vertex in the mesh. */
 static void add_triangles(joiner *j, const ebpo_patch *patch, const uint32_t *mesh_vertex)
 {
     for (uint64_t i = 0; i < patch->triangle_count; i++) {
@@ -155,7 +155,8 @@ static ebpo_status join_patch(joiner *j, uint64_t index, ebpo_error *error)
     return status;
 }
 
-/* Adds faces of the model. Vertices that no triangle uses after the join stay in the mesh. */
+/* Adds faces of the model to the mesh. A vertex may stay in the mesh although no triangle uses it.
+ */
 static ebpo_status join_faces(joiner *j, const ebpo_patch *faces, ebpo_error *error)
 {
     uint32_t *mesh_vertex = ebpo_alloc(faces->vertex_count, sizeof *mesh_vertex);

@@ -17,23 +17,23 @@ typedef struct ebpo_patch_reader {
     bool coloured;       /* patches have colours */
 } ebpo_patch_reader;
 
-/* Joins patches as ebpo_surface_join does. `patches`: [count] ascending indices. `faces`: the
- * model's faces that replace patches not in `patches`, stored like one patch (whose level and
- * position are ignored), or NULL. */
+/* Joins patches as ebpo_surface_join does. `patches`: [count] indices of patches, ascending.
+ * `faces`: faces of the model that replace further patches; they are stored like one patch, whose
+ * level and position are ignored. NULL: none. */
 EBPO_MUST_USE ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader,
                                             const uint64_t *patches, uint64_t count,
                                             const ebpo_patch *faces, ebpo_surface_mesh *out,
                                             ebpo_error *error);
 
-/* Joins patches, which are read from a file, as ebpo_patches_join does. */
+/* Does the same as ebpo_patches_join for patches that are read from a file. */
 EBPO_MUST_USE ebpo_status ebpo_table_join(const ebpo_patch_table *table, ebpo_chunks *chunks,
                                           const uint64_t *patches, uint64_t count,
                                           const ebpo_patch *faces, ebpo_surface_mesh *out,
                                           ebpo_error *error);
 
-/* Reads the faces that patches replace, with normals, and with colours if the patches have colours.
- * Free the result with ebpo_patch_free. `patches`: [count] ascending indices. Returns EBPO_E_ABSENT
- * if the file has no mesh. */
+/* Reads the faces below the nodes of these patches, with normals, and with colours if the patches
+ * have colours. The caller frees the result with ebpo_patch_free. `patches`: [count] indices of
+ * patches, ascending. Returns EBPO_E_ABSENT if the file has no mesh. */
 EBPO_MUST_USE ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *chunks,
                                                 const uint64_t *patches, uint64_t count,
                                                 ebpo_patch *out, ebpo_error *error);

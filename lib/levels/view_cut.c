@@ -1,5 +1,5 @@
-/* Manages the cut of a view, and the order of refinement. The cut consists of the delivered nodes
- * without delivered children.
+/* Manages the cut of a view, and the order of refinement. A view delivers nodes of the octree to a
+ * program, from coarse to fine. The cut consists of the delivered nodes without delivered children.
  *
  * - A viewpoint is a prepared observer. It gives the distance of a cell, the cell's size in pixels,
  *   the cell's visibility in the frustum, and the priority key of a node. Because of rounding, a
@@ -9,8 +9,7 @@
  * - The frontier holds the gray nodes of the cut in a binary heap. The first node of the heap is
  *   refined next, that is, replaced in the cut by its children. Nodes are ordered by turn (visible,
  *   not visible, never refined), then by key, then by octcode (locational code). No two nodes have
- *   the same octcode, so the order is deterministic.
- */
+ *   the same octcode, so the order is deterministic. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -26,8 +25,8 @@
 
 /* --- the observer --- */
 
-/* A bound, with a large margin, of the relative rounding error of a sum of three products. A
- * cell that is outside by less than this error counts as visible. */
+/* An upper bound, with a large margin, of the relative rounding error of a sum of three products. A
+ * cell that is outside the frustum by less than this error counts as visible. */
 static const double SLACK = 1e-12;
 
 /* Scales a vector of any length to length 1; returns false for (0, 0, 0). */
@@ -64,9 +63,9 @@ static ebpo_status check_observer(const ebpo_observer *o, ebpo_error *error)
 }
 
 /* Computes the frustum's side planes, and the plane through the eye that is parallel to the
- * picture. The inward normals of the side planes are t * forward +- side, where side is the
- * direction to the right or up, and t is the tangent of half the angle of view in this direction.
- */
+ * picture. The inward normals of the side planes are t * forward + side and t * forward - side,
+ * where `side` is the direction to the right or up, and t is the tangent of half the angle of view
+ * in this direction. */
 static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
                                 ebpo_error *error)
 {
@@ -121,7 +120,7 @@ ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
 {
     ebpo_seen out = { 0, true };
-    double low[3], high[3]; /* relative to the eye */
+    double low[3], high[3]; /* bounds of the cell, relative to the eye */
     if (!s->has_observer)
         return out;
     for (int k = 0; k < 3; k++) {
@@ -167,8 +166,8 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
     return octant;
 }
 
-/* Returns a key for the order from front to back. The key has three bits for each level of the path
- * from the root: the octant of the path ^ the octant of the eye (ebpo_viewpoint_octant). */
+/* Returns a key for the order from front to back. The key has three bits for each node above this
+ * node: the octant of the path to this node, XOR the octant of the eye (ebpo_viewpoint_octant). */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -184,8 +183,8 @@ static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_o
     return key;
 }
 
-/* Returns the bits of a nonnegative double as an integer. Integers of greater doubles are greater.
- */
+/* Returns the bits of a nonnegative double as an integer. These integers have the same order as the
+ * doubles. */
 static uint64_t double_bits(double v)
 {
     uint64_t out;
@@ -238,8 +237,8 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
 {
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
     uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
-    /* A damaged index may assign one group to many parents. Without this check, the view would then
-     * never end. */
+    /* In a damaged file, one group may be the children of many nodes. Without this check, such a
+     * view would never end. */
     if (grays > info->level[level].gray_count - g->grays[level])
         return ebpo_fail(
             error, EBPO_E_FORMAT,
@@ -284,10 +283,11 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_n
     if (ebpo_partial_type(g, node) == EBPO_BLACK)
         return ebpo_envelope_put_cube(e, octcode);
     for (int depth = 0; depth <= level; depth++) {
-        /* octcode of the ancestor at this depth; at the last depth, of the node */
+        /* octcode of the node's ancestor at this depth, or of the node itself if depth is `level`
+         */
         ebpo_octcode ancestor = octcode >> 3 * (level - depth);
         if (depth == level)
-            at = node; /* the node's group may not be linked yet */
+            at = node; /* the node's group may not be linked to its parent yet */
         else if (depth)
             at =
                 (ebpo_partial_node){ g->group[at.group].child[at.octant], (uint8_t)(ancestor & 7) };
@@ -303,7 +303,7 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_n
 
 /* --- the frontier --- */
 
-/* Returns true if node a is refined before node b. */
+/* Returns true if node `a` is refined before node `b`. */
 static bool waits_before(const ebpo_waiting *a, const ebpo_waiting *b)
 {
     if (a->turn != b->turn)
@@ -324,7 +324,7 @@ ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *e
                : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }
 
-/* Moves the node at index i down the heap, until no node below it comes before it. */
+/* Moves the node at index i down the heap, until the nodes below are refined later. */
 static void sink_down(ebpo_frontier *f, uint64_t i)
 {
     ebpo_waiting node = f->at[i];
@@ -362,9 +362,9 @@ void ebpo_frontier_restore(ebpo_frontier *f)
         sink_down(f, i);
 }
 
-/* Collects the blocks of the frontier's nodes in a hash table, with the node of each block that is
- * refined first. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of further blocks are
- * skipped. At the end, sorts the nodes of the table. */
+/* Collects the blocks of the frontier's nodes in a hash table. For each block, the table has the
+ * node that is refined first. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of further
+ * blocks are skipped. At the end, the nodes of the table are sorted. */
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
                               uint64_t best[EBPO_FRONTIER_BLOCKS])
 {
@@ -379,7 +379,8 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         const ebpo_waiting *w = &f->at[i];
         if (w->turn == EBPO_TURN_NEVER)
             continue;
-        /* The block's number includes the level in its lower six bits, so it is never 0. */
+        /* The lower six bits of a block's number depend on the level and are not 0, so the number
+         * is never 0. */
         uint64_t block =
             (w->child_group / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at;

@@ -1,7 +1,8 @@
 /* Declares the state of a view (view_cut.c): the observer, the delivered part of the tree, and the
- * frontier. The "cut" is the set of the delivered nodes whose children have not been delivered. The
- * "frontier" is the set of those gray nodes of the cut that have children in the file. To refine a
- * node means to replace it in the cut by its children. */
+ * frontier. A view delivers nodes of the octree to a program, from coarse to fine. The "cut" is the
+ * set of the delivered nodes whose children have not been delivered. The "frontier" is the set of
+ * those gray nodes of the cut that have children in the file. To refine a node means to replace it
+ * in the cut by its children. */
 #ifndef EBPO_LEVELS_VIEW_CUT_H
 #define EBPO_LEVELS_VIEW_CUT_H
 
@@ -16,14 +17,16 @@
 
 /* --- the observer: distance, size, visibility and order of cells --- */
 
-/* A prepared observer. Lengths are measured in a unit that is about the root cell's longest side (a
- * power of two of the model's unit), so that their squares neither overflow nor underflow. */
+/* A prepared observer. The unit of lengths is a power of two, about as long as the root cell's
+ * longest side, so that the squares of lengths neither overflow nor underflow. */
 typedef struct ebpo_viewpoint {
     bool has_observer; /* false: there is no observer */
     bool no_frustum;   /* the observer has no frustum, so every cell is visible */
     double eye[3];     /* in the model's unit */
-    double unit;       /* the unit of length of the members below, in the model's unit */
-    double focal;      /* size in pixels of a length of 1 at a distance of 1 */
+    /* length of this unit in the model's unit; the members below use this unit */
+    double unit;
+    /* size in pixels of an object whose length is equal to its distance from the eye */
+    double focal;
     /* inward normals of the four side planes of the frustum, and of the plane parallel to the
      * picture; all five planes pass through the eye */
     double inward[5][3];
@@ -34,36 +37,38 @@ typedef struct ebpo_viewpoint {
 EBPO_MUST_USE ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
                                               const ebpo_observer *observer, ebpo_error *error);
 
-/* How a cell is seen by the observer. */
+/* The distance and the visibility of a cell. */
 typedef struct ebpo_seen {
     double distance2; /* squared distance from the eye to the cell's nearest point, in `unit`^2 */
     bool seen;        /* false: the cell does not intersect the frustum */
 } ebpo_seen;
-/* Returns how a cell is seen. Without an observer, every cell is seen at distance 0. */
+/* Returns the distance and the visibility of a cell. Without an observer, every cell is visible at
+ * distance 0. */
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *box, ebpo_cell cell);
 
 /* Converts a squared distance of ebpo_viewpoint_see to a distance in the model's unit. Returns NAN
  * without an observer. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
-/* Returns the size in pixels of a length (in the model's unit) at a distance. Returns NAN without
- * an observer. */
+/* Returns the size in pixels of an object of this length (in the model's unit) at a squared
+ * distance of ebpo_viewpoint_see. Returns NAN without an observer. */
 double ebpo_viewpoint_length(const ebpo_viewpoint *viewpoint, double length, double distance2);
-/* Returns the size in pixels of a cell's diagonal at the cell's distance. Returns NAN without an
- * observer. */
+/* Returns the size in pixels of the diagonal of a cell of this level at a squared distance of
+ * ebpo_viewpoint_see. Returns NAN without an observer. */
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
 
-/* Returns the octant e of the cell that contains the eye or is nearest to the eye. With children in
- * ascending order of (octant ^ e), no child hides an earlier one: no ray from the eye to a child p
- * passes through a child o if o ^ e has a bit that p ^ e lacks. */
+/* Returns the octant e of the cell that contains the eye or is nearest to the eye. If the children
+ * are drawn in ascending order of (octant ^ e), no child hides an earlier one. Reason: a ray from
+ * the eye to a child p can pass through a child o only if all bits of o ^ e are also set in p ^ e,
+ * so o comes before p. */
 unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                                ebpo_cell cell);
 
-/* Returns the priority key of a node: the node with the least key comes first. Keys may be compared
- * only if none of the two cells contains the other one. */
+/* Returns the priority key of a node. The node with the least key comes first. The keys of two
+ * nodes may be compared only if neither of their cells contains the other one. */
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
 
-/* Makes the mesh of ebpo_view_stream_surface. Reads the table of patches if `table` is still empty.
+/* Does the work of ebpo_view_stream_surface. Reads the table of patches if `table` is still empty.
  */
 EBPO_MUST_USE ebpo_status ebpo_view_surface(ebpo_patch_table *table, ebpo_chunks *chunks,
                                             const ebpo_viewpoint *viewpoint,
@@ -72,8 +77,8 @@ EBPO_MUST_USE ebpo_status ebpo_view_surface(ebpo_patch_table *table, ebpo_chunks
 
 /* --- the delivered part of a tree --- */
 
-/* A group of siblings. The group is linked to its parent (`child` of the parent's group) after all
- * nodes of the group have been delivered. */
+/* A group of siblings. After all nodes of the group have been delivered, the group is linked to its
+ * parent: an element of `child` in the parent's group is set. */
 typedef struct ebpo_partial_group {
     uint64_t parent;        /* octcode (locational code) of the parent; 0: the root's group */
     uint64_t first_gray;    /* rank in its level of the group's first gray node */
@@ -84,13 +89,13 @@ typedef struct ebpo_partial_group {
 } ebpo_partial_group;
 
 typedef struct ebpo_partial {
-    ebpo_partial_group *group; /* [group_count] group 0 is the root's */
+    ebpo_partial_group *group; /* [group_count] group 0 contains only the root */
     uint32_t *codes;           /* [code_count] plane codes of all groups */
-    int32_t (*winding)[8];     /* [group_count] winding numbers of the nodes; see `windings` */
+    /* [group_count] winding numbers of the nodes, by octant; see `windings` */
+    int32_t (*winding)[8];
     uint64_t group_count, group_capacity, winding_capacity, code_count, code_capacity;
     bool windings; /* false: no winding numbers are requested, and `winding` is NULL */
-    /* number of delivered gray nodes of each level; in a damaged file, it could exceed the number
-     * in the header */
+    /* [level] number of gray nodes added so far; it must not exceed the number in the header */
     uint64_t grays[EBPO_LEVELS_MAX];
 } ebpo_partial;
 
@@ -121,22 +126,24 @@ static inline uint64_t ebpo_partial_children(const ebpo_partial *g, ebpo_partial
            ebpo_group_count(g->group[gray.group].types, EBPO_GRAY, gray.octant);
 }
 
-/* Appends the group `read` as the children of the node with octcode `parent` (0: as the root's
- * group), without linking it to its parent. */
+/* Appends the group `read`, whose nodes are the children of the node with octcode `parent`. If
+ * `parent` is 0, the group contains the root. Does not link the group to its parent. Returns
+ * EBPO_E_FORMAT if the level has more gray nodes than the header states. */
 EBPO_MUST_USE ebpo_status ebpo_partial_add(ebpo_partial *partial, const ebpo_info *info,
                                            uint64_t parent, const ebpo_group *read,
                                            ebpo_error *error);
 
-/* Returns the plane codes of a node. */
+/* Returns the plane codes of a node, and sets *count to their number. Returns NULL if there are
+ * none. */
 const uint32_t *ebpo_partial_codes(const ebpo_partial *partial, ebpo_partial_node node,
                                    unsigned *count);
 
-/* Returns the envelope of a node in cell coordinates; its ancestors must be linked. Valid until the
- * next call with these envelopes. */
+/* Returns the envelope of a node in cell coordinates. The groups of the node's ancestors must be
+ * linked. The result is valid until the next call with the same `envelopes`. */
 const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_partial_node node,
                                            ebpo_envelope_stack *envelopes);
 
-/* --- the frontier: the gray nodes of the cut in a heap, the next one to refine on top --- */
+/* --- the frontier: the gray nodes of the cut in a heap; the top is the node to refine next --- */
 
 /* Class of a node in the order of refinement: visible nodes first, then nodes outside the frustum.
  * EBPO_TURN_NEVER: the node is not refined, because a limit of the view's options excludes it. */
@@ -146,7 +153,7 @@ typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebp
 typedef struct ebpo_waiting {
     uint64_t key, octcode; /* key: ebpo_viewpoint_key */
     uint64_t child_group;  /* ebpo_partial_children; view_surface.c: index of a patch */
-    uint32_t group;        /* `group` and `octant` are the node's ebpo_partial_node */
+    uint32_t group;        /* `group` and `octant`: the node as an ebpo_partial_node */
     uint8_t octant, turn;  /* turn: ebpo_turn */
 } ebpo_waiting;
 
@@ -164,11 +171,11 @@ void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
 /* Restores the heap after keys or turns have changed. */
 void ebpo_frontier_restore(ebpo_frontier *frontier);
-/* A block is `span` neighbouring groups of a level. A node of the frontier belongs to the block
- * that has its children's group. For each block, finds the node of the frontier that will be
- * refined first. Writes the indices of these nodes in frontier->at to `best`, in the order of
- * refinement, so best[0] is the top. Returns the number of indices, at most EBPO_FRONTIER_BLOCKS.
- */
+/* A block consists of `span` neighbouring groups of a level. A node of the frontier belongs to the
+ * block that contains the group of the node's children. For each block, finds the node of the
+ * frontier that will be refined first. Writes the indices of these nodes in frontier->at to `best`,
+ * in the order of refinement, so best[0] is the top. Returns the number of indices, at most
+ * EBPO_FRONTIER_BLOCKS. */
 enum { EBPO_FRONTIER_BLOCKS = 1024 };
 unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
                               uint64_t best[EBPO_FRONTIER_BLOCKS]);

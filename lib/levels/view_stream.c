@@ -1,15 +1,15 @@
 /* Delivers a view: one group of siblings after the other, in the order of the view's priority,
  * until the view's limits are reached.
  *
- * The cut of the view is the set of the delivered nodes without delivered children; the frontier is
- * the set of gray nodes of the cut, in the order in which they are refined (view_cut.h). Each step
- * takes the first node of the frontier, reads the group of its children, with the faces of leaves
- * if faces are requested, and returns these siblings one by one. After the last sibling, the
- * siblings replace their parent in the cut. When the observer changes, the frontier is sorted
- * again; delivered nodes stay.
+ * The cut of the view is the set of the delivered nodes without delivered children. The frontier is
+ * the set of gray nodes of the cut, in the order in which they are refined, that is, replaced by
+ * their children (view_cut.h). Each step takes the first node of the frontier and reads the group
+ * of its children. If faces are requested, it also reads the faces of the leaves among them. Then
+ * it returns these siblings one by one. After the last sibling, the siblings replace their parent
+ * in the cut. When the observer changes, the frontier is sorted again; delivered nodes stay.
  *
- * For remote files, the chunks that a group needs are requested in one batch. The batch also has
- * the chunks of the groups that follow, as far as the memory for chunks allows. */
+ * For remote files, the chunks that a group needs are requested in one batch. If the memory for
+ * chunks is sufficient, the batch also has the chunks of the groups that follow. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -34,10 +34,11 @@ typedef struct view_leaves {
     uint8_t *delivered;  /* bit f: face f was delivered */
     /* Faces of the last returned leaf, valid until the next node is returned. */
     double (*corners)[3][3];
-    uint32_t *file_faces;    /* indices of the faces in the file */
-    uint8_t *repeated;       /* 1: the face was delivered before */
-    uint64_t capacity[3];    /* of corners, file_faces and repeated, in faces */
-    ebpo_view_faces current; /* refers to these three arrays */
+    uint32_t *file_faces; /* indices of the faces in the file */
+    uint8_t *repeated;    /* 1: the face was delivered before */
+    /* number of faces for which corners, file_faces and repeated have space */
+    uint64_t capacity[3];
+    ebpo_view_faces current; /* its pointers refer to these three arrays */
 } view_leaves;
 
 /* A group of siblings; `parent` is an octcode (locational code), 0 for the root's group. */
@@ -46,8 +47,8 @@ typedef struct view_group {
     uint64_t parent;
 } view_group;
 
-/* A function that returns, for a node (given by its octcode), the first level at which the view
- * will refine no descendant of the node soon. */
+/* A function with its argument. For the node with this octcode, it returns the first level at which
+ * the view will refine no descendant of the node soon (depth_of_view). */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
@@ -62,9 +63,11 @@ struct ebpo_view_stream {
     ebpo_viewpoint viewpoint; /* prepared from `observer` */
     ebpo_chunks *chunks;
     ebpo_partial partial;
-    ebpo_frontier frontier;     /* gray nodes of the cut, except `parent` */
-    bool delivering;            /* true while the last group of `partial` is being delivered */
-    ebpo_waiting parent;        /* of the group being delivered; unused for the root's group */
+    /* gray nodes of the cut that have children in the file, except `parent` */
+    ebpo_frontier frontier;
+    bool delivering; /* true while the last group of `partial` is being delivered */
+    /* parent of the group being delivered; not used while the root is delivered */
+    ebpo_waiting parent;
     unsigned step, octant_mask; /* the next sibling to deliver has the octant step ^ octant_mask */
     uint64_t delivered, cut[4]; /* number of delivered nodes; nodes of each type in the cut */
     ebpo_group read;            /* the group being delivered, as read from the file */
@@ -115,8 +118,8 @@ static void view_leaves_free(view_leaves *l)
     free(l);
 }
 
-/* If the node of this octant is a leaf, writes the node to *out and returns true. `read` has the
- * data of `group`. */
+/* If the node of this octant is a leaf, writes the node to *out and returns true. `read`: the data
+ * of `group`. */
 static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsigned octant,
                           ebpo_node *out)
 {
@@ -197,13 +200,14 @@ static void set_faces(view_leaves *l, unsigned octant)
 
 /* --- fetching: requests --- */
 
-/* Data that the functions of the sections "fetching" need. */
+/* Arguments of fetch_group, for the functions of the sections "fetching". */
 typedef struct fetching {
     ebpo_chunks *chunks;
     const ebpo_partial *partial;
     const ebpo_frontier *frontier;
-    unsigned wanted; /* data of each group: EBPO_GROUP_... */
-    bool faces;      /* true: the faces of leaves are also needed */
+    /* data that are needed for each group: EBPO_GROUP_PLANES, EBPO_GROUP_WINDINGS */
+    unsigned wanted;
+    bool faces; /* true: the faces of leaves are also needed */
     const view_depth *depth;
 } fetching;
 
@@ -213,8 +217,9 @@ static view_group children_of(const ebpo_waiting *w)
     return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->child_group }, w->octcode };
 }
 
-/* Lists the group to deliver next (`first`) and groups that follow soon: one group for each block
- * of `span` neighbouring groups of a level. Returns the number of listed groups. */
+/* Lists the group to deliver next (`first`), and groups that will be delivered soon. Lists only one
+ * group of each block; a block consists of `span` neighbouring groups of a level. Returns the
+ * number of listed groups. */
 static unsigned coming_groups(const fetching *f, const view_group *first, unsigned span,
                               view_group groups[EBPO_FRONTIER_BLOCKS])
 {
@@ -227,8 +232,8 @@ static unsigned coming_groups(const fetching *f, const view_group *first, unsign
     return count ? count : 1;
 }
 
-/* Reads all data of a group that is in memory, only to record which chunks are missing
- * (ebpo_chunks_collect). */
+/* Reads a group from the chunks in memory, and drops the result. The purpose is to record which
+ * chunks are missing (ebpo_chunks_collect). */
 static void try_group(const fetching *f, const view_group *group)
 {
     ebpo_group read;
@@ -251,7 +256,8 @@ static bool is_in_subtree(const fetching *f, const view_group *group)
     return group->parent && ebpo_subtree_table_has(f->chunks->file, group->number.level);
 }
 
-/* Returns the index of the group's subtree: its root's rank among gray nodes. */
+/* Returns the index of the subtree that contains the group: the rank of the subtree's root among
+ * the gray nodes of its level. */
 static uint64_t subtree_of(const fetching *f, const view_group *group)
 {
     int last = ebpo_octcode_level(group->parent), level = f->chunks->file->info.subtree_level;
@@ -262,11 +268,11 @@ static uint64_t subtree_of(const fetching *f, const view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-/* SUBTREES_MAX: length of a list of subtrees. If faces are requested and the view enters more than
- * SUBTREES_WITH_FACES subtrees, try_subtrees collects nothing. */
+/* SUBTREES_MAX: maximum length of a list of subtrees. SUBTREES_WITH_FACES: if faces are requested
+ * and the view will refine nodes in more subtrees, try_subtrees collects nothing. */
 enum { SUBTREES_MAX = 4096, SUBTREES_WITH_FACES = 64 };
 
-/* A subtree that the view enters, by its index and root. */
+/* A subtree in which the view refines nodes: its index, and the octcode of its root. */
 typedef struct view_subtree {
     uint64_t index, octcode;
 } view_subtree;
@@ -276,8 +282,9 @@ typedef struct subtree_list {
     view_subtree list[SUBTREES_MAX];
 } subtree_list;
 
-/* Lists the subtrees of these groups, each subtree once. If no faces are requested, skips the
- * groups directly below a subtree's root, because list_frontier_subtrees lists their subtrees. */
+/* Lists the subtrees that contain these groups, each subtree once. If no faces are requested, skips
+ * the groups directly below a subtree's root, because list_frontier_subtrees lists their subtrees.
+ */
 static void list_group_subtrees(const fetching *f, const view_group *groups, unsigned count,
                                 subtree_list *e)
 {
@@ -294,9 +301,9 @@ static void list_group_subtrees(const fetching *f, const view_group *groups, uns
     }
 }
 
-/* Lists the subtrees that the view will enter below a node; `children` is the group of the node's
- * children, above the roots of subtrees or at them. If the node types of a level in between are not
- * in memory, their chunks are recorded as missing. */
+/* Lists the subtrees below a node in which the view will refine nodes. `children`: the group of the
+ * node's children, whose level is at most the level of the subtrees' roots. If node types of a
+ * level in between are not in memory, their chunks are recorded as missing. */
 static void list_descendant_subtrees(const fetching *f, const view_group *children, subtree_list *e)
 {
     int level = children->number.level;
@@ -316,8 +323,8 @@ static void list_descendant_subtrees(const fetching *f, const view_group *childr
     }
 }
 
-/* Lists the subtrees that the view will enter from those visible nodes of the frontier that are
- * roots of subtrees or above such roots. */
+/* Lists the subtrees in which the view will refine nodes, and whose root is a visible node of the
+ * frontier or below such a node. */
 static void list_frontier_subtrees(const fetching *f, subtree_list *e)
 {
     int level = f->chunks->file->info.subtree_level;
@@ -332,9 +339,9 @@ static void list_frontier_subtrees(const fetching *f, subtree_list *e)
 }
 
 /* Collects all chunks that the view needs from the subtrees of these groups, up to `byte_limit`
- * bytes. Returns false if it collected none: if the groups are in no subtree, or if faces are
- * requested and the view enters so many subtrees that none will be completed soon. The caller then
- * collects only the chunks of the next groups. */
+ * bytes. Returns false in two cases: the groups are in no subtree; or faces are requested, and
+ * there are so many subtrees that none will be completed soon. Then the caller collects only the
+ * chunks of the next groups. */
 static bool try_subtrees(const fetching *f, const view_group *groups, unsigned count,
                          const ebpo_chunk_keys *keys, uint64_t byte_limit)
 {
@@ -360,13 +367,13 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
 /* --- fetching --- */
 
 /* Collects in `keys` the missing chunks of the group, and returns their number. If all of these
- * chunks were prefetched with an earlier batch, collects nothing else: so the view uses the chunks
- * of one batch before it requests the next batch. Otherwise also collects the missing chunks of the
- * groups that follow. */
+ * chunks were prefetched with an earlier batch, collects nothing else, so that the view uses the
+ * chunks of one batch before it requests the next batch. Otherwise also collects the missing chunks
+ * of the groups that follow. */
 static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
-    /* With faces, the list of following groups has one group of each FACES_BLOCK neighbouring
-     * groups. At most TRIED groups are tried, because each try takes time. */
+    /* FACES_BLOCK: if faces are requested, only one of this number of neighbouring groups is
+     * listed. TRIED: maximum number of calls of try_group, which takes time. */
     enum { FACES_BLOCK = 64, TRIED = 64 };
     view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys_begin(keys);
@@ -384,9 +391,9 @@ static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_
     return missing;
 }
 
-/* Fetches the chunks in passes, because the chunks of one pass show which chunks the next pass
- * needs: face lists, then the faces that they name, then the faces' vertices, and the ranks in
- * between. Chunks that are missing after the last pass are read one by one. */
+/* Fetches the chunks of the group in passes. The chunks of one pass show which chunks the next pass
+ * needs: the face lists of leaves give the faces, and the faces give the vertices. Chunks that are
+ * missing after the last pass are read one by one later. */
 static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_error *error)
 {
     enum { PASSES = 12 };
@@ -409,17 +416,18 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
     if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
         return EBPO_OK;
     if (f->chunks->limit == UINT64_MAX)
-        ebpo_hint_top(f->chunks->file); /* together with the first data of the subtrees */
+        /* requests the levels above the subtrees together with the first data of the subtrees */
+        ebpo_hint_top(f->chunks->file);
     unsigned count = coming_groups(f, group, EBPO_GROUP_BLOCK, groups);
     for (unsigned i = 0; i < count; i++)
         numbers[i] = groups[i].number;
     return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
 }
 
-/* For a remote file. Fetches the missing chunks of the group's `wanted` data (EBPO_GROUP_...) and,
- * with `faces`, of the faces of the group's leaves. Also prefetches the chunks of the groups that
- * follow. If the file has a table of subtrees, prefetches all chunks of the groups' subtrees. When
- * the limit of bytes is exceeded, returns EBPO_E_LIMIT as ebpo_group_read does. */
+/* Fetches missing chunks of a remote file: the chunks of the group's `wanted` data (EBPO_GROUP_...)
+ * and, if `faces` is true, of the faces of the group's leaves. Also prefetches chunks of the groups
+ * that follow. If the file has a table of subtrees, prefetches all needed chunks of the subtrees
+ * that contain these groups. Returns EBPO_E_LIMIT when the view's limit of bytes is exceeded. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                const ebpo_frontier *frontier, const view_group *group,
                                unsigned wanted, bool faces, const view_depth *depth,
@@ -433,8 +441,8 @@ static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                                                     : status;
 }
 
-/* Least memory of a view, in bytes. With less memory than one group's chunks need, every group
- * would read all chunks again. */
+/* Least memory of a view, in bytes. If the chunks of one group did not fit into the memory, every
+ * group would read all chunks again. */
 enum { MEMORY_LEAST = 1 << 20 };
 
 /* --- options --- */
@@ -530,7 +538,8 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
 
 /* --- the next group --- */
 
-/* Returns the class of a node (of this level, and seen like this) in the order of refinement. */
+/* Returns the class, in the order of refinement, of a node of this level. `sight`: result of
+ * ebpo_viewpoint_see for the node. */
 static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen sight)
 {
     const ebpo_view_options *o = &s->options;
@@ -578,7 +587,8 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
-/* Reads a group and the faces of its leaves; missing chunks are read one by one. */
+/* Reads a group into s->read, and the faces of its leaves into s->leaves if faces are requested.
+ * Missing chunks are read one by one. */
 static ebpo_status read_now(ebpo_view_stream *s, const view_group *group, unsigned wanted,
                             ebpo_error *error)
 {
@@ -589,7 +599,8 @@ static ebpo_status read_now(ebpo_view_stream *s, const view_group *group, unsign
                : status;
 }
 
-/* Reads a group of a remote file from memory only; returns false if chunks are missing. */
+/* Does the same as read_now for a remote file, but only with chunks in memory. Returns false if
+ * chunks are missing. */
 static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned wanted)
 {
     ebpo_chunk_keys missing;
@@ -605,7 +616,7 @@ static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned 
  * (in the order of pixels) smaller than the next node by a factor of more than 2^SOON_LEVELS. */
 enum { SOON_LEVELS = 2 };
 
-/* Sets the limits of what is prefetched; `next` is the octcode of the next node to refine. */
+/* Sets soon_level and soon_pixels. `next`: octcode of the next node to refine. */
 static void set_soon(ebpo_view_stream *s, uint64_t next)
 {
     int level = ebpo_octcode_level(next);
@@ -658,10 +669,10 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
-/* Begins to deliver the root, or the children of the frontier's first node. Sets `end` if the view
- * ends here. If the first node is a pruned node (whose children are not in the file), only removes
- * the node from the frontier; the node stays in the cut, and the caller calls this function again.
- */
+/* Begins to deliver the root, or the children of the frontier's first node. If the view ends here,
+ * sets *end to the reason. If the first node is pruned (its children are not in the file), only
+ * removes the node from the frontier. Such a node stays in the cut, and the caller calls this
+ * function again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
@@ -670,7 +681,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         *end = EBPO_VIEW_DONE;
         return EBPO_OK;
     }
-    /* The group would exceed the limit of nodes. */
+    /* The view ends if the group would exceed the limit of nodes. */
     if (s->options.nodes &&
         (root ? 1 : 8) > s->options.nodes -
                              (s->delivered < s->options.nodes ? s->delivered : s->options.nodes)) {
@@ -796,8 +807,8 @@ typedef struct visitor {
     ebpo_view_node node; /* filled in for the call of `visit` */
 } visitor;
 
-/* Visits the node if it is in the cut, otherwise the nodes of the cut below it, from front to back.
- * Returns false if `visit` returned false; then no further node is visited. */
+/* Visits the node if it is in the cut. Otherwise visits the nodes of the cut below it, from front
+ * to back. Returns false if `visit` returned false; then no further node is visited. */
 static bool visit_node(visitor *v, ebpo_partial_node node)
 {
     const ebpo_partial *partial = &v->stream->partial;
@@ -824,7 +835,7 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
         (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
 }
 
-/* Includes a gray node of the cut in out->pixels and out->waiting. */
+/* Updates out->pixels and out->waiting for a gray node of the cut. */
 static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);

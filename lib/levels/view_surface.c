@@ -2,10 +2,10 @@
  * A patch approximates the faces below a node (format/surface_patches.h).
  *
  * The choice begins with the patch of the root. The patch with the greatest error in the image is
- * replaced by the patches of its node's children, until no error is greater than options.pixels.
- * A patch without patches below is replaced by the model's faces, if options.faces is true. The
- * errors are in the table of patches, so only chosen patches are read. With a limit of bytes, the
- * choice ends before the chunks of the next patches would exceed the limit. */
+ * replaced by the patches of its node's children, until no error is greater than options.pixels. If
+ * the children have no patches and options.faces is true, the patch is replaced by the model's
+ * faces. The errors are in the table of patches, so only chosen patches are read. If there is a
+ * limit of bytes, the choice ends before the chunks of the next patches would exceed the limit. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,10 +24,13 @@ typedef struct choosing {
     const ebpo_view_options *options;
     const ebpo_info *info;
     ebpo_box box;
-    ebpo_frontier frontier; /* (view_cut.h) patches to draw so far; child_group: index of a patch */
-    ebpo_chunk_keys *keys;  /* missing chunks of the patches so far; NULL: no limit of bytes */
-    uint64_t *chosen;       /* [chosen_count] patches that are drawn */
-    uint64_t *replaced; /* [replaced_count] patches whose faces are drawn, greatest error first */
+    /* the patches chosen so far, as a heap (view_cut.h); child_group: index of a patch */
+    ebpo_frontier frontier;
+    /* missing chunks of the patches chosen so far; NULL: no limit of bytes */
+    ebpo_chunk_keys *keys;
+    uint64_t *chosen; /* [chosen_count] patches that are drawn */
+    /* [replaced_count] patches that are replaced by faces, greatest error first */
+    uint64_t *replaced;
     uint64_t chosen_count, replaced_count;
     double pixels; /* greatest error of a visible patch that is drawn */
 } choosing;
@@ -51,8 +54,8 @@ static double pixels_of(const choosing *c, uint64_t patch, ebpo_seen sight)
                : 0;
 }
 
-/* Returns EBPO_TURN_NEVER for a patch that is drawn, and otherwise the class in the order in which
- * patches are replaced. */
+/* Returns the class of a patch in the order in which patches are replaced. EBPO_TURN_NEVER: the
+ * patch is drawn and not replaced. */
 static ebpo_turn turn_of(const choosing *c, uint64_t patch, ebpo_seen sight)
 {
     const ebpo_view_options *o = c->options;
@@ -88,8 +91,8 @@ static ebpo_status offer_patch(choosing *c, uint64_t patch, ebpo_error *error)
     return status;
 }
 
-/* Returns true if the view stays within the limit of bytes when it reads the patches `first` to
- * `end` - 1, which replace a patch. Adds their missing chunks to c->keys. */
+/* Returns true if the view can read the patches `first` to `end` - 1 within its limit of bytes.
+ * Adds the missing chunks of these patches to c->keys. */
 static bool is_affordable(choosing *c, uint64_t first, uint64_t end)
 {
     if (!c->keys)
@@ -132,7 +135,7 @@ static void sort_indices(uint64_t *indices, uint64_t count)
     qsort(indices, count, sizeof *indices, compare_indices);
 }
 
-/* Requests the chunks of the chosen patches together. */
+/* Requests the missing chunks of all chosen patches in one batch. */
 static ebpo_status fetch_patches(choosing *c, ebpo_error *error)
 {
     ebpo_chunk_keys *keys = ebpo_alloc(1, sizeof *keys);
@@ -146,9 +149,10 @@ static ebpo_status fetch_patches(choosing *c, ebpo_error *error)
     return status;
 }
 
-/* Reads the faces of replaced patches. Requests their chunks together, in passes, because the faces
- * of one pass show which vertices are needed. If the faces exceed the limit of bytes, draws half of
- * the replaced patches (those with the least errors) instead of their faces, and tries again. */
+/* Reads the faces of replaced patches. Requests their chunks in a few batches: the chunks of faces
+ * show which chunks of vertices are needed. If the faces exceed the limit of bytes, the half of the
+ * replaced patches with the least errors is drawn without replacement, and the function tries
+ * again. */
 static ebpo_status read_faces(choosing *c, ebpo_patch *faces, ebpo_error *error)
 {
     enum { PASSES = 4 };
