@@ -1,8 +1,8 @@
 /* Counts checks and violations of the verifier, and keeps the first violation of each kind.
  *
- * Each thread counts in a separate tally; tallies are merged. The first violation is the first by
- * octcode (locational code), then by face, by plane and by text. So the report does not depend on
- * which thread finds a violation, or on the order of merging. */
+ * Each thread counts in a separate tally; later the tallies are merged. Violations are ordered by
+ * octcode (locational code), then by face, then by plane, then by text. So the report does not
+ * depend on which thread finds a violation, or on the order of merging. */
 #include "verify/tally.h"
 
 #include <inttypes.h>
@@ -22,8 +22,8 @@ static int compare_places(const ebpo_verify_place *a, const ebpo_verify_place *b
     return order != 0 ? order : compare_u64(a->plane, b->plane);
 }
 
-/* Prints "level 5, octcode 0o1234567, face 17, plane 2: " without the items that the place lacks.
- * Returns the length. */
+/* Prints a place as "level 5, octcode 0o1234567, face 17, plane 2: ". Omits items that the place
+ * does not have. Returns the length. */
 static int print_place(char *out, size_t size, const ebpo_verify_place *place)
 {
     int length = 0;
@@ -46,8 +46,9 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
     return length;
 }
 
-/* Counts a violation, and keeps its text if it is the first. Violations at the same place are
- * ordered by their text, so that the result does not depend on the order of merging. */
+/* Counts a violation. Keeps its text if it is the first violation of its kind so far. Violations at
+ * the same place are ordered by their text, so that the result does not depend on the order of
+ * merging. */
 static void record_violation(ebpo_tally *tally, ebpo_verify_kind kind,
                              const ebpo_verify_place *place, const char *text)
 {
@@ -73,7 +74,8 @@ void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_v
                           const char *format, ...)
 {
     if (tally->violations[kind] && compare_places(place, &tally->place[kind]) > 0) {
-        /* a damaged file may have millions of violations, so only a text to keep is printed */
+        /* a damaged file may have millions of violations, so a text is printed only if it may be
+         * kept */
         tally->violations[kind]++;
         return;
     }

@@ -1,5 +1,5 @@
 /* Counts the verifier's checks and violations, and keeps the first violation of each kind, in file
- * order. The result does not depend on the number of threads. */
+ * order (ebpo_verify_place). The result does not depend on the number of threads. */
 #ifndef EBPO_VERIFY_TALLY_H
 #define EBPO_VERIFY_TALLY_H
 
@@ -20,10 +20,10 @@ typedef enum ebpo_verify_kind {
 #define EBPO_NO_FACE  UINT64_MAX
 #define EBPO_NO_PLANE UINT32_MAX
 
-/* Position of a violation. File order compares these members one after the other. The order of
- * octcodes (locational codes) is breadth-first. */
+/* Position of a violation. In file order, positions are compared by these members, one after the
+ * other. The order of octcodes (locational codes) is breadth-first. */
 typedef struct ebpo_verify_place {
-    uint64_t octcode; /* 0: no node, the whole file */
+    uint64_t octcode; /* 0: the violation concerns no node */
     uint64_t face;    /* EBPO_NO_FACE: none */
     uint32_t plane;   /* EBPO_NO_PLANE: none */
 } ebpo_verify_place;
@@ -33,14 +33,14 @@ typedef struct ebpo_tally {
     uint64_t checks[EBPO_VERIFY_KINDS], violations[EBPO_VERIFY_KINDS];
     ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* positions of the violations in `first` */
     char first[EBPO_VERIFY_KINDS][240];         /* texts of the first violations */
-    /* number of listed faces that do not touch the leaf; the format allows this if they are near
-     * the leaf */
+    /* number of faces in the lists of leaves that do not touch the leaf; the format allows such
+     * faces if they are near the leaf */
     uint64_t spare_entries;
     uint64_t exact_touches, exact_half_spaces; /* numbers of tests in rational arithmetic */
 } ebpo_tally;
 
-/* Counts one violation. If it precedes, in file order, the first violation so far, keeps its text
- * "place: text". */
+/* Counts one violation. If it precedes the first violation so far in file order, keeps its text,
+ * which begins with the place. */
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
                           const char *format, ...) EBPO_PRINTF(4, 5);
 

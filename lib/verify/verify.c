@@ -1,21 +1,22 @@
 /* Verifies a file: runs all checks in order, and makes the report. The folder `verify` checks the
  * results of other folders, so it uses no code of `construct`, of the writer or of `query`, and has
- * its own vector functions. It computes cells, half-spaces and clipping with other methods than the
- * builder. The verifier and the builder share only the exact predicates (tests/lint/test_layers.py
- * checks this).
+ * its own vector functions. It tests faces against cells and half-spaces, and clips faces, by other
+ * methods than the builder. The verifier and the builder share only the exact predicates
+ * (tests/lint/test_layers.py checks this).
  *
  * The order of the checks:
  * 1. chunk directory and chunk checksums (verify_chunks.c)
  * 2. content checksum
- * 3. consistency of the arrays; the checks of item 4 require it
- * 4. structure, nesting, colours, the walk (containment, lists, labels), subtrees, chunks of faces
+ * 3. consistency of the arrays, which the checks of item 4 require
+ * 4. structure, nesting, colours, patches, all nodes with their faces (containment, lists, labels),
+ *    subtrees, chunks of faces
  * 5. source mesh
  * 6. unused bytes
  * Damage that is found while reading is a violation, not an error of the call.
  *
  * This file also checks the colours of gray nodes, from the root down. The colour of a gray node is
- * the mean of the colours of the faces below it. The check does not round the mean to a byte: two
- * products decide if the stored byte is nearest to the mean. */
+ * the mean of the colours of the faces below it. The check does not compute the mean: comparisons
+ * of integers decide if the stored byte is nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -38,7 +39,8 @@
 /* Number of leaves after which pages of the workspace are released. */
 enum { NODES_A_TIME = 128 };
 
-/* Sums over the corners of faces. */
+/* Weighted sums over the corners of faces. The weight of a corner is the weight of its face
+ * (add_face). */
 typedef struct colour_sums {
     ebpo_wide of[4]; /* 0 to 2: weight times red, green, blue; 3: weight */
 } colour_sums;
@@ -48,12 +50,12 @@ typedef struct colour_check {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     ebpo_colours colours;
-    bool by_face;    /* use colours of faces; false: of vertices */
+    bool by_face;    /* true: the colours of faces are used; false: those of vertices */
     double longest;  /* longest side of the root cell */
     uint64_t leaves; /* number of visited leaves */
 } colour_check;
 
-/* Adds the colour of a corner. */
+/* Adds the colour of a corner to *sum. */
 static void add_corner(uint64_t weight, const uint8_t *rgba, colour_sums *sum)
 {
     for (int k = 0; k < 3; k++)
@@ -61,8 +63,8 @@ static void add_corner(uint64_t weight, const uint8_t *rgba, colour_sums *sum)
     sum->of[3] = ebpo_wide_plus(sum->of[3], (ebpo_wide){ 0, weight });
 }
 
-/* Adds a face. Its weight is 1 + floor(2^32 A / L^2), where A is twice the face's area, and L the
- * longest side of the root cell. */
+/* Adds the corners of a face to *sum. The weight of the face is 1 + floor(2^32 A / L^2), where A is
+ * twice the face's area, and L is the longest side of the root cell. */
 static void add_face(const colour_check *j, uint64_t face, colour_sums *sum)
 {
     const ebpo_mesh *mesh = &j->view->tree->mesh;
@@ -80,7 +82,8 @@ static void add_face(const colour_check *j, uint64_t face, colour_sums *sum)
     }
     double squares = across[0] * across[0] + across[1] * across[1];
     double area = ldexp(sqrt(squares + across[2] * across[2]), 32);
-    /* a larger face extends beyond the root cell, which check_vertices (verify_tree.c) reports */
+    /* a face with a larger weight extends beyond the root cell; check_vertices (verify_tree.c)
+     * reports it */
     uint64_t weight = area < 0x1p40 ? (uint64_t)area + 1 : 1;
     for (uint64_t i = 0; i < 3; i++)
         add_corner(weight,
@@ -106,7 +109,8 @@ static void add_leaf(colour_check *j, const ebpo_reference_node *leaf, colour_su
  * 1/2. */
 static bool is_nearest(const colour_sums *sum, int channel, uint32_t byte)
 {
-    /* twice the sum plus the weight, compared with 2 * byte * weight and 2 * (byte + 1) * weight */
+    /* the same condition, multiplied by 2 * weight and with `weight` added: 2 * byte * weight <=
+     * doubled < 2 * (byte + 1) * weight */
     ebpo_wide weight = sum->of[3],
               doubled = ebpo_wide_plus(ebpo_wide_left(sum->of[channel], 1), weight);
     return !ebpo_wide_less(doubled, ebpo_wide_times(weight, 2 * (uint64_t)byte)) &&
@@ -127,7 +131,8 @@ static void check_node(const colour_check *j, const ebpo_reference_node *node,
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-/* Checks the colours of a node and of all nodes below, and adds the sums of its faces to *above. */
+/* Checks the colours of a node and of all nodes below, and adds the sums over the faces below this
+ * node to *above. */
 static void check_subtree_colours(colour_check *j, const ebpo_reference_node *node,
                                   colour_sums *above)
 {

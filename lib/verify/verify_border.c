@@ -38,7 +38,8 @@ static uint64_t value_of_position(const double p[3])
     return value;
 }
 
-/* Returns the value of the edge from a to b. The value of the opposite edge is its negative. */
+/* Returns a pseudo-random value for the edge from a to b. The value of the opposite edge is its
+ * negative. */
 static uint64_t value_of_edge(const double a[3], const double b[3])
 {
     uint64_t from = value_of_position(a), to = value_of_position(b);
@@ -60,7 +61,8 @@ static uint64_t value_of_faces(const ebpo_mesh *mesh)
     return sum;
 }
 
-/* Returns the sum of the values of the loops' edges, times the loops' weights. */
+/* Returns the sum over all edges of the loops: the value of the edge, times the weight of the loop.
+ */
 static uint64_t value_of_loops(const ebpo_border_loops *loops)
 {
     uint64_t sum = 0, first = 0;
@@ -99,9 +101,9 @@ static double area_of(const double *a, const double *b, const double *c)
     return sqrt(sum) / 2;
 }
 
-/* Lists the caps between the path from point `first` to point `last` and the chord of these two
- * points, each `weight` times, with the orientation opposite to the loop. Recursive, at most 32
- * deep. */
+/* Lists the caps between the path of a loop from point `first` to point `last` and the straight
+ * segment between these two points. Each cap is listed `weight` times, with the orientation
+ * opposite to the loop. The depth of recursion is at most 32. */
 static void list_caps(cap_list *c, uint64_t first, uint64_t last, uint32_t weight)
 {
     if (last < first + 2 || c->no_memory)
@@ -127,8 +129,8 @@ static void list_caps(cap_list *c, uint64_t first, uint64_t last, uint32_t weigh
 
 #define CHECK(...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, __VA_ARGS__)
 
-/* Lists all caps. The loops are checked before, so their weights are at most the number of faces.
- */
+/* Lists all caps. ebpo_check_border_loops has checked the loops, so their weights are at most the
+ * number of faces. */
 static ebpo_status list_all_caps(cap_list *c, ebpo_error *error)
 {
     uint64_t first = 0;
@@ -177,7 +179,9 @@ ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_points *points,
                            .faces = caps.corner };
         status = ebpo_rays_follow(points, &mesh, &view->box, threads, progress, error);
         for (uint64_t i = 0; i < points->count && status == EBPO_OK; i++)
-            points->point[i].stored -= points->point[i].found; /* now without the caps */
+            /* `found` is the winding number of the caps; `stored` is now the winding number of the
+             * faces */
+            points->point[i].stored -= points->point[i].found;
     }
     free(caps.corner);
     return status;

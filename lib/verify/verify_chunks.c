@@ -1,13 +1,13 @@
 /* Verifies how the file stores its chunks (format-spec/gates.md, checksums.md).
  *
- * - A reference implementation, which follows the specification line by line and is not optimised,
- * decodes the chunks of faces with the coding `gates`. The corners are compared with the library's
- * result.
+ * - The chunks of faces with the coding `gates` are decoded by a reference implementation, which
+ *   follows the specification line by line and is not optimised. The corners are compared with the
+ *   corners that the library has decoded.
  * - The list of chunk offsets (/subtrees/chunk_directory) is compared with HDF5's indexes.
  * - Unused bytes of the file are counted. They do not affect results, but a change of these bytes
  *   must be detectable.
- * - Chunk checksums are compared with the last bytes of the chunks, which are read without the
- *   library's check. */
+ * - Chunk checksums are compared with the last bytes of the chunks. These bytes are read without
+ *   the library's check of checksums. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,11 +24,12 @@
 
 /* --- reference implementation of a reader of the coding `gates` --- */
 
-/* As in the specification: maximum number of open edges, and number of newest open edges among
- * which a new edge is searched. */
+/* Limits of the specification. OPEN_MAX: maximum number of open edges. NEWEST_EDGES: number of
+ * newest open edges among which pass_edge searches an edge. */
 enum { OPEN_MAX = 64, NEWEST_EDGES = 32 };
 
-/* An open edge, from vertex a to vertex b. */
+/* An open edge, from vertex a to vertex b: an edge of a face that was read, across which the next
+ * face may be read. */
 typedef struct open_edge_ends {
     uint64_t a, b;
 } open_edge_ends;
@@ -65,7 +66,7 @@ static void pass_edge(gates_reader *t, uint64_t a, uint64_t b)
     open_edge(t, b, a);
 }
 
-/* Reads a vertex. Returns false if the chunk is invalid. */
+/* Reads a vertex from the bytes `low` and `more`. Returns false if the chunk is invalid. */
 static bool read_vertex(gates_reader *t, uint64_t *vertex)
 {
     uint64_t code = *t->low++;
@@ -88,8 +89,8 @@ static bool read_vertex(gates_reader *t, uint64_t *vertex)
     return true;
 }
 
-/* Returns the index of the newest open edge that begins (`first`) or ends at the vertex, or
- * t->count if there is none. */
+/* Returns the index of the newest open edge that begins (if `first` is true) or ends at the vertex.
+ * Returns t->count if there is none. */
 static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
 {
     for (size_t i = t->count; i > 0; i--)
@@ -98,14 +99,12 @@ static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
     return t->count;
 }
 
-/* Reads a face across the open edge `gate` (1: the newest). `third`: three times the kind of the
- * face's third vertex c, plus the position of the gate in the face. Returns false if the chunk is
- * invalid. Kinds of c, where the gate runs from a to b:
- *   0: a new vertex
- *   1: the end of the newest open edge that begins at b
- *   2: the beginning of the newest open edge that ends at a
- *   3: a vertex that is stored as read_vertex reads it
- *   4 and more: the beginning of an open edge; 4: the newest */
+/* Reads a face across an open edge, its gate. `gate`: number of the open edge; 1 is the newest.
+ * `third`: three times the kind of the face's third vertex c, plus the position of the gate in the
+ * face. Returns false if the chunk is invalid. Kinds of c, if the gate leads from a to b:
+ *   0: a new vertex 1: the end of the newest open edge that begins at b 2: the beginning of the
+ *   newest open edge that ends at a 3: a vertex that is stored as read_vertex reads it 4 and more:
+ *   the beginning of an open edge; 4: the newest */
 static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t *face)
 {
     uint64_t c = 0;
@@ -250,13 +249,13 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* An array and its chunks by HDF5's index. */
+/* An array, and its chunks according to HDF5's index. */
 typedef struct indexed {
     const ebpo_array_in *array;
-    uint32_t number; /* the array's number in the list */
+    uint32_t number; /* number by which the list identifies the array */
     ebpo_chunk_location *chunks;
     uint64_t count;  /* number of chunks in HDF5's index */
-    uint64_t listed; /* number of chunks in the list so far */
+    uint64_t listed; /* number of this array's chunks found in the list so far */
 } indexed;
 
 enum { INDEXED_MAX = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
@@ -267,12 +266,13 @@ typedef struct offset_comparison {
     ebpo_head head;
     indexed array[INDEXED_MAX];
     unsigned arrays;
-    /* [rows] the list: the array's number in the upper 32 bits, the chunk's bytes in the lower */
+    /* [rows] the list: the array's number in the upper 32 bits, the chunk's size in bytes in the
+     * lower 32 bits */
     uint64_t *list, rows;
 } offset_comparison;
 
-/* Reads HDF5's index of an array, if the file has it. `number`: the array's number in the
- * specification, which has 64 numbers for each level, then numbers for all other arrays. */
+/* Reads HDF5's index of an array, if the file has the array. `number`: the array's number in the
+ * specification, which has 64 numbers for each level, and then numbers for all other arrays. */
 static ebpo_status index_array(offset_comparison *c, const ebpo_array_in *array, uint32_t number,
                                ebpo_error *error)
 {
@@ -341,13 +341,14 @@ static indexed *find_indexed(offset_comparison *c, uint32_t number)
     return NULL;
 }
 
-/* Compares a row of the list with HDF5's index. `at`, `bytes`: the chunk by the list. */
+/* Compares a row of the list with HDF5's index. `at`, `bytes`: offset in the file and size of the
+ * chunk according to the list. */
 static void compare_row(offset_comparison *c, uint64_t row, uint64_t at, uint32_t bytes)
 {
     ebpo_tally *tally = c->tally;
     uint32_t number = (uint32_t)(c->list[row] >> 32);
     indexed *of = find_indexed(c, number);
-    if (!of) /* a gap, or an array that the header does not require */
+    if (!of) /* the row is a gap, or belongs to an array that the header does not require */
         return;
     if (!CHECK(of->listed < of->count,
                "/subtrees/chunk_directory, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
@@ -408,12 +409,12 @@ ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
 
 /* --- unused bytes --- */
 
-/* Search for the bytes of the file that nothing uses. */
+/* State of the search for unused bytes of the file. */
 typedef struct survey {
     const ebpo_file *file;
     const ebpo_progress *progress;
     ebpo_head head;
-    ebpo_range *range; /* used bytes */
+    ebpo_range *range; /* [count] ranges of used bytes */
     uint64_t count, capacity;
 } survey;
 
@@ -480,8 +481,8 @@ static int by_offset(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts the bytes of a gap that are not zero. The gap may be large, so it is read in several
- * steps. */
+/* Adds the number of bytes of a gap that are not zero to *filled. The gap may be large, so it is
+ * read in several steps. */
 static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
 {
     enum { STEP_BYTES = 1 << 14 };
@@ -501,8 +502,8 @@ static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled
     return status;
 }
 
-/* Counts the bytes between the used bytes (*spare), and the bytes among them that are not zero
- * (*filled). */
+/* Sets *spare to the number of bytes between the used ranges, and *filled to the number of those
+ * bytes that are not zero. */
 static ebpo_status inspect_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
 {
     uint64_t file_end = ebpo_reader_own(s->file)->in.source.size;
@@ -542,7 +543,8 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
     if (status == EBPO_OK)
         status = inspect_gaps(&s, spare, filled, &failure);
     free(s.range);
-    /* damage is not reported here: the checks that read the damaged data report it */
+    /* damage is not reported here, because other checks read the damaged data and report the damage
+     */
     return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &failure);
 }
 
@@ -557,7 +559,7 @@ typedef struct checksum_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
     /* [rows] /chunk_checksums: the array's number in the upper 32 bits, the checksum in the lower
-     */
+     * 32 bits */
     const uint64_t *list;
     uint64_t rows;
 } checksum_comparison;
@@ -640,8 +642,8 @@ ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     ebpo_error failure = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
-    /* in a remote file, each chunk would take a request, so only the library's own check
-     * is made */
+    /* in a remote file, this check would send a request for each chunk; such a file is checked only
+     * by the library's reader */
     if (!file->has_checksums || ebpo_input_prefetches(&ebpo_reader_own(file)->in))
         return EBPO_OK;
     ebpo_status status = ebpo_file_locate(file, NULL, &failure);

@@ -1,7 +1,7 @@
-/* Determines exactly if a face touches a cell, if the part of a face in a cell satisfies the node's
- * planes, and how a ray crosses a face. Floating point with error bounds decides most cases;
- * rational arithmetic (GMP) decides the other cases. Only the exact predicates are shared with the
- * builder.
+/* Determines exactly if a face touches a cell, if the part of a face in a cell is in the
+ * half-spaces of the node's planes, and how a ray crosses a face. Floating point with error bounds
+ * decides most cases; rational arithmetic (GMP) decides the other cases. Only the exact predicates
+ * are shared with the builder.
  *
  * The methods, in the order of this file:
  * - clipping in rationals (Sutherland and Hodgman, "Reentrant polygon clipping", 1974)
@@ -19,7 +19,8 @@
 
 enum {
     CORNERS = 9
-}; /* a clipped face has three corners, and at most one more for each cell face */
+}; /* maximum number of corners: a clipped face has three, and at most one more for each of six cell
+    * faces */
 
 typedef struct polygon {
     int count;
@@ -60,8 +61,8 @@ static void set_triangle(polygon *g, const double low[3], const double high[3],
     mpq_clears(first, size, NULL);
 }
 
-/* Returns true if a coordinate is on the inner side of a cell face. cell_face 0: at least 0;
- * cell_face 1: at most 1. */
+/* Returns true if a coordinate is on the inner side of a cell face. cell_face: 0 (x must be at
+ * least 0) or 1 (x must be at most 1). */
 static bool exact_within(const mpq_t x, int cell_face)
 {
     return cell_face == 0 ? mpq_sgn(x) >= 0 : mpq_cmp_ui(x, 1, 1) <= 0;
@@ -156,22 +157,24 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
     return holds;
 }
 
-/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the normals of the box, the
- * normal of the face, and the cross products of an edge of the box with an edge of the face. These
- * axes are sufficient for a box and a triangle, which may have no area. */
+/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): a box and a triangle are apart if
+ * their projections on some axis are apart. It is sufficient to test the normals of the box, the
+ * normal of the face, and the cross products of an edge of the box with an edge of the face. This
+ * is also true for a face without area. */
 
 static const double eps = 0x1p-53;
-static const double slack = 0x1p-900; /* bound of errors by underflow */
+static const double slack = 0x1p-900; /* upper bound of errors by underflow */
 
 /* Corners of a face in cell coordinates. The error of each coordinate is at most 4 * 2^-53 of its
  * absolute value (plus 2^-1000). */
 typedef struct local_face {
     double at[3][3];
     double largest[3];  /* largest absolute coordinate on each axis, at least 1 */
-    unsigned contained; /* bit i: corner i is in the closed cell; exact */
+    unsigned contained; /* bit i: corner i is in the closed cell (exact) */
 } local_face;
 
-/* The relation of a face and a cell on some axes; UNSURE: not certain in floating point. */
+/* The relation of a face and a cell on the axes tested so far. UNSURE: floating point cannot
+ * decide. */
 typedef enum verdict { APART, INTERSECT, UNSURE } verdict;
 
 ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell)
@@ -200,8 +203,8 @@ static void local_make(local_face *out, const ebpo_frame *frame, const ebpo_corn
     }
 }
 
-/* Compares the intervals [a, b] of the face and [low, high] of the box on an axis. The error of
- * each end is at most `error`. Returns UNSURE for NaN. */
+/* Compares the intervals [a, b] of the face and [low, high] of the box on an axis. `error`: upper
+ * bound of the rounding error of each end. Returns UNSURE if a value is NaN. */
 static verdict compare_intervals(double a, double b, double low, double high, double error)
 {
     if (a > high + error || b < low - error)
@@ -211,16 +214,16 @@ static verdict compare_intervals(double a, double b, double low, double high, do
     return UNSURE;
 }
 
-/* Returns (b - a) * inverse. The result is 0 only when a and b are equal. Returns NaN, which makes
- * the comparison UNSURE, if the value is too small for exact bounds. */
+/* Returns (b - a) * inverse. The result is 0 only when a and b are equal. If the value is too small
+ * for the error bounds, returns NaN, so that compare_intervals returns UNSURE. */
 static double scaled_difference(double a, double b, double inverse)
 {
     double x = (b - a) * inverse;
     return a != b && fabs(x) < 0x1p-400 ? NAN : x;
 }
 
-/* Compares the intervals on the cross product of an edge of the face and the unit vector k. The
- * edge begins at corner i; l is the corner opposite to the edge. */
+/* Compares the intervals of face and box on one axis: the cross product of an edge of the face and
+ * the unit vector k. The edge begins at corner i of the face; corner l is opposite to the edge. */
 static verdict edge_axis(const local_face *p, const double edge[3], int i, int l, int k)
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -235,7 +238,7 @@ static verdict edge_axis(const local_face *p, const double edge[3], int i, int l
     return compare_intervals(a < b ? a : b, a < b ? b : a, low, high, error);
 }
 
-/* Compares the intervals on the normal of the face. */
+/* Compares the intervals of face and box on the normal of the face. */
 static verdict normal_axis(const local_face *p, double edge[3][3])
 {
     double value = 0, low = 0, high = 0, error = slack;
@@ -251,8 +254,8 @@ static verdict normal_axis(const local_face *p, double edge[3][3])
     return compare_intervals(value, value, low, high, error);
 }
 
-/* Compares the intervals on all axes except the normals of the box, which the caller has compared
- * exactly. */
+/* Compares the intervals of face and box on all axes except the normals of the box. On these, the
+ * caller has compared the intervals exactly. */
 static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face)
 {
     local_face p;
@@ -289,10 +292,12 @@ bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_t
     return ebpo_exact_touches(frame->low, frame->high, face);
 }
 
-/* Winding numbers by rays. In a projection along the axis, a face winds around the ray once or not
- * at all. To decide this, the edges that cross a half-line from the point are counted. The
- * half-line is along the axis of the larger shift. The smaller shift therefore decides on which
- * side of the half-line an end of an edge is, and the larger shift decides all remaining ties. */
+/* Winding numbers by rays. In a projection along the axis of the ray, the ray is a point, and a
+ * face winds around this point once or not at all. To decide which, the edges of the face are
+ * counted that cross a half-line from the point. The point is shifted by infinitely small amounts
+ * along both axes of the projection (verify_geometry.h). The half-line is parallel to the axis with
+ * the larger shift. So the smaller shift decides on which side of the half-line an end of an edge
+ * is, and the larger shift decides all remaining ties. */
 
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)
 {
@@ -306,8 +311,8 @@ static int orient_in(int u, int v, const double a[3], const double b[3], const d
                          (double[2]){ c[u], c[v] });
 }
 
-/* Returns 1 if the face, projected to the plane (u, v), winds around p counter-clockwise, -1 if
- * clockwise, 0 if it does not wind around p. */
+/* Returns 1 if the face, projected to the plane of the axes u and v, winds around p
+ * counter-clockwise, -1 if it winds around p clockwise, and 0 otherwise. */
 static int turns_around(const double p[3], int u, int v, const ebpo_corners *face)
 {
     int sum = 0;
@@ -325,8 +330,8 @@ static int turns_around(const double p[3], int u, int v, const ebpo_corners *fac
     return sum;
 }
 
-/* Returns the side of the face's plane on which the shifted p is. If p is in the plane, the first
- * nonzero component of the normal decides. */
+/* Returns the sign of the orientation of the face's corners and the shifted point p. If p is in the
+ * face's plane, the first nonzero component of the normal decides. */
 static int shifted_side(const double p[3], const ebpo_corners *face)
 {
     const double *a = face->at[0], *b = face->at[1], *c = face->at[2];
@@ -366,10 +371,10 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
  *
  *     n . x <= (max of (n - m) . v over the face's corners v) + (max of m . y over the unit cube)
  *
- * The bound is attained for one of these m: 0; m along one axis such that n - m is perpendicular to
- * an edge of the face; m along two axes such that n - m is normal to the face. A rounded m gives a
- * valid bound as well, so the face need not be clipped. Undecided cases are clipped in rationals.
- */
+ * For one of the following vectors m, the bound is equal to n . x: m = 0; m along one axis such
+ * that n - m is perpendicular to an edge of the face; m along two axes such that n - m is normal to
+ * the face. A rounded m also gives a valid bound, so most faces need not be clipped. If no bound
+ * decides, the face is clipped in rationals. */
 
 void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
                          const ebpo_reference_node *node)
@@ -401,7 +406,8 @@ static double highest_corner(const local_face *face, const double n[3])
     return fmax(a, fmax(b, c));
 }
 
-/* Returns true if the upper bound for m, including rounding errors, is at most `bound`. */
+/* Returns true if the upper bound of n . x that the vector m gives, including rounding errors, is
+ * at most `bound`. */
 static bool is_certified(const local_face *face, const double n[3], const double m[3], double bound)
 {
     double difference[3], cube = 0, size = 0;
@@ -459,7 +465,8 @@ static bool corner_beyond(const local_face *face, const double n[3], double boun
     return false;
 }
 
-/* Returns true if plane i cuts off no point of the face in the cell. The 1-norm of n is 511. */
+/* Returns true if plane i cuts off no point of the face in the cell. (511 in the error bound is the
+ * sum of the absolute components of n.) */
 static bool face_keeps(ebpo_tally *tally, const ebpo_node_planes *planes, int i,
                        const ebpo_frame *frame, const ebpo_corners *face, const local_face *local)
 {

@@ -14,7 +14,7 @@
 
 /* --- tests in rational arithmetic: exact and slow --- */
 
-/* A face: its corners in the model's coordinates, exact. */
+/* A face, given by its corners in the model's coordinates, without rounding. */
 typedef struct ebpo_corners {
     double at[3][3];
 } ebpo_corners;
@@ -22,14 +22,15 @@ typedef struct ebpo_corners {
 /* Returns true when the closed face intersects the closed box [low, high]. */
 bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face);
 
-/* Returns true when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, where
- * xi = (point - low) / (high - low). */
+/* Returns true when every point of the face in the closed box satisfies 4096 * (n . x) <= d, where
+ * x = (point - low) / (high - low) for each coordinate. */
 bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
                            const int32_t n[3], int32_t d);
 
 /* --- tests in floating point with error bounds; undecided cases use rational arithmetic --- */
 
-/* A cell: the coordinates of its cell faces (exact), and the reciprocals of its sizes (rounded). */
+/* A cell. `low`, `high`: the coordinates of its cell faces (exact). `inverse`: the reciprocals of
+ * its sides (rounded). */
 typedef struct ebpo_frame {
     double low[3], high[3], inverse[3];
 } ebpo_frame;
@@ -49,11 +50,12 @@ bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_t
 
 /* --- winding numbers by rays --- */
 
-/* A point is shifted by (d0, d1, d2), infinitely small and positive, with d0 >> d1 >> d2, as the
- * format defines for the corners of cells. The ray leads from the point in the positive direction
- * of an axis. Its far end is outside, where the winding number is 0. So the point's winding number
- * is a sum over the faces that the ray crosses: +1 if the ray crosses the face along its normal, -1
- * if it crosses against the normal. The computation uses only signs of orientation predicates. */
+/* A point is shifted by (d0, d1, d2), infinitely small and positive, where d0 is much greater than
+ * d1, and d1 is much greater than d2. The format defines this shift for the corners of cells. The
+ * ray leads from the point in the positive direction of an axis. Its far end is outside the model,
+ * where the winding number is 0. So the point's winding number is a sum over the faces that the ray
+ * crosses: +1 if the ray crosses the face along its normal, -1 if it crosses against the normal.
+ * The computation uses only signs of orientation predicates. */
 
 /* Returns the face's exact contribution to the winding number of p: -1, 0 or 1. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
@@ -66,27 +68,30 @@ void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 /* A node's planes must not cut off a point of a face in the cell, or a corner of the cell that is
  * in the solid. */
 
-enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
+enum { EBPO_NODE_PLANES_MAX = 255 }; /* the file stores the number of planes in a byte */
 
-/* The planes stored for a node, decoded. Invalid codes are omitted, because ebpo_check_nesting
- * reports them. */
+/* The decoded planes that the file stores for a node. Invalid codes are omitted, because
+ * ebpo_check_nesting reports them. */
 typedef struct ebpo_node_planes {
     int count;
-    double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX];   /* n . xi <= bound; exact */
-    int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX]; /* 4096 normal . xi <= d */
+    /* half-space n . x <= bound in cell coordinates (exact) */
+    double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX];
+    /* the same half-space as 4096 (normal . x) <= d */
+    int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX];
     uint32_t number[EBPO_NODE_PLANES_MAX]; /* index among the node's codes */
 } ebpo_node_planes;
 
 void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
                          const ebpo_reference_node *node);
 
-/* Checks a face that touches the cell against all planes. `number`: the face's index. */
+/* Checks that no plane cuts off a part of the face in the cell. The face must touch the cell.
+ * `number`: index of the face in the file. */
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                const ebpo_reference_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
-/* Checks the corners of the cell that are in the solid against all planes. `corners`: bit i is set
- * for corner i; bits 0, 1 and 2 of i are set for the upper end in x, y and z. */
+/* Checks that no plane cuts off a corner of the cell that is in the solid. `corners`: bit i is set
+ * if corner i is in the solid; bits 0, 1 and 2 of i are set for the upper end in x, y and z. */
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_reference_node *node, unsigned corners);
 

@@ -1,15 +1,15 @@
 /* Verifies labels, which are the winding numbers of cells, in two independent ways:
  *
  * - By links, for all cells. A point must have the same winding number in all cells of which it is
- * a corner. All corners of a cell without faces have the cell's winding number. A leaf stores the
- * winding number of its lowest corner; the winding numbers of its other corners follow from signed
- * crossings along the cell's edges. The 64 corners of a gray node's children are 27 points. The
- * corners of the root have the winding number 0. These links connect every cell to the root. So all
- * winding numbers are correct if no link is violated and the leaves list all their faces
- * (verify_lists.c).
- * - By rays through the whole mesh, for all cells or an even sample. The points are sorted into
- * columns along x, and each face is tested against the points in its columns. So faces are read
- * once, in their order, and only the points are in memory. */
+ *   a corner. All corners of a cell without faces have the cell's winding number. A leaf stores
+ *   the winding number of its lowest corner; the winding numbers of its other corners follow from
+ *   signed crossings of faces with the cell's edges. The 64 corners of a gray node's eight
+ *   children are 27 different points. The corners of the root have the winding number 0. These
+ *   links connect every cell to the root. So all winding numbers are correct if no link is
+ *   violated and the leaves list all their faces (verify_lists.c).
+ * - By rays through the whole mesh, for all cells or an evenly spread sample of the cells. The
+ *   points are sorted into columns along x, and each face is tested against the points in its
+ *   columns. So faces are read once, in their order, and only the points are in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -31,13 +31,13 @@ enum {
     FACE_GRAIN = 1 << 14 /* number of faces for each call of a thread's function */
 };
 
-/* Columns along x. They are the cells of a grid in y and z. */
+/* Columns of points along x. A column is a cell of a grid in y and z. */
 typedef struct columns {
     const ebpo_mesh *mesh;
-    double low[2], scale[2]; /* in y and z: least coordinates; reciprocals of the box's sides */
+    double low[2], scale[2]; /* [y, z] least coordinate of the box; reciprocal of the box's side */
     uint64_t side;           /* number of columns along y and along z */
-    uint64_t *first;         /* [side * side + 1] start of each column's points */
-    ebpo_ray_point *point;   /* column after column */
+    uint64_t *first;         /* [side * side + 1] index in `point` of each column's first point */
+    ebpo_ray_point *point;   /* the points, column after column */
 } columns;
 
 bool ebpo_rays_add(ebpo_ray_points *points, const ebpo_ray_point *point)
@@ -61,9 +61,9 @@ static columns grid_for(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
     return c;
 }
 
-/* Returns the position, in the grid of columns, of a coordinate y (i = 0) or z (i = 1). The
- * function is monotone, so a point within a face's range of coordinates is also within the face's
- * range of columns. */
+/* Returns the position in the grid of columns for a coordinate x, which is a y coordinate if i is 0
+ * and a z coordinate if i is 1. The function is monotone, so a point within a face's range of
+ * coordinates is also within the face's range of columns. */
 static uint64_t column_of(const columns *c, int i, double x)
 {
     double at = (x - c->low[i]) * c->scale[i] * (double)c->side;
@@ -75,7 +75,7 @@ static uint64_t column_of_point(const columns *c, const ebpo_ray_point *p)
     return column_of(c, 1, p->at[2]) * c->side + column_of(c, 0, p->at[1]);
 }
 
-/* The columns from[i] .. to[i] in y (i = 0) and z (i = 1). */
+/* A range of columns: positions from[0] .. to[0] in y, and from[1] .. to[1] in z. */
 typedef struct column_range {
     uint64_t from[2], to[2];
 } column_range;
@@ -115,7 +115,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     }
     EBPO_FOR_ITEMS_SCATTERED(points->workspace, i, 0, points->count)
         sorted[c->first[column_of_point(c, &points->point[i])]++] = points->point[i];
-    /* each `first` has been advanced to the start of the next column */
+    /* each element of `first` has been advanced to the start of the next column */
     memmove(c->first + 1, c->first, cells * sizeof *c->first);
     c->first[0] = 0;
     ebpo_array_free(points->workspace, points->point);
@@ -124,8 +124,8 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     return EBPO_OK;
 }
 
-/* Adds a face's contributions to the winding numbers of points [begin, end). Several threads may
- * update one point. */
+/* Adds a face's contributions to `found` of the points begin .. end - 1. Several threads may update
+ * the same point. */
 static void count_hits(const columns *c, const ebpo_corners *face, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++) {
@@ -142,12 +142,13 @@ static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, uns
     const columns *c = context;
     (void)worker;
     (void)error;
-    uint64_t rows = 0; /* number of visited rows of columns, which are far apart in memory */
+    /* number of visited rows of columns; points of different rows are far apart in memory */
+    uint64_t rows = 0;
     for (uint64_t f = begin; f < end; f++) {
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
         column_range r = columns_of_face(c, &face);
-        /* the columns with the same z are adjacent */
+        /* the points of columns with the same z are adjacent */
         for (uint64_t z = r.from[1]; z <= r.to[1]; z++) {
             count_hits(c, &face, c->first[z * c->side + r.from[0]],
                        c->first[z * c->side + r.to[0] + 1]);
@@ -172,8 +173,8 @@ ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, con
     return status;
 }
 
-/* Estimates the number of tests of a face against a point if `count` points were spread evenly over
- * the box. */
+/* Estimates how many tests of a face against a point are needed, if `count` points are spread
+ * evenly over the box. */
 static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count)
 {
     columns c = grid_for(mesh, box, count);
@@ -189,10 +190,12 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
 
 /* --- selection of the cells to check by rays --- */
 
-/* By default, all cells are checked if there are at most CELLS_ALL, otherwise SAMPLES_MANY cells.
- * If checking so many cells would take too long, SAMPLES_LEAST cells are checked. */
+/* Default number of cells to check by rays: all cells if there are at most CELLS_ALL cells,
+ * otherwise SAMPLES_MANY. If checking this number of cells would take too long, the default is
+ * SAMPLES_LEAST. */
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
-/* Number of tests of a face against a point that takes too long: some seconds. */
+/* Maximum number of tests of a face against a point; more tests would take more than some seconds.
+ */
 static const double ray_work_affordable = 4e8;
 
 static uint64_t default_samples(const ebpo_reference_tree *view, uint64_t cells)
@@ -218,8 +221,9 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view
     }
     if (samples == 0)
         samples = default_samples(view, all);
-    /* A class is the cells of one level and type. Half of the samples are distributed evenly to the
-     * classes, so that small levels are included, and half in proportion to the number of cells. */
+    /* A class consists of the cells of one level and one type. Half of the samples are distributed
+     * evenly to the classes, so that small levels are included. The other half is distributed in
+     * proportion to the number of cells. */
     for (int l = 0; l < view->tree->info.level_count; l++)
         for (int type = 0; type <= EBPO_GRAY; type++) {
             uint64_t cells = plan->cells[l][type];
@@ -252,15 +256,14 @@ static void corner_position(const ebpo_frame *frame, unsigned corner, double out
         out[k] = corner >> k & 1 ? frame->high[k] : frame->low[k];
 }
 
-/* Seven edges of a cell that connect all corners to corner 0: the corners at the ends, and the
- * axis.
- */
+/* Seven edges of a cell that connect all corners to corner 0: the corners at both ends of the edge,
+ * and its axis. */
 static const struct {
     unsigned char from, to, axis;
 } edge_tree[7] = { { 0, 1, 0 }, { 0, 2, 1 }, { 0, 4, 2 }, { 2, 3, 0 },
                    { 4, 5, 0 }, { 4, 6, 1 }, { 6, 7, 0 } };
 
-/* Adds the changes that a face causes to the winding number along the seven edges. */
+/* Adds to change[e] by how much a face changes the winding number along edge e of edge_tree. */
 static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo_corners *face)
 {
     for (int e = 0; e < 7; e++) {
@@ -333,7 +336,8 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
     }
 }
 
-/* Returns the number of the point, 0 .. 26, at a corner of a child. */
+/* Returns the number, 0 to 26, of the point at a corner of a child. A corner of several children
+ * has one number. */
 static int shared_point(unsigned octant, unsigned corner)
 {
     int point = 0, step = 1;

@@ -12,7 +12,7 @@
 
 /* --- winding numbers of many points by rays --- */
 
-/* The lowest corner of a cell. */
+/* A point to check by rays: the lowest corner of a cell. */
 typedef struct ebpo_ray_point {
     double at[3];
     uint64_t octcode; /* code of the cell */
@@ -20,9 +20,10 @@ typedef struct ebpo_ray_point {
     int64_t found;    /* winding number by crossings, set by ebpo_rays_follow */
 } ebpo_ray_point;
 
-/* List of points. A list of zeros is empty. Free `point` with ebpo_array_free. */
+/* A list of points. A structure of zeros is an empty list. The caller frees `point` with
+ * ebpo_array_free. */
 typedef struct ebpo_ray_points {
-    ebpo_workspace *workspace; /* quota of the list, or NULL */
+    ebpo_workspace *workspace; /* workspace from which `point` is allocated, or NULL */
     ebpo_ray_point *point;
     uint64_t count, capacity;
 } ebpo_ray_points;
@@ -43,7 +44,7 @@ EBPO_MUST_USE ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_m
  * end in x, y and z. */
 typedef struct ebpo_node_windings {
     int64_t at[8];
-    unsigned known; /* bit i: at[i] is set. Without a mesh, only corner 0 of a leaf is known */
+    unsigned known; /* bit i: at[i] is known. Without a mesh, only corner 0 of a leaf is known */
 } ebpo_node_windings;
 
 /* The cells to check by rays: an even sample of the cells of each level and type. */
@@ -52,11 +53,12 @@ typedef struct ebpo_label_plan {
     uint64_t take[EBPO_LEVELS_MAX][4];  /* number of cells to check */
 } ebpo_label_plan;
 
-/* Chooses about `samples` cells. 0: the default that ebpo_verify_options documents. */
+/* Chooses about `samples` cells. If `samples` is 0, chooses the default number that
+ * ebpo_verify_options documents. */
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view, uint64_t samples);
 
-/* Computes the winding numbers of the corners of a leaf, white or black node. `faces`: the `count`
- * faces that touch the node. */
+/* Computes the winding numbers of the corners of a leaf, white or black node. `faces`: [count]
+ * indices of the faces that touch the node's cell. */
 void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_reference_tree *view,
                             const ebpo_reference_node *node, const ebpo_frame *frame,
                             const uint32_t *faces, uint64_t count);
@@ -70,7 +72,7 @@ void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_reference_tree *vie
 EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_reference_tree *view,
                                    const ebpo_reference_node *node, const ebpo_frame *frame,
                                    const ebpo_label_plan *plan);
-/* Compares the winding numbers by rays with the winding numbers in the file. */
+/* Compares the winding numbers that rays have found with the winding numbers in the file. */
 void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
 /* Compares the winding numbers at common corners of the children of a gray node. Stores the winding

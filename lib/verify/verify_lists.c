@@ -2,12 +2,12 @@
  *
  * A leaf must list every face that touches its closed cell. No face may touch a white or black
  * cell. The builder also lists faces for which its test is not certain. So a listed face that does
- * not touch the leaf's cell is no violation if it touches the cell widened by 1/256; such faces are
- * only counted.
+ * not touch the leaf's cell is no violation if it touches the cell enlarged by 1/256 of its size on
+ * each side; such faces are only counted.
  *
- * A gray node is only allowed if a leaf in its place would list more faces than the limit of the
- * file (`leaf_faces`). To check this, the different faces in the lists below the node are counted
- * up to the limit. If there is not enough memory to count them, the node passes. */
+ * The format allows a gray node only if a leaf in its place would list more faces than the limit of
+ * the file (`leaf_faces`). To check this, the different faces in the lists below the node are
+ * counted up to the limit. If there is not enough memory to count them, the check passes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -29,7 +29,7 @@ static void report_face(ebpo_tally *tally, const ebpo_reference_node *node, uint
 typedef struct face_list {
     const uint32_t *refs;
     uint32_t ref_count, new_count;
-    uint64_t first; /* first new face */
+    uint64_t first; /* index of the first new face */
 } face_list;
 
 /* Returns the face list of a leaf. */
@@ -56,8 +56,8 @@ static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
     return low < count && faces[low] == face;
 }
 
-/* Checks that a listed face touches the leaf's cell widened by 1/256. Distance queries with a
- * limited level depend on this. */
+/* Checks that a listed face touches the leaf's cell enlarged by 1/256 of its size on each side.
+ * Distance queries with a limited level rely on this condition. */
 static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
                        const ebpo_reference_node *leaf, uint32_t face)
 {
@@ -74,7 +74,8 @@ static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
         report_face(tally, leaf, face, "the leaf lists a face that is not near it");
 }
 
-/* Checks the listed faces that do not touch the leaf. `faces`: all faces that touch the leaf. */
+/* Checks the listed faces that do not touch the leaf. `faces`: [count] all faces that touch the
+ * leaf, ascending. */
 static void check_extra(ebpo_tally *tally, const ebpo_reference_tree *view,
                         const ebpo_reference_node *leaf, const face_list *list,
                         const uint32_t *faces, uint64_t count)
@@ -135,12 +136,12 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
 }
 
 /* The different faces that the leaves below a node list. Faces are gathered only until there are
- * more than `limit`. They are kept in a list of at most about twice `limit` entries, which may
- * contain repetitions. If `limit` exceeds LIST_LIMIT_MAX, one bit for each face of the mesh
- * replaces the list. */
+ * more than `limit` different faces. They are kept in a list of at most about twice `limit`
+ * entries, which may contain repetitions. If `limit` exceeds LIST_LIMIT_MAX, they are marked in an
+ * array with one bit for each face of the mesh instead. */
 typedef struct gathering {
     uint32_t *faces; /* [count] the list */
-    uint8_t *listed; /* the bits; NULL: the list is used */
+    uint8_t *listed; /* bit f: face f was gathered; NULL: the list is used */
     uint64_t count, capacity, limit;
     bool more; /* there are more different faces than `limit` */
     bool short_of_memory;
@@ -183,8 +184,8 @@ static void mark_list(gathering *g, const face_list *list)
         mark_face(g, list->first + i);
 }
 
-/* Adds a leaf's list. A list contains no face twice, so a list longer than the limit is sufficient
- * to set `more`. */
+/* Adds the faces of a leaf's list. A list contains no face twice, so if the list is longer than the
+ * limit, `more` is set at once. */
 static void gather_list(gathering *g, const face_list *list)
 {
     uint64_t length = (uint64_t)list->ref_count + list->new_count;

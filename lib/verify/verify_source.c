@@ -2,10 +2,10 @@
  *
  * The recorded repairs are repeated on a copy of the source. Afterwards, the copy must be equal to
  * the file's mesh bit for bit. If the file's mesh is in the source's order, vertices and faces are
- * compared one by one; if not, as multisets. For a subset, or the file of one component, faces and
- * vertices are compared by their source indices. The file must have the attributes of the source,
- * in the same order, except for omitted elements. If an earlier version of the program has rounded
- * the coordinates, only this is reported. */
+ * compared one by one. Otherwise they are compared as multisets. For a subset, or the file of one
+ * component, faces and vertices are compared by their source indices. The file must have the
+ * attributes of the source, in the same order, except for attributes of omitted elements. If an
+ * earlier version of the program has rounded the coordinates, only this fact is reported. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -65,8 +65,8 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
     return status;
 }
 
-/* Returns the repair steps of the record. (If faces were flipped without the step `orient`, the
- * step `flip` has flipped all faces.) */
+/* Returns the repair steps that the record implies. (If faces were flipped without the step
+ * `orient`, then the step `flip` has flipped all faces.) */
 static unsigned steps_of(const ebpo_repair_record *to_repeat)
 {
     return (to_repeat->weld ? EBPO_REPAIR_WELD : 0) | (to_repeat->orient ? EBPO_REPAIR_ORIENT : 0) |
@@ -75,9 +75,9 @@ static unsigned steps_of(const ebpo_repair_record *to_repeat)
            (to_repeat->fill_holes ? EBPO_REPAIR_FILL : 0);
 }
 
-/* Repeats the recorded repairs on a copy of the source; *repeated receives their record. If the
- * number of flipped faces differs from the recorded number, repeats the repairs as earlier versions
- * of the program did, which flipped fewer faces. */
+/* Sets *mesh to a copy of the source, repeats the recorded repairs on it, and sets *repeated to
+ * their record. If the number of flipped faces differs from the recorded number, does this again
+ * with the repairs of earlier versions of the program, which flipped fewer faces. */
 static ebpo_status repair_again(ebpo_mesh *mesh, const ebpo_mesh *source,
                                 const ebpo_repair_record *to_repeat, ebpo_repair_record *repeated,
                                 ebpo_workspace *workspace, ebpo_error *error)
@@ -140,24 +140,24 @@ static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_m
                                  "the face (by its source index) has other corners in the file");
 }
 
-/* Returns true if element, names and types are equal. */
+/* Returns true if element, names and type of two arrays of attributes are equal. */
 static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
 {
     return strcmp(a->element, b->element) == 0 && strcmp(a->names, b->names) == 0 &&
            a->type == b->type && a->list == b->list;
 }
 
-/* Returns true if the image of a texture is missing in the source or in the file, so that its rows
- * cannot be compared. */
+/* Returns true if the image of a texture is missing in the source (row `at`) or in the file (row
+ * i), so that the rows cannot be compared. */
 static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
                           uint64_t i)
 {
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
 
-/* Compares row i of the file's array with row source_row[i] of the source's array, or with row i if
- * `source_row` is NULL. Skips faces that repairs have added: their source indices are at
- * least source->rows. */
+/* Compares each row i of the file's array with row source_row[i] of the source's array, or with row
+ * i if `source_row` is NULL. Skips rows of faces that repairs have added; the source indices of
+ * these faces are at least source->rows. */
 static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
                          const ebpo_attribute *stored, const uint32_t *source_row,
                          ebpo_workspace *workspace)
@@ -175,7 +175,8 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
 }
 
 /* Returns the source indices of an array's rows, or NULL if row i of the file is row i of the
- * source. For elements other than vertices and faces, every file has all rows of the source. */
+ * source. For elements other than vertices and faces, every file has all rows of the source in
+ * their order. */
 static const uint32_t *source_rows(const ebpo_attribute *array, const ebpo_maps *maps)
 {
     if (maps && ebpo_attribute_is_of(array, "vertex"))
@@ -184,8 +185,8 @@ static const uint32_t *source_rows(const ebpo_attribute *array, const ebpo_maps 
 }
 
 /* Checks that the file has the attribute arrays of the source, in the same order, except for arrays
- * of omitted elements. `maps`: source indices of the file's rows; NULL: the rows are in the
- * source's order. */
+ * of omitted elements. `maps`: source indices of the file's vertices and faces; NULL: they are in
+ * the source's order. */
 static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const ebpo_mesh *stored,
                                const ebpo_maps *maps)
 {
@@ -236,8 +237,8 @@ static uint32_t *sorted_order(const ebpo_mesh *mesh, uint64_t count,
     return order;
 }
 
-/* Compares the faces or the vertices of two meshes as multisets: sorts both, and compares one by
- * one. */
+/* Compares the faces (or, if `faces` is false, the vertices) of two meshes as multisets: sorts the
+ * elements of both meshes, and compares them one by one. */
 static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_mesh *b,
                                    bool faces, ebpo_error *error)
 {
@@ -259,9 +260,9 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     return EBPO_OK;
 }
 
-/* Computes (*out)[i]: the index in `whole` of the face with the source index i, or EBPO_NO_INDEX if
- * the face was dropped. If source indices are the indices in `whole`, *out remains NULL.
- * *source_count: number of source indices. */
+/* Sets (*out)[i] to the index in `whole` of the face with the source index i, or to EBPO_NO_INDEX
+ * if the face was dropped. If source indices are the indices in `whole`, *out remains NULL. Sets
+ * *source_count to the number of source indices. */
 static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64_t *source_count,
                                   ebpo_error *error)
 {
@@ -279,7 +280,7 @@ static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64
     return EBPO_OK;
 }
 
-/* Returns true if face i of the part has the same corners as the face of `whole` with its source
+/* Returns true if face i of `part` has the same corners as the face of `whole` with the same source
  * index. */
 static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint64_t source_count,
                          const ebpo_mesh *part, const ebpo_maps *maps, uint64_t i)
@@ -294,8 +295,8 @@ static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint
     return true;
 }
 
-/* Compares each face and vertex of the file by its source index: for a subset, the file of one
- * component, or a mesh of which repairs have dropped faces. */
+/* Compares each face and vertex of the file by its source index. This is done for a subset, for the
+ * file of one component, and for a mesh from which repairs have dropped faces. */
 static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *whole,
                                 const ebpo_read_options *read, ebpo_error *error)
 {
@@ -344,8 +345,9 @@ static bool check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_me
                  "the source file's digest or size is not the recorded one");
 }
 
-/* Returns true if an earlier version of the program has written the file: it rounded the
- * coordinates of OBJ, OFF and text STL to floats, even if the text had more digits. */
+/* Returns true if an earlier version of the program has written the file and rounded its
+ * coordinates. Earlier versions rounded the coordinates of OBJ, OFF and text STL to floats, even if
+ * the text had more digits. */
 static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
 {
     return source->xyz64 && !info->double_coordinates && source->source_format[0] &&
@@ -375,7 +377,8 @@ static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *repaired,
     return status;
 }
 
-/* Returns true for the file of one component, which records that the source has more faces. */
+/* Returns true for the file of one component: it records that the source has more faces than the
+ * file. */
 static bool is_part(const ebpo_info *info)
 {
     return info->source_face_count + info->repair_record.added_faces -
@@ -389,8 +392,8 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (check_digest(tally, info, source) && was_rounded(info, source)) {
-        /* no further comparison, as rounding may have made vertices equal and may have changed
-         * how polygons are cut into triangles */
+        /* nothing else is compared, because rounding may have made vertices equal, and may have
+         * changed how polygons are cut into triangles */
         CHECK(false, "coordinates were rounded to single precision by an earlier version; convert "
                      "again");
         return EBPO_OK;

@@ -1,12 +1,12 @@
 /* Verifies the table of subtrees (format-spec/subtrees.md). Visits the whole tree once, depth
  * first, which is the order of the faces, and counts all items again.
  *
- * Every column of every row is recomputed, except the two numbers of shared chunks, because
- * /subtrees/shared_chunks is only a hint. The sum of these numbers must be the number of rows of
- * /subtrees/shared_chunks.
+ * Every column of every row is recomputed, except the two columns with numbers of shared chunks,
+ * because /subtrees/shared_chunks is only a hint. The sum of these two columns over all subtrees
+ * must be the number of rows of /subtrees/shared_chunks.
  *
- * This check is independent of the library's writer and reader, which proceed level by level. It
- * shares with them only the code that reads arrays. */
+ * This check is independent of the library's writer and reader, which proceed level by level. This
+ * file shares with them only the code that reads arrays. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -21,13 +21,13 @@
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
 /* Columns of the table, numbered as in the specification. From FIRST_LEVEL on, each level has
- * OF_A_LEVEL columns; GRAY to END_GROWTH are positions among them. */
+ * OF_A_LEVEL columns. GRAY to END_GROWTH are the positions of the columns of one level. */
 enum {
-    FACES_BEFORE, /* faces between the previous subtree and this one */
+    FACES_BEFORE, /* number of new faces between the previous subtree and this one */
     FACES,
     VERTICES_BEFORE,
     VERTICES,
-    SHARED_FACES, /* number of chunks */
+    SHARED_FACES, /* number of chunks with shared faces */
     SHARED_VERTICES,
     FIRST_LEVEL,
     GRAY = 0,
@@ -56,18 +56,20 @@ static const char *const level_names[] = { "gray nodes",
 typedef struct recount {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
-    int level;                       /* level of the subtrees' roots */
-    const uint32_t *counts;          /* [subtrees][columns] /subtrees/counts, as stored */
-    unsigned columns, rows_of_chunk; /* columns of `counts`, and rows in each of its chunks */
-    const uint64_t *index;           /* [chunks][columns] /subtrees/index, as stored */
-    uint64_t subtrees, shared_rows;  /* shared_rows: number of rows of /subtrees/shared_chunks */
-    /* numbers of subtrees, faces and vertices so far */
+    int level;              /* level of the subtrees' roots */
+    const uint32_t *counts; /* [subtrees][columns] /subtrees/counts, as stored */
+    /* number of columns of `counts`; number of rows in each of its chunks */
+    unsigned columns, rows_of_chunk;
+    const uint64_t *index;          /* [chunks][columns] /subtrees/index, as stored */
+    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of /subtrees/shared_chunks */
+    /* numbers of subtrees, faces and vertices counted so far */
     uint64_t subtree, faces, vertices;
-    uint64_t shared_done;          /* sum of the numbers of shared chunks so far */
+    /* sum of the two columns with numbers of shared chunks, over the subtrees so far */
+    uint64_t shared_done;
     uint64_t end[EBPO_LEVELS_MAX]; /* [level] end of the last leaf's new faces */
-    uint64_t sum[COLUMNS_MAX];     /* of each column, over all subtrees before the current one */
-    uint64_t row[COLUMNS_MAX];     /* counts of the current subtree */
-    bool within;                   /* the visit is within a subtree */
+    uint64_t sum[COLUMNS_MAX];     /* [column] sum over all subtrees before the current one */
+    uint64_t row[COLUMNS_MAX];     /* [column] counts of the current subtree */
+    bool within;                   /* the node that is visited is below the root of a subtree */
 } recount;
 
 /* Returns the name of a column. *level: the level to which it belongs, or -1. */
@@ -87,7 +89,7 @@ static void check_row(recount *c)
     ebpo_tally *tally = c->tally;
     const uint32_t *stated = c->counts + c->subtree * c->columns;
     int level;
-    /* these two numbers are not checked: they are hints, as is /subtrees/shared_chunks */
+    /* these two columns are not checked, because they are hints, as is /subtrees/shared_chunks */
     c->row[SHARED_FACES] = stated[SHARED_FACES];
     c->row[SHARED_VERTICES] = stated[SHARED_VERTICES];
     c->shared_done += c->row[SHARED_FACES] + c->row[SHARED_VERTICES];
@@ -110,8 +112,8 @@ static void check_row(recount *c)
 
 /* --- visiting the tree --- */
 
-/* Counts the next `count` faces, which are the new faces of a leaf, and the vertices that these
- * faces are the first to use. */
+/* Counts the next `count` faces of the mesh, which are the new faces of a leaf. Also counts the
+ * vertices that no earlier face uses. */
 static void count_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
@@ -124,8 +126,8 @@ static void count_faces(recount *c, uint64_t count)
     c->vertices = used;
 }
 
-/* Counts a leaf. `row`: counts of the leaf's level in the current subtree; NULL: not in a subtree.
- */
+/* Counts a leaf. `row`: counts of the leaf's level in the current subtree; NULL: the leaf is not in
+ * a subtree. */
 static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
 {
     const ebpo_level *level = &c->view->tree->level[leaf->cell.level];

@@ -26,7 +26,7 @@
 
 enum {
     SIDE_MAX = 128,      /* greatest number of grid cells along an axis */
-    SAMPLED_FACES = 4096 /* about the number of tested faces of a patch */
+    SAMPLED_FACES = 4096 /* approximate number of faces that are tested for a patch */
 };
 
 #define CHECK(...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, __VA_ARGS__)
@@ -36,13 +36,13 @@ enum {
 typedef struct node_walk {
     ebpo_tally *tally;
     const ebpo_tree *tree;
-    /* by level: numbers of groups and of leaves so far */
+    /* [level] number of groups and number of leaves visited so far */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
-    uint64_t face;  /* number of new faces of the leaves so far */
+    uint64_t face;  /* number of new faces of the leaves visited so far */
     uint64_t found; /* number of visited nodes with a patch */
 } node_walk;
 
-/* Returns the row of a node's patch, or NULL. */
+/* Returns the row of the patch of the node with this octcode, or NULL if the node has no patch. */
 static const uint64_t *find_patch(const ebpo_surface *s, ebpo_octcode code)
 {
     uint64_t low = 0, high = s->patch_count;
@@ -94,14 +94,14 @@ typedef struct triangle_grid {
     ebpo_workspace *workspace;
     double low[3], step[3]; /* lowest corner of the grid; sides of a cell */
     int side;               /* number of cells along each axis */
-    uint64_t *begin;        /* [side^3 + 1] begin of each cell's triangles in `triangle` */
+    uint64_t *begin;        /* [side^3 + 1] index in `triangle` of each cell's first triangle */
     uint32_t *triangle;     /* indices of triangles, cell by cell */
 } triangle_grid;
 
-/* Triangles of a patch, or faces of the model. */
+/* A list of triangles: those of a patch, or faces of the model. */
 typedef struct triangle_list {
     uint64_t count;
-    const ebpo_patch *patch; /* NULL: faces of the mesh, from `first` */
+    const ebpo_patch *patch; /* NULL: the list has the faces first .. first + count - 1 of `mesh` */
     const ebpo_mesh *mesh;
     uint64_t first;
 } triangle_list;
@@ -200,8 +200,8 @@ static bool make_grid(triangle_grid *g, const triangle_list *list, ebpo_workspac
     return true;
 }
 
-/* Returns true unless the point is certainly farther than `limit` from all triangles in a range of
- * cells. */
+/* Returns false if the point is certainly farther than `limit` from all triangles in a range of
+ * cells; otherwise returns true. */
 static bool is_near_cells(const triangle_grid *g, const triangle_list *list, const double p[3],
                           double limit, const int from[3], const int to[3])
 {
@@ -217,7 +217,8 @@ static bool is_near_cells(const triangle_grid *g, const triangle_list *list, con
     return false;
 }
 
-/* Returns true unless the point is certainly farther than `limit` from all triangles. */
+/* Returns false if the point is certainly farther than `limit` from all triangles; otherwise
+ * returns true. */
 static bool is_near(const triangle_grid *g, const triangle_list *list, const double p[3],
                     double limit)
 {
@@ -234,8 +235,9 @@ static bool is_near(const triangle_grid *g, const triangle_list *list, const dou
     return is_near_cells(g, list, p, limit, from, to);
 }
 
-/* Tests the corners and the centre of every `every`-th triangle of the list `of`. Returns the
- * number of these points that are farther than `limit` from the list `from`, whose grid is g. */
+/* Tests the corners and the centre of every `every`-th triangle of the list `of`. Returns how many
+ * of these points are certainly farther than `limit` from all triangles of the list `from`. `g`:
+ * grid of `from`. */
 static uint64_t count_far(const triangle_list *of, uint64_t every, const triangle_grid *g,
                           const triangle_list *from, double limit)
 {

@@ -1,17 +1,17 @@
-/* Finds the nodes of a tree in memory, and runs the checks that need no single face: nesting and
- * structure.
+/* Finds the nodes of a tree in memory, and runs the checks for which no single face is needed:
+ * nesting and structure.
  *
- * - Nodes are found by rank (number among the nodes of the level and type). The numbers of items
- * before each group of siblings give the positions of a node's children, planes, lists and winding
- * number.
+ * - Nodes are found by rank (number among the nodes of the level and type). For each group of
+ *   siblings, the numbers of items before the group are stored. They give the positions of a
+ *   node's children, planes, lists and winding number.
  * - Structure: the arrays are consistent (ebpo_check_shape, which runs before all other checks),
- * and the format allows the tree: summaries, leaf sizes, the order of faces, the root box, balanced
- *   edges of a solid.
+ *   and the tree obeys the format: summaries, leaf sizes, the order of faces, the root box,
+ *   balanced edges of a solid.
  * - Nesting: the planes of a node and of all its ancestors bound the node's envelope. So the
- * envelope is within the parent's envelope if a plane is the same in the coordinates of every cell.
- * This condition is checked in integers, for points of sampled cells. Each point is compared with
- * each plane twice: once the plane is transformed down to the cell of the point, once the point is
- * transformed up to the cell of the plane. */
+ *   envelope is within the parent's envelope if a plane is the same half-space in the coordinates
+ *   of every cell. This condition is checked in integers, for points of sampled cells. Each point
+ *   is compared with each plane twice: first the point is transformed to the cell of the plane,
+ *   then the plane is transformed to the cell of the point. Both comparisons must agree. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -28,7 +28,7 @@
 
 /* --- finding nodes --- */
 
-/* Adds the numbers of nodes, planes and references of a group to *sum. */
+/* Adds the numbers of nodes, planes and references in a group to *sum. */
 static void add_group(ebpo_reference_group *sum, const ebpo_reference_tree *view,
                       const ebpo_level *level, uint64_t group, unsigned octants)
 {
@@ -83,7 +83,8 @@ void ebpo_reference_free(ebpo_reference_tree *view)
     *view = (ebpo_reference_tree){ 0 };
 }
 
-/* Returns a node, with type and rank, from its position. */
+/* Returns the node at a position, with its type and rank. `group`: index of its group in the level
+ * of `cell`. */
 static ebpo_reference_node node_in_group(const ebpo_reference_tree *view, ebpo_octcode code,
                                          ebpo_cell cell, uint64_t group, unsigned octant)
 {
@@ -120,7 +121,7 @@ ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
     return node_in_group(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
 }
 
-/* Returns the group of `level` that contains the gray node of this rank. */
+/* Returns the index of the group of `level` that contains the gray node of this rank. */
 static uint64_t group_of_gray(const ebpo_reference_tree *view, int level, uint64_t rank)
 {
     uint64_t low = 0, high = view->tree->level[level].group_count;
@@ -134,7 +135,8 @@ static uint64_t group_of_gray(const ebpo_reference_tree *view, int level, uint64
     return low;
 }
 
-/* Returns the node at a position of a level. Finds its ancestors to determine its cell. */
+/* Returns the node with this octant in this group of a level. To determine its cell, finds its
+ * ancestors. */
 static ebpo_reference_node reference_at(const ebpo_reference_tree *view, int level, uint64_t group,
                                         unsigned octant)
 {
@@ -200,8 +202,10 @@ int64_t ebpo_reference_winding(const ebpo_reference_tree *view, const ebpo_refer
 
 enum {
     NODES_PER_LEVEL = 256, /* number of sampled cells of a level */
-    POINTS_PER_NODE = 8,   /* number of corners, and of random points, of a sampled cell */
-    POINT_BITS = 16        /* coordinates of points are in units of 2^-POINT_BITS of the cell */
+    /* number of tested corners, and of tested random points, of a sampled cell */
+    POINTS_PER_NODE = 8,
+    /* the unit of coordinates of points is the cell's side divided by 2^POINT_BITS */
+    POINT_BITS = 16
 };
 
 /* Checks that the plane codes of all nodes of one type in a level are valid. */
@@ -250,8 +254,9 @@ static void chain_to(chain *out, const ebpo_reference_tree *view, const ebpo_ref
                                             (unsigned)(end->code >> 3 * (out->depth - l) & 7));
 }
 
-/* Returns true if a point is on the inner side of a plane of the cell `above`. The point is in
- * units of 2^-16 of the cell `at`, and is transformed to the coordinates of `above`. */
+/* Returns true if a point is on the inner side of a plane of the cell `above`. The point is given
+ * in the coordinates of the cell `at`, in units of 2^-16 of its side. The function transforms the
+ * point to the coordinates of `above`. */
 static bool point_kept_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
                              const int32_t n[3], int64_t d)
 {
@@ -266,8 +271,9 @@ static bool point_kept_above(const ebpo_cell *above, const ebpo_cell *at, const 
                                     ebpo_wide_signed_product(d, INT64_C(1) << (POINT_BITS + down)));
 }
 
-/* Returns the same as point_kept_above, but transforms the plane of the cell at level `from` of the
- * chain, level by level as readers do, to the coordinates of the point's cell at level `to`. */
+/* Returns true if a point is on the inner side of a plane, as point_kept_above does, but transforms
+ * the plane. The plane belongs to the node of level `from` of the chain. It is transformed level by
+ * level, as readers do, to the coordinates of the point's cell, which is the node of level `to`. */
 static bool point_kept_below(const chain *c, int from, int to, const int64_t point[3],
                              const int32_t n[3], int64_t d)
 {
@@ -280,7 +286,8 @@ static bool point_kept_below(const chain *c, int from, int to, const int64_t poi
                                     ebpo_wide_signed_product(d, 1 << POINT_BITS));
 }
 
-/* Compares a point of the deepest cell of a chain with all planes of the cells above. */
+/* Compares a point of the deepest cell of a chain with all planes of the cells above, in both ways.
+ */
 static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, const chain *c,
                         const int64_t point[3])
 {
@@ -306,8 +313,9 @@ static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, cons
     }
 }
 
-/* Checks that each cell face, as a double, is a cell face of the parent or its middle plane. Checks
- * that the difference of opposite cell faces is the size of the cell. */
+/* Checks that the coordinate of each cell face is a double that is equal to the coordinate of a
+ * cell face of the parent or of the parent's middle plane. Checks that the difference of opposite
+ * cell faces is the size of the cell. */
 static void check_cell_faces(ebpo_tally *tally, const ebpo_reference_tree *view,
                              const ebpo_reference_node *node)
 {
@@ -338,7 +346,8 @@ static uint64_t next_random(uint64_t *state)
     return *state;
 }
 
-/* Checks random points of a cell, and the cell's corners. */
+/* Checks the nesting of a node: compares random points and the corners of its cell with the planes
+ * of its ancestors. */
 static void check_nesting_at(ebpo_tally *tally, const ebpo_reference_tree *view,
                              const ebpo_reference_node *node)
 {
@@ -532,8 +541,8 @@ static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
     return CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
 }
 
-/* Checks that the required arrays which no other function checks are present. Counts a check only
- * if it fails. */
+/* Checks that all required arrays of a level are present. Counts a check only if an array is
+ * missing, because other functions check most of these arrays. */
 static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
@@ -573,9 +582,10 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
 
 /* --- structure: the tree --- */
 
-/* Returns true if a volume is at most the volume of `cells` cells, plus a tolerance for the
- * rounding of sums. Also returns true for coordinates beyond about 1e102 or below 1e-102. Their
- * volumes exceed the range of double, and the format does not specify them. */
+/* Returns true if a volume is at most the volume of `cells` cells of level l, plus a tolerance for
+ * the rounding of sums. Also returns true for sizes beyond about 1e102 or below 1e-102, because the
+ * volumes of such cells exceed the range of double, and the format does not specify these volumes.
+ */
 static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
 {
     double cell =
@@ -610,7 +620,7 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
 typedef struct descent {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
-    uint64_t next_face;               /* first face that no visited leaf has listed */
+    uint64_t next_face;               /* index of the first face that no visited leaf has listed */
     uint64_t grays;                   /* number of visited gray nodes */
     uint64_t pruned[EBPO_LEVELS_MAX]; /* number of pruned nodes (whose children are not in the
                                          file), by level */
@@ -658,7 +668,8 @@ static void check_node(descent *d, const ebpo_reference_node *node)
 
 static void check_gray(descent *d, const ebpo_reference_node *node)
 {
-    if (ebpo_reference_is_pruned(d->view, node)) { /* in a subset, also in place of a leaf */
+    /* a subset may also have a pruned node in place of a leaf */
+    if (ebpo_reference_is_pruned(d->view, node)) {
         d->pruned[node->cell.level]++;
         return;
     }
@@ -696,9 +707,10 @@ static void check_vertices(ebpo_tally *tally, const ebpo_reference_tree *view)
           outside, first / 3);
 }
 
-/* Returns true if every edge is used equally often in both directions. Each edge has a
+/* Returns true if the faces use every edge equally often in both directions. Each edge has a
  * pseudo-random value, which is added for each use in one direction and subtracted for each use in
- * the other direction. If the uses do not cancel, the sum is 0 with a probability of only 2^-64. */
+ * the other direction. If some edge is not used equally often, the sum is 0 with a probability of
+ * only 2^-64. */
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
@@ -729,7 +741,8 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_reference_tree *view)
     CHECK(d.next_face == tree->mesh.face_count, "leaves list %" PRIu64 " of %" PRIu64 " faces",
           d.next_face, tree->mesh.face_count);
     check_vertices(tally, view);
-    if (tree->info.solid && !tree->info.pruned) /* a part of a mesh may be unbalanced */
+    /* in a subset, the mesh is a part of the model and may be unbalanced */
+    if (tree->info.solid && !tree->info.pruned)
         CHECK(edges_balance(&tree->mesh),
               "the file states a solid, but the directions of the mesh's edges do not cancel");
 }

@@ -11,7 +11,7 @@
 
 /* --- finding nodes --- */
 
-/* Numbers of items that precede a group of siblings in its level. */
+/* The numbers of items of a level that precede a group of siblings. */
 typedef struct ebpo_reference_group {
     uint64_t of_type[4]; /* nodes of each ebpo_node_type */
     uint64_t planes, refs, leaf_planes;
@@ -31,14 +31,15 @@ typedef struct ebpo_reference_tree {
 typedef struct ebpo_reference_node {
     ebpo_octcode code;
     ebpo_cell cell;
-    uint64_t group;  /* number of its group of siblings in the level */
+    uint64_t group;  /* index, in its level, of its group of siblings */
     unsigned octant; /* position in this group */
     ebpo_node_type type;
     uint64_t rank;
 } ebpo_reference_node;
 
-/* Creates a view. The tree must have passed ebpo_check_shape, and must outlive the view. Memory is
- * from `workspace`, or from the heap if it is NULL. On failure the view is cleared. */
+/* Creates a view of a tree. The tree must have passed ebpo_check_shape, and must outlive the view.
+ * Memory is allocated from `workspace`, or from the heap if `workspace` is NULL. On failure, the
+ * view is set to zeros. */
 EBPO_MUST_USE ebpo_status ebpo_reference_make(ebpo_reference_tree *out, const ebpo_tree *tree,
                                               ebpo_workspace *workspace, ebpo_error *error);
 void ebpo_reference_free(ebpo_reference_tree *view);
@@ -61,7 +62,8 @@ ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
  * to 0. */
 const uint32_t *ebpo_reference_planes(const ebpo_reference_tree *view,
                                       const ebpo_reference_node *node, uint32_t *count);
-/* Returns the references of a leaf to faces that earlier leaves already list. */
+/* Returns the references of a leaf (the faces in its list that an earlier leaf also lists), and
+ * sets *count to their number. */
 const uint32_t *ebpo_reference_refs(const ebpo_reference_tree *view,
                                     const ebpo_reference_node *leaf, uint32_t *count);
 /* Returns the winding number that is stored for a leaf (at its lowest corner) or a white or black
@@ -81,7 +83,7 @@ static inline bool ebpo_reference_inside(const ebpo_reference_tree *view, int64_
 /* --- nesting --- */
 
 /* Checks that plane codes are valid, and that a plane is the same in the coordinates of its cell
- * and of every cell below. */
+ * and in the coordinates of sampled cells below. */
 void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view);
 
 /* --- structure: the arrays are consistent, and the format allows the tree --- */
@@ -90,8 +92,9 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view);
  * Returns false after a violation; the caller must then run no other checks. */
 bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree);
 
-/* Checks the level summaries, the sizes of leaves, the order of faces, that the root box contains
- * the vertices, and that the edges of a solid are balanced. */
+/* Checks the level summaries, the sizes of leaves and the order of faces. Checks that the root box
+ * contains the vertices, and that the faces of a solid use each edge equally often in both
+ * directions. */
 void ebpo_check_structure(ebpo_tally *tally, const ebpo_reference_tree *view);
 
 #endif

@@ -1,7 +1,7 @@
 /* Visits the nodes of the tree from the root down, with the faces that touch each node, and checks
  * containment, lists and labels of each node.
  *
- * Nodes with many faces are visited first, one after the other, with their faces distributed to all
+ * Nodes with many faces are visited first, one after the other; their faces are distributed to all
  * threads. Each smaller subtree below them is visited by one thread, depth first. Every face is
  * tested exactly against every cell that its bounding box intersects. The points for the check by
  * rays are collected during the visit, and their winding numbers are computed at the end. The tally
@@ -22,8 +22,8 @@
 
 enum {
     FACE_GRAIN = 4096, /* number of faces for each call of a thread's function */
-    /* A subtree that one thread visits has at most a SUBTREES_WANTED-th of all faces. This limit is
-     * raised to SUBTREE_FACES or lowered to SUBTREE_FACES_MAX. */
+    /* The maximum number of faces of a subtree that one thread visits is the number of all faces
+     * divided by SUBTREES_WANTED, but at least SUBTREE_FACES and at most SUBTREE_FACES_MAX. */
     SUBTREES_WANTED = 64,
     SUBTREE_FACES = 1024,
     SUBTREE_FACES_MAX = 1 << 18
@@ -32,7 +32,7 @@ enum {
 /* A stack of face indices: the faces of a node, then the faces of its child, and so on down. */
 typedef struct face_stack {
     uint32_t *faces;
-    uint8_t *octants; /* for each face, the children that it touches, as bits */
+    uint8_t *octants; /* for each face, a mask of the children that the face touches */
     uint64_t capacity;
 } face_stack;
 
@@ -42,7 +42,7 @@ typedef struct worker {
     face_stack stack;
     ebpo_node_planes planes;
     ebpo_ray_points points;
-    uint64_t visited; /* faces visited since pages were released; a node counts 64 more */
+    uint64_t visited; /* number of faces visited since pages were released, plus 64 for each node */
 } worker;
 
 /* A node of the upper part of the tree, which is visited by all threads, or the root of a subtree.
@@ -51,7 +51,8 @@ typedef struct upper_node {
     ebpo_reference_node node;
     uint32_t *faces; /* faces that touch the node; NULL after the node has been visited */
     uint64_t face_count;
-    uint64_t children;          /* index in `upper` of the first of eight; 0: root of a subtree */
+    /* index in `upper` of the first of eight children; 0: the node is the root of a subtree */
+    uint64_t children;
     ebpo_node_windings corners; /* winding numbers of the corners, set after the visit */
 } upper_node;
 
@@ -69,8 +70,7 @@ typedef struct walk {
     uint64_t subtree_limit; /* maximum number of faces of a subtree's root */
     /* the node whose faces are distributed to all threads */
     const upper_node *shared;
-    uint8_t
-        *shared_octants; /* for each of its faces, the children that the face touches, as bits */
+    uint8_t *shared_octants; /* [face of `shared`] a mask of the children that the face touches */
 } walk;
 
 /* The cells of a gray node and of its children. */
@@ -93,8 +93,8 @@ static void family_make(family *out, const ebpo_box *box, const ebpo_reference_n
         }
 }
 
-/* Returns the octants that the face's bounding box intersects, as bits. Here, an octant is the
- * intersection of three half-spaces at the middle planes. */
+/* Returns a mask of the octants that the face's bounding box intersects. Here, an octant is the
+ * intersection of three half-spaces that are bounded by the middle planes. */
 static unsigned near_octants(const family *f, const ebpo_corners *face)
 {
     static const uint8_t upper[3] = { 0xaa, 0xcc, 0xf0 };
@@ -109,7 +109,7 @@ static unsigned near_octants(const family *f, const ebpo_corners *face)
     return octants & 255;
 }
 
-/* Returns the children that a face of the node touches, as bits. */
+/* Returns a mask of the children that a face of the node touches. */
 static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
 {
     unsigned near = near_octants(f, face), touched = 0;
@@ -121,7 +121,8 @@ static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_
     return touched;
 }
 
-/* Checks containment of the faces at a gray node, and finds the children that each face touches. */
+/* Checks that the planes of a gray node cut off no part of the faces, and sets octants[i] to a mask
+ * of the children that face i touches. */
 static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *node,
                         const family *f, const uint32_t *faces, uint8_t *octants, uint64_t count)
 {
@@ -139,8 +140,8 @@ static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *
     }
 }
 
-/* Checks that a gray node has too many faces for a leaf. `touching`: number of faces that touch the
- * node. */
+/* Checks that a gray node has more faces than a leaf may list. `touching`: number of faces that
+ * touch the node. */
 static void check_face_limit(const walk *w, ebpo_tally *tally, const ebpo_reference_node *node,
                              uint64_t touching)
 {
@@ -182,7 +183,7 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_referen
 {
     const ebpo_reference_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
-    if (view->has_mesh && node->type != EBPO_GRAY) /* a gray node is pruned here */
+    if (view->has_mesh && node->type != EBPO_GRAY) /* a gray node in this function is pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
     ebpo_node_planes_of(&self->planes, view, node);
     EBPO_FOR_ITEMS_SCATTERED(w->options->workspace, i, 0, self->planes.count ? count : 0) {
@@ -208,7 +209,7 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_referen
     return EBPO_OK;
 }
 
-/* Makes space for `need` faces. Returns false when out of memory. */
+/* Makes space for `need` faces on the stack. Returns false when out of memory. */
 static bool stack_reserve(face_stack *s, uint64_t need)
 {
     if (need <= s->capacity)
@@ -225,8 +226,8 @@ static bool stack_reserve(face_stack *s, uint64_t need)
     return true;
 }
 
-/* Visits a node and all nodes below it. The faces that touch the node are [first, first + count) on
- * the stack. */
+/* Visits a node and all nodes below it. The faces that touch the node are faces[first .. first +
+ * count - 1] of the stack. */
 static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_node *node,
                              uint64_t first, uint64_t count, ebpo_node_windings *corners,
                              ebpo_error *error)
@@ -271,7 +272,7 @@ static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Appends a child with those faces of the parent that touch it. */
+/* Appends a child to w->upper, with those faces of the parent that touch the child. */
 static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_error *error)
 {
     const upper_node *from = &w->upper[parent];
@@ -352,8 +353,8 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Visits a subtree. If its root is a leaf, it may have very many faces; these are not copied to the
- * stack. */
+/* Visits a subtree. If its root is a leaf, the root may have very many faces, so they are not
+ * copied to the stack. */
 static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
 {
     if (is_terminal(w, &n->node))
@@ -381,8 +382,8 @@ static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Completes the upper nodes in reverse order, so that children are completed before their parents.
- */
+/* Calls finish_gray for the upper nodes in reverse order, so that children come before their
+ * parents. */
 static void finish_upper(walk *w)
 {
     for (uint64_t at = w->upper_count; at-- > 0;) {
@@ -421,7 +422,8 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Moves the points of all threads to one list, and checks their winding numbers by rays. */
+/* Moves the points that all threads have collected to one list, and checks their winding numbers by
+ * rays. */
 static ebpo_status follow_rays(walk *w, ebpo_error *error)
 {
     ebpo_ray_points *all = &w->workers[0].points;
