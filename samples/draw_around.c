@@ -1,6 +1,6 @@
 /* Writes the faces around a point as PLY, for a model of any size, from a disk or by HTTP. Reads
- * only the subtree of the cell of a level that contains the point. In a model of 28 million faces,
- * a cell of level 6 contains about 2,000 faces.
+ * only one subtree: that of the cell of level LEVEL that contains the point. In a model of 28
+ * million faces, a cell of level 6 contains about 2,000 faces.
  *
  *     draw_around FILE.ebpo.h5|URL X Y Z LEVEL OUT.ply
  *     cc draw_around.c $(pkg-config --cflags --libs ebpo) */
@@ -47,8 +47,9 @@ int main(int argc, char **argv)
     }
     for (int k = 0; k < 3; k++)
         point[k] = strtod(argv[2 + k], NULL);
-    options.parts = EBPO_PART_MESH;     /* without envelopes and source indices */
-    options.memory = UINT64_C(1) << 30; /* EBPO_E_LIMIT if the cell of LEVEL needs more */
+    options.parts = EBPO_PART_MESH; /* only the mesh, without envelopes and source indices */
+    /* in bytes; the result is EBPO_E_LIMIT if the cell of LEVEL needs more */
+    options.memory = UINT64_C(1) << 30;
     options.or_leaf_above = true;
     if (ebpo_open(argv[1], &file, &error) != EBPO_OK)
         goto done;

@@ -18,15 +18,15 @@
 
 typedef struct position_packet {
     char magic[4];
-    uint16_t version, kind; /* 1: a position, 3: the end */
+    uint16_t version, kind; /* kind 1: a position; kind 3: the end */
     uint64_t sequence, tag;
-    double place[3], turn[4];
+    double place[3], turn[4]; /* position; rotation as a quaternion (x, y, z, w) */
 } position_packet;
 
 typedef struct force_packet {
     char magic[4];
-    uint16_t version, kind; /* 2 */
-    uint64_t sequence, tag; /* of the position packet to which this packet is the reply */
+    uint16_t version, kind; /* kind 2: a force */
+    uint64_t sequence, tag; /* values of the position packet to which this packet is the reply */
     double force[3], torque[3], proxy[3], turn[4], depth, lo, hi, normal[3];
     uint64_t face;
     uint32_t flags;

@@ -13,12 +13,12 @@
 #include <stdlib.h>
 #include <sys/stat.h>
 
-enum { TOGETHER = 1 << 18 }; /* number of points of a process in each collective read */
+enum { TOGETHER = 1 << 18 }; /* number of points that a process reads in each collective read */
 
 static int rank, ranks;
 
-/* Returns true if `ok` is true in all processes; a process in which it is false prints its error.
- * Every process must call this function. */
+/* Returns true if `ok` is true in all processes. If `ok` is false, prints the error `what` of this
+ * process. Every process must call this function. */
 static int all_ok(int ok, const char *what)
 {
     int every;
@@ -28,7 +28,8 @@ static int all_ok(int ok, const char *what)
     return every;
 }
 
-/* Returns true if an MPI call for a file succeeded in all processes; prints MPI errors as text. */
+/* Returns true if an MPI call for a file succeeded in all processes. `code`: result of the call.
+ * Prints MPI errors as text. */
 static int mpi_ok(int code, const char *path)
 {
     char why[MPI_MAX_ERROR_STRING] = "", what[MPI_MAX_ERROR_STRING + 512];
@@ -39,8 +40,9 @@ static int mpi_ok(int code, const char *path)
     return all_ok(code == MPI_SUCCESS, what);
 }
 
-/* Returns true if the query succeeded in all processes. The message of the library contains the
- * index of a point in one call; `first` is the index of the call's first point in the file. */
+/* Returns true if the query succeeded in all processes. A message of the library states the index
+ * of a point among the points of one call. `first`: index in the file of the first point of this
+ * call. */
 static int query_ok(ebpo_status status, MPI_Offset first, const char *message)
 {
     char what[sizeof(ebpo_error) + 64];
@@ -48,8 +50,8 @@ static int query_ok(ebpo_status status, MPI_Offset first, const char *message)
     return all_ok(status == EBPO_OK, what);
 }
 
-/* Reads `count` points from index `first` on, queries them, and writes the results, together with
- * the other processes. */
+/* Reads `count` points from index `first` on, queries them, and writes the results. All processes
+ * call this function at the same time, because it reads and writes collectively. */
 static int query_range(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
                        MPI_Offset first, int count, double *points, ebpo_inside_result *results,
                        int *pairs)

@@ -14,7 +14,8 @@ static bool print_results(ebpo_context *context, const double point[3], ebpo_err
     ebpo_inside_result where;
     ebpo_distance_result nearest;
     ebpo_status status = ebpo_inside(context, point, NULL, &where, error);
-    bool solid = status != EBPO_E_NOT_SOLID; /* a surface without a border has only distances */
+    /* a surface whose file has no border can only return distances */
+    bool solid = status != EBPO_E_NOT_SOLID;
     if ((solid && status != EBPO_OK) ||
         ebpo_distance(context, point, NULL, &nearest, error) != EBPO_OK)
         return false;
@@ -28,8 +29,9 @@ int main(int argc, char **argv)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ebpo_model *model = NULL;     /* entirely in memory; ebpo_model_options can limit it */
-    ebpo_context *context = NULL; /* one for each thread */
+    /* completely in memory; ebpo_model_options can limit the memory */
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL; /* each thread needs one */
     char line[1000];
     double p[3];
     if (argc != 2)
@@ -50,7 +52,7 @@ int main(int argc, char **argv)
     }
     if (!ok)
         fprintf(stderr, "query: %s\n", error.message);
-    ok = fflush(stdout) == 0 && !ferror(stdout) && ok; /* detects a full disk */
+    ok = fflush(stdout) == 0 && !ferror(stdout) && ok; /* fflush detects a full disk */
     if (ferror(stdout))
         perror("query: standard output");
     ebpo_context_free(context);

@@ -1,5 +1,6 @@
-/* Main loop of a coarse-to-fine viewer: draws (here: sums) the envelopes of each level as closed
- * polyhedra as soon as the level is read.
+/* Main loop of a viewer that shows a model from coarse to fine. As soon as a level is read, it gets
+ * the envelopes of the level as closed polyhedra. This sample counts their polygons instead of
+ * drawing them.
  *
  *     stream_levels FILE.ebpo.h5 [LEVEL]
  *     cc stream_levels.c $(pkg-config --cflags --libs ebpo) */
@@ -29,7 +30,7 @@ int main(int argc, char **argv)
     while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more) {
         uint64_t polyhedra = 0, polygons = 0;
         while (ebpo_stream_next_node(stream, &node, &more, &error) == EBPO_OK && more) {
-            polyhedra += node.polygon_count > 0; /* white nodes have none */
+            polyhedra += node.polygon_count > 0; /* white nodes have no polygons */
             /* a renderer draws node.vertices, node.polygon_first and node.corners here */
             polygons += node.polygon_count;
         }

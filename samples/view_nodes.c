@@ -1,5 +1,5 @@
-/* Main loop of a viewer with a camera. Gets the nodes that are largest in the image first, until no
- * visible node is larger than 16 pixels, or until BYTES are read. Then the camera moves.
+/* Main loop of a viewer with a camera. Refines the node that is largest in the image first, until
+ * no visible node is larger than 16 pixels, or until BYTES are read. Then the camera moves.
  *
  *     view_nodes FILE.ebpo.h5|URL X Y Z [BYTES]
  *     cc view_nodes.c $(pkg-config --cflags --libs ebpo) */
@@ -11,7 +11,9 @@
 static bool draw(void *user, const ebpo_view_node *node)
 {
     *(uint64_t *)user += node->seen ? node->node.polygon_count
-                                    : 0; /* a renderer draws node->node here, front to back */
+                                    /* a renderer draws node->node here; nodes come from front to
+                                     * back */
+                                    : 0;
     return true;
 }
 
@@ -57,7 +59,8 @@ int main(int argc, char **argv)
         printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64
                " polygons to draw, no node larger than %.3g pixels\n",
                arrived, stats.bytes_read, polygons, stats.pixels);
-        /* Moves the camera to half the distance. Nodes in memory are not read again. */
+        /* Moves the camera half the way to the middle of the model. Nodes in memory are not read
+         * again. */
         for (int k = 0; k < 3; k++)
             observer.eye[k] += (middle[k] - observer.eye[k]) / 2;
         if (error.status == EBPO_OK && ebpo_view_stream_change(stream, &options, &error) != EBPO_OK)

@@ -1,14 +1,14 @@
 /* Finds the boxes that contain a point, that may be near a point, or that a ray may intersect.
  *
- * Boxes are in a tree. Boxes are ordered along the Morton curve of their centres. Every eight
- * consecutive boxes have a common box on the next level, which contains them; the box of the
- * highest level contains all boxes. A query begins with the highest level and skips boxes that are
- * not relevant. The tree is immutable, so any number of threads may query it.
+ * The boxes are the leaves of a tree. They are ordered along the Morton curve of their centres.
+ * Every eight consecutive boxes have a common box on the next higher level, which contains them.
+ * The only box of the highest level contains all boxes. A query begins with the highest level and
+ * skips boxes that are not relevant. The tree is immutable, so any number of threads may query it.
  *
- * No relevant box is skipped. A length is rounded some ten times in this file, each time by at most
- * 2^-53 of its value; a box is skipped only if its distance exceeds the limit by more than 2^-40 of
- * this distance. A query may return boxes that are not relevant; queries of the models in these
- * boxes then return no face. */
+ * No relevant box is skipped, in spite of rounding. A length is rounded some ten times in this
+ * file, each time by at most 2^-53 of its value. A box is skipped only if its distance exceeds the
+ * limit by more than 2^-40 of this distance. So a query may return boxes that are not relevant;
+ * queries of the models in these boxes then return no face. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +35,7 @@ static int by_code(const void *a, const void *b)
                               : (x->number > y->number) - (x->number < y->number);
 }
 
-/* Returns the Morton code of a point in a box. */
+/* Returns the Morton code of a point in the box from `min` to `max`. */
 static uint64_t code_of(const double p[3], const double min[3], const double max[3])
 {
     uint64_t code = 0;
@@ -134,11 +134,11 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
 typedef struct walk {
     const ebpo_catalogue_boxes *t; /* the tree of boxes */
     const double *p, *d;           /* the point, or the ray's origin and direction */
-    double reach;              /* for the nearest face: boxes at a larger distance are skipped */
-    double pad;                /* for a ray: margin around each box, more than the rounding error */
-    uint32_t item;             /* index of the point or ray, for the pairs */
-    ebpo_catalogue_pairs *out; /* receives the pairs; NULL: only `reach` is computed */
-    /* Returns false if the box, and all boxes in it, are to be skipped; otherwise may set
+    double reach;                  /* nearest face: boxes at a larger distance are skipped */
+    double pad;                    /* ray: margin around each box, larger than the rounding error */
+    uint32_t item;                 /* index of the point or ray, which is stored in the pairs */
+    ebpo_catalogue_pairs *out;     /* the pairs are appended here; NULL: only `reach` is computed */
+    /* Returns false if the box and all boxes in it are to be skipped. Otherwise it may set
      * *min_distance. */
     bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *min_distance);
     bool failed; /* true: out of memory */
@@ -154,7 +154,7 @@ static void append_pair(walk *w, uint32_t box, double min_distance)
     o->pair[o->count++] = (ebpo_catalogue_pair){ box, w->item, min_distance };
 }
 
-/* Visits a box and, recursively, the boxes in it. The recursion is at most LEVELS deep. */
+/* Visits a box and, recursively, the boxes in it. The depth of recursion is at most LEVELS. */
 static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
 {
     double min_distance = 0;
@@ -197,7 +197,7 @@ bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[
     return walk_boxes(&w);
 }
 
-/* Returns the length of a vector, also when squares overflow. */
+/* Returns the length of a vector, also if the squares of its components overflow. */
 static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
 /* Returns the distance of a point from the box; 0 within the box. */
@@ -218,15 +218,15 @@ static double max_length(const ebpo_catalogue_box *b, const double p[3])
     return vector_length(v);
 }
 
-/* Returns true if a face in the box may be as near as `reach`. */
+/* Returns true if the distance of a face in the box may be at most w->reach. */
 static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *min_distance)
 {
     *min_distance = min_length(b, w->p);
     return *min_distance * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
 }
 
-/* Lowers `reach` to the distance of the box's farthest corner: the model in the box is not farther
- * away than this corner. */
+/* Does the same as may_be_near, and lowers w->reach to the distance of the box's farthest corner,
+ * because the distance of the model in the box is at most this distance. */
 static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *min_distance)
 {
     if (!may_be_near(w, b, min_distance))

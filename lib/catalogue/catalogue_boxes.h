@@ -21,18 +21,19 @@ typedef struct ebpo_catalogue_box {
 } ebpo_catalogue_box;
 
 typedef struct ebpo_catalogue_boxes {
-    /* [count[0]] for each box of level 0, the number that identifies it in pairs */
+    /* [count[0]] for each box of level 0, the number that identifies the box in pairs */
     uint32_t *number;
     int levels;                          /* number of levels; 0: there is no box */
     size_t count[EBPO_CATALOGUE_LEVELS]; /* number of boxes of each level */
-    /* level 0: the given boxes, along the Morton curve of their centres; higher levels: boxes
-     * around eight boxes of the next lower level */
+    /* [level] boxes. Level 0: the given boxes, along the Morton curve of their centres; a box of a
+     * higher level contains eight consecutive boxes of the next lower level */
     ebpo_catalogue_box *box[EBPO_CATALOGUE_LEVELS];
 } ebpo_catalogue_boxes;
 
 /* A box, and an item (a point or ray) for which it is relevant. */
 typedef struct ebpo_catalogue_pair {
-    uint32_t box, item;  /* box: the box's number (from `numbers`); item: index of point or ray */
+    /* box: the box's number (ebpo_catalogue_boxes.number); item: index of the point or ray */
+    uint32_t box, item;
     double min_distance; /* rounded distance of the box; only ebpo_catalogue_boxes_near sets it */
 } ebpo_catalogue_pair;
 
@@ -41,8 +42,9 @@ typedef struct ebpo_catalogue_pairs {
     uint64_t count, capacity;
 } ebpo_catalogue_pairs;
 
-/* Makes the tree of boxes[count]. numbers[count] identify the boxes in pairs. Returns false when
- * out of memory; call ebpo_catalogue_boxes_free in any case. */
+/* Makes the tree of the boxes. `boxes`: [count]. `numbers`: [count] numbers that identify the boxes
+ * in pairs. Returns false when out of memory. The caller must call ebpo_catalogue_boxes_free, also
+ * on failure. */
 bool ebpo_catalogue_boxes_make(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
                                const uint32_t *numbers, size_t count);
 void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t);
@@ -52,16 +54,17 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t);
 /* Appends a pair (box, item) for each box that contains the point. */
 bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[3], uint32_t item,
                                   ebpo_catalogue_pairs *out);
-/* Appends pairs for all boxes that may contain the face nearest to the point, if the distance of
- * this face is at most max_distance. */
+/* Appends pairs for all boxes that may contain the face nearest to the point. Boxes that are
+ * farther away than max_distance are omitted. */
 bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3],
                                double max_distance, uint32_t item, ebpo_catalogue_pairs *out);
 /* Appends pairs for all boxes that the ray from o along d may intersect. */
 bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3],
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out);
 
-/* Writes the indices of points[count][3] in the order of the Morton curve of a box. Points outside
- * the box have the position of the nearest point of the box. Returns false when out of memory. */
+/* Sorts points along the Morton curve of the box from `min` to `max`. `points`: [count][3].
+ * `numbers`: [count] gets the indices of the points, in this order. A point outside the box is
+ * sorted as if it were the nearest point of the box. Returns false when out of memory. */
 bool ebpo_catalogue_morton_order(const double *points, size_t count, const double min[3],
                                  const double max[3], uint32_t *numbers);
 

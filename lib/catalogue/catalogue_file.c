@@ -1,11 +1,12 @@
 /* Makes a catalogue, a list of models with their boxes, from a JSON file or an array.
  *
  * A catalogue file is untrusted input. The kind and range of every member that is used are checked
- * before the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two
- * corners of three finite numbers each, with min not above max. When a model is opened,
- * open_models.c compares the digest and the box with the model. Unknown members are ignored.
+ * before the catalogue is made. Paths must be texts, and digests must be 64 hexadecimal digits.
+ * Boxes must have two corners of three finite numbers each, with min not above max. When a model is
+ * opened, open_models.c compares the digest and the box with the model. Unknown members are
+ * ignored.
  *
- * The paths in entries are already joined with their base folder. For a catalogue file, the base
+ * The paths in the entries of a catalogue include their base folder. For a catalogue file, the base
  * folder is the folder of this file. A catalogue is immutable, and any number of threads may use
  * it.
  *
@@ -30,9 +31,9 @@
 #include "core/hash.h"
 #include "core/os.h"
 
-/* MAX_BYTES: maximum length of a file in bytes, sufficient for some millions of models. The maximum
- * limits the memory for reading, which is many times the length of the file. DIGEST_LETTERS: length
- * of a digest in letters. */
+/* MAX_BYTES: maximum length of a catalogue file in bytes, sufficient for some millions of models.
+ * It limits the memory for reading, which is many times the length of the file. DIGEST_LETTERS:
+ * number of letters of a digest. */
 enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
@@ -45,8 +46,9 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
 
 /* --- making --- */
 
-/* Returns the path by which a file is opened: `path` after `folder`, if `path` is relative. The
- * folder is "" or ends in '/'. Returns NULL when out of memory. */
+/* Returns the path by which a file is opened. If `path` is relative, the result is `folder`
+ * followed by `path`; `folder` is "" or ends in '/'. Otherwise the result is a copy of `path`.
+ * Returns NULL when out of memory. */
 static char *joined_path(const char *folder, const char *path)
 {
     bool whole = ebpo_path_is_absolute(path) || strstr(path, "://");
@@ -59,8 +61,8 @@ static char *joined_path(const char *folder, const char *path)
     return joined;
 }
 
-/* Makes the tree of the boxes of all models or, if `seen` is true, of the models that rays and
- * distances use. */
+/* Makes the tree of the boxes of all models. If `seen` is true, the tree has only the boxes of the
+ * models that rays and distances use (not models that consist of caps only). */
 static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, bool seen)
 {
     ebpo_catalogue_box *box = ebpo_alloc(c->count, sizeof *box);
@@ -266,7 +268,8 @@ static ebpo_status bad_file(const reader *r, const char *what)
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: %s", what);
 }
 
-/* Reads a path; *out stays NULL if the member is missing, null or empty. */
+/* Reads a path from a member of a model. *out stays NULL if the member is missing, null or empty.
+ */
 static ebpo_status read_path(const reader *r, const json_t *model, const char *key,
                              const char **out)
 {
@@ -431,8 +434,8 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-/* Reads the file's text, which the caller frees. Sets c->file_bytes to its length. If the file is a
- * pipe, fails without waiting for a writer. */
+/* Sets *text to the file's content, which the caller frees, and c->file_bytes to its length. If the
+ * file is a pipe, fails without waiting for a writer. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;

@@ -1,5 +1,5 @@
-/* Defines what the files of lib/catalogue share: the catalogue, open models that threads share, and
- * queries of several models. */
+/* Defines data and functions that the files of lib/catalogue share: the catalogue, open models that
+ * several threads use, and queries of several models. */
 #ifndef EBPO_CATALOGUE_CATALOGUE_IN_H
 #define EBPO_CATALOGUE_CATALOGUE_IN_H
 
@@ -11,10 +11,11 @@
 
 struct ebpo_catalogue {
     char *path; /* path of the catalogue file that was read; NULL: made from an array */
-    uint64_t file_bytes, file_hash;      /* size and hash of this file */
-    uint64_t count;                      /* number of models, at least 1, at most 2^32 - 2 */
-    ebpo_catalogue_entry *entry;         /* [count] the catalogue owns the texts of the entries */
-    ebpo_catalogue_options how;          /* options; `folder` is not set */
+    uint64_t file_bytes, file_hash; /* size and hash of the catalogue file */
+    uint64_t count;                 /* number of models, at least 1, at most 2^32 - 2 */
+    /* [count] models; the catalogue owns the texts of the entries */
+    ebpo_catalogue_entry *entry;
+    ebpo_catalogue_options how;          /* options; `folder` is NULL */
     ebpo_catalogue_boxes all;            /* boxes of all models */
     ebpo_catalogue_boxes seen;           /* boxes of the models that rays and distances use */
     const ebpo_catalogue_entry *surface; /* first model that is not a solid; NULL: all are solids */
@@ -31,14 +32,16 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c);
 /* An open model, lent to a thread. */
 typedef struct ebpo_catalogue_held ebpo_catalogue_held;
 
-/* Runs a query. The context is one of the model, and belongs to the calling thread. */
+/* Runs a query of a model. `context` is a context of this model that no other thread uses
+ * meanwhile. */
 typedef ebpo_status (*ebpo_catalogue_query)(ebpo_context *context, const ebpo_catalogue_held *model,
                                             void *user, ebpo_error *error);
 
-/* Waits until the budget has space for a model, opens the model if necessary, and calls `run_query`
- * with it. If `surface` is true, the model is the part that rays and distances use. If the model's
- * share of the budget is too small for several threads, calls `run_query` again while no other
- * thread queries the model. Fails with the errors of ebpo/catalogue.h for opening. */
+/* Waits until the memory budget has space for a model, opens the model if necessary, and calls
+ * `run_query` with the model. If `surface` is true, opens the file that rays and distances use. If
+ * `run_query` fails because the model's share of the budget is too small for several threads, calls
+ * it again while no other thread queries the model. Fails with the errors of ebpo/catalogue.h for
+ * opening. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
                                               const ebpo_catalogue *c, uint64_t number,
                                               bool surface, ebpo_catalogue_query run_query,
@@ -47,8 +50,8 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
 /* Returns true if the catalogue has a single model, which is open and completely in memory. */
 bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c);
 
-/* Converts the index of a part's face to its index in the whole model, if the catalogue has such
- * indices; *face may be EBPO_NO_FACE. */
+/* Replaces *face, the index of a face in a part, by the index of this face in the whole model. Does
+ * nothing if the catalogue has no such indices, or if *face is EBPO_NO_FACE. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *model, uint64_t *face,
                                                    ebpo_error *error);
 
@@ -77,7 +80,8 @@ void ebpo_catalogue_numbers_close(ebpo_catalogue_numbers *f);
 EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f,
                                                      uint64_t *face, ebpo_error *error);
 
-/* --- queries of each model once, by one thread: catalogue_query.c --- */
+/* --- a range of rows, in one thread; each model is queried once: catalogue_query.c. A row (item)
+ * is a point or a ray. A pair consists of an item and a model that is relevant for it --- */
 
 typedef struct ebpo_catalogue_batch {
     const ebpo_catalogue *c;
@@ -85,29 +89,31 @@ typedef struct ebpo_catalogue_batch {
     const ebpo_catalogue_query_options *options;
 } ebpo_catalogue_batch;
 
-/* When at least this number of pairs is in memory, their models are queried before the pairs of
- * further items are added. */
+/* When there are at least this number of pairs in memory, their models are queried before further
+ * pairs are made. */
 enum { EBPO_CATALOGUE_PAIRS = 1 << 21 };
 
 /* The input of a query of one model. */
 typedef struct ebpo_catalogue_run {
-    uint32_t model;                  /* index of the model in the catalogue */
-    const ebpo_catalogue_pair *pair; /* [count] pair[i].item: index of the item of row i */
-    uint64_t count;                  /* number of rows */
-    const double *rows;              /* [count][width] rows of the items */
-    void *user;                      /* argument `user` of ebpo_catalogue_query_runs */
+    uint32_t model; /* index of the model in the catalogue */
+    /* [count] pair[i].item is the index of the item whose row is row i */
+    const ebpo_catalogue_pair *pair;
+    uint64_t count;     /* number of rows */
+    const double *rows; /* [count][width] rows of the items */
+    void *user;         /* argument `user` of ebpo_catalogue_query_runs */
 } ebpo_catalogue_run;
 
-/* Sorts the pairs by model, then by item. Queries each model in `pairs` once, for the rows of its
- * items. The argument `user` of `run_query` is an ebpo_catalogue_run. */
+/* Sorts the pairs by model, then by item. Queries each model in `pairs` once, for all items that
+ * are paired with it. `rows`: [item][width] rows of all items. The argument `user` of `run_query`
+ * is an ebpo_catalogue_run. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_batch *a,
                                                     ebpo_catalogue_pairs *pairs, const double *rows,
                                                     size_t width, bool surface,
                                                     ebpo_catalogue_query run_query, void *user,
                                                     ebpo_error *error);
 
-/* Appends a pair for each box that is relevant for an item. `row`: the row of the item. Returns
- * false when out of memory. */
+/* A function that appends a pair for each box that is relevant for an item. `row`: the row of the
+ * item. Returns false when out of memory. */
 typedef bool (*ebpo_catalogue_find)(const ebpo_catalogue_boxes *boxes, const double *row,
                                     uint32_t item, ebpo_catalogue_pairs *out);
 bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
@@ -115,9 +121,8 @@ bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *
 bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
                              ebpo_catalogue_pairs *out);
 
-/* Finds the pairs of each of rows[count] with `find`, and queries the models as
- * ebpo_catalogue_query_runs does. If `surface` is true, queries only models that rays and distances
- * use. */
+/* Finds the pairs of all rows by `find`, and queries the models as ebpo_catalogue_query_runs does.
+ * `rows`: [count][width]. If `surface` is true, queries only models that rays and distances use. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a,
                                                    const double *rows, uint32_t count, size_t width,
                                                    ebpo_catalogue_find find, bool surface,
@@ -130,7 +135,8 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, e
 
 /* --- queries of many rows, by any number of threads: catalogue_query.c --- */
 
-/* Processes a range of rows in one thread. A row is a point, or the numbers of an ebpo_ray. */
+/* A function that processes a range of rows in one thread. A row is a point (3 numbers) or an
+ * ebpo_ray (7 numbers). `out` and `model` get the result of each row and the index of its model. */
 typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_batch *a, const double *rows,
                                               uint32_t count, void *out, uint64_t *model,
                                               ebpo_error *error);
@@ -140,11 +146,13 @@ typedef struct ebpo_catalogue_job {
     ebpo_catalogue_stretch run_query;
     const char *stage;    /* name of the stage, for the progress */
     size_t width, result; /* width: number of doubles in a row; result: bytes of a result */
-    bool ordered;         /* true: rows are points, which may be processed along the Morton curve */
+    bool ordered;         /* true: the rows may be processed in the order of the Morton curve */
     const double *rows;   /* rows that are not processed yet */
-    char *out;            /* receives the results of these rows */
-    uint64_t *model;      /* receives the index of the model of each result; NULL: not requested */
-    /* order in which the rows of the current lap are processed; NULL: the given order */
+    char *out;            /* the results of these rows are stored here */
+    /* the index of the model of each result is stored here; NULL: not requested */
+    uint64_t *model;
+    /* order in which the rows of the current lap (a block of rows that are sorted together) are
+     * processed; NULL: the given order */
     const uint32_t *order;
 } ebpo_catalogue_job;
 

@@ -1,17 +1,18 @@
 /* Classifies points by winding numbers, summed over the models whose boxes contain the points.
  *
- * Independent models: a point is inside if it is inside any model. A model with a face that
- * contains the point adds 0 to the sum.
+ * If the models are independent, a point is inside if it is inside any model. If a face of a model
+ * contains the point, this model adds 0 to the sum.
  *
- * Parts of one model are closed by caps, which do not belong to the surface of the whole model. If
- * the point is on no face and no cap, the winding numbers of all parts add up to the winding number
- * of the whole model. A point on a face or cap of a part is *doubtful*. The point is on the surface
- * of the whole model if a face that is not a cap contains it; a box query for the point decides
- * this exactly. Otherwise the point is on a cap. Then the point's winding number is counted along a
- * ray through the surfaces, which have no caps. The winding number is the number of faces where the
- * ray leaves the solid, minus the number of faces where the ray enters the solid. If a ray hits an
- * edge or runs along a face, its crossings are not counted, and another ray is cast. The directions
- * are the same in all queries. Every ray whose crossings are counted gives the same winding number.
+ * If the models are parts of one model, they are closed by caps, which do not belong to the surface
+ * of the whole model. If the point is on no face and no cap, the winding numbers of all parts add
+ * up to the winding number of the whole model. A point on a face or cap of a part is *doubtful*.
+ * The point is on the surface of the whole model if a face that is not a cap contains it; a box
+ * query for the point decides this exactly. Otherwise the point is on a cap. Then the point's
+ * winding number is counted along a ray through the files `surface` of the parts, which have no
+ * caps. The winding number is the number of faces where the ray leaves the solid, minus the number
+ * of faces where the ray enters the solid. If a ray hits an edge or runs along a face, its
+ * crossings are not counted, and another ray is cast. The directions are the same in all queries.
+ * Every ray whose crossings are counted gives the same winding number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -37,7 +38,7 @@ typedef struct point_result {
     bool on;         /* true: the point is on a face of a model */
 } point_result;
 
-/* Adds the winding numbers of the points in one model to their results. */
+/* Adds the winding numbers that the points have in one model to the points' results. */
 static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_held *model,
                                   void *user, ebpo_error *error)
 {
@@ -64,13 +65,13 @@ static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_he
 typedef struct doubtful {
     uint32_t count;
     uint32_t *number; /* [count] index of the point among all points of the range */
-    double *rows;     /* [count][7] rays from the points */
+    double *rows;     /* [count][7] rays that begin at the points (ebpo_ray) */
     bool *on_surface; /* [count] true: the point is on the surface of the whole model */
     int64_t *sum;     /* [count] winding number that the last ray has given */
-    bool *decided;    /* [count] true: the last ray gives a valid winding number */
+    bool *decided;    /* [count] true: the winding number of the last ray is valid */
 } doubtful;
 
-/* Sets on_surface for the points on a face of one model. */
+/* Sets on_surface for the points that are on a face of one model. */
 static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                              ebpo_error *error)
 {
@@ -91,8 +92,8 @@ static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *m
 }
 
 /* Writes the results of those points i for which known[i] is true to `all`, and removes these
- * points from `d`. If `on` is true, these points are on the surface; otherwise d->sum has their
- * winding numbers. */
+ * points from `d`. If `on` is true, these points are on the surface. Otherwise d->sum[i] is the
+ * winding number of point i. */
 static void keep_unknown(doubtful *d, const bool *known, bool on, point_result *all)
 {
     uint32_t kept = 0;
@@ -175,7 +176,7 @@ static ebpo_status classify_doubtful(const ebpo_catalogue_batch *a, doubtful *d,
 
 /* --- parts together --- */
 
-/* Finds the doubtful points, and replaces their results. */
+/* Finds the doubtful points, classifies them, and replaces their results. */
 static ebpo_status correct_doubtful(const ebpo_catalogue_batch *a, const double *points,
                                     uint32_t count, point_result *all, ebpo_error *error)
 {

@@ -1,17 +1,17 @@
 /* Finds the nearest face of all models to a point, and the first face that a ray hits.
  *
  * For a point, the models are queried in the order of the distances of their boxes from the point,
- * until no other box may contain a face that is nearer than the nearest face so far. Many points
- * are processed together: in each step, the points are grouped by their next model, and each
+ * until no remaining box can contain a face that is nearer than the nearest face so far. Many
+ * points are processed together: in each step, the points are grouped by their next model, and each
  * of these models is queried once, with all points of its group. If several models have the same
- * rounded distance, the result is from the first of these models in the catalogue, independent of
- * the order of queries. So a box is skipped only if its distance exceeds the nearest distance by
- * more than the rounding error (catalogue_boxes.c).
+ * rounded distance, the first of these models in the catalogue gives the result, independent of the
+ * order of queries. To ensure this, a box is skipped only if its distance exceeds the nearest
+ * distance by more than the rounding error (catalogue_boxes.c).
  *
  * For a ray, the models whose boxes the ray may intersect are queried in the order of the
- * catalogue, each only up to the nearest hit so far. If t overflows for several hits, t is
- * computed again with the direction multiplied by a power of two, which is exact. The hit with the
- * smallest new t is first. */
+ * catalogue, each only up to the nearest hit so far. A hit is at the point origin + t direction. If
+ * t overflows for several hits, t is computed again with the direction multiplied by a power of
+ * two, which is exact. Then the hit with the smallest new t is the first one. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -45,8 +45,8 @@ static int nearest_first(const void *a, const void *b)
                                               : (x->box > y->box) - (x->box < y->box);
 }
 
-/* Keeps the nearer face of each point. If distances are equal, keeps the face of the first model in
- * the catalogue. */
+/* Compares the results of one model with the results so far, and keeps the nearer face of each
+ * point. If distances are equal, keeps the face of the model that is first in the catalogue. */
 static ebpo_status merge_nearest(const search *s, const ebpo_catalogue_run *run,
                                  const ebpo_catalogue_held *model, ebpo_distance_result *reported,
                                  ebpo_error *error)
@@ -86,9 +86,10 @@ static ebpo_status query_distances(ebpo_context *context, const ebpo_catalogue_h
     return status;
 }
 
-/* Queries the next box of each point, until no remaining box may contain a nearer face. `begin`:
- * [points + 1] index in s->near of each point's first box, and at the end the number of all boxes.
- * `next_box`: [points] memory for the index of each point's next box. */
+/* Queries the models of the next box of each point, again and again, until no remaining box may
+ * contain a nearer face. `begin`: [points + 1] index in s->near of each point's first box; the last
+ * element is the number of all boxes. `next_box`: [points] space for the index of each point's next
+ * box. */
 static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *next_box,
                                   uint32_t points, ebpo_error *error)
 {
@@ -114,8 +115,8 @@ static ebpo_status query_in_steps(search *s, const uint64_t *begin, uint64_t *ne
     return status;
 }
 
-/* Processes points from *at on, until they have EBPO_CATALOGUE_PAIRS or more boxes together. Sets
- * *at to the first point that is not processed. */
+/* Processes as many points from *at on as have about EBPO_CATALOGUE_PAIRS boxes together. Sets *at
+ * to the first point that is not processed. `begin`, `next_box`: space for query_in_steps. */
 static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *next_box,
                               ebpo_error *error)
 {
@@ -217,15 +218,15 @@ typedef struct ray_search {
     ebpo_ray_sides sides;
     ebpo_ray_hit *out;
     uint64_t *model;
-    double *longer_t; /* t along the ray with a longer direction, for hits whose t is INFINITY */
+    double *longer_t; /* [item] for a hit whose t is INFINITY: t along the longer_ray */
 } ray_search;
 
-/* Returns the ray with a longer direction, exactly scaled by a power of two, so that the t of every
- * hit is finite. */
+/* Returns the ray with its direction multiplied by a power of two, which is exact, so that the t of
+ * every hit is finite. */
 static ebpo_ray longer_ray(const ebpo_ray *ray)
 {
-    /* If the largest component of the direction is at least 2^2, every t is finite, because
-     * coordinates are at most 2^1025 apart. */
+    /* If the largest component of the direction is at least 2^2, every t is finite, because the
+     * difference of two coordinates is at most 2^1025. */
     enum { ENOUGH = 3 };
     ebpo_ray out = *ray;
     int exponent;
@@ -237,8 +238,8 @@ static ebpo_ray longer_ray(const ebpo_ray *ray)
     return out;
 }
 
-/* Sets *nearer to true if `hit` comes before the hit of this item that is kept so far. If t is
- * INFINITY for both hits, compares their t along the ray with a longer direction (longer_ray). */
+/* Sets *nearer to true if `hit` comes before the first hit of this ray so far, s->out[item]. If t
+ * is INFINITY for both hits, compares their t along the longer_ray. */
 static ebpo_status is_nearer(const ray_search *s, ebpo_context *context, const ebpo_ray *ray,
                              const ebpo_ray_hit *hit, uint32_t item, bool *nearer,
                              ebpo_error *error)
@@ -280,7 +281,8 @@ static ebpo_status merge_hits(const ray_search *s, const ebpo_catalogue_run *run
 }
 
 /* Queries one model for hits that are not farther away than the hits so far. Models are queried in
- * the order of the catalogue, so if hits have an equal t, the hit of the first model is kept. */
+ * the order of the catalogue. So if two hits have an equal t, the hit of the model that is first in
+ * the catalogue is kept. */
 static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                               ebpo_error *error)
 {

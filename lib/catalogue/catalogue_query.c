@@ -2,12 +2,12 @@
  * range is processed by one thread, which queries each model once for all rows of the range.
  *
  * Points are processed in laps of some millions of points. The points of a lap are sorted along the
- * Morton curve of the catalogue's box, so that a range needs few models and few subtrees. A single
- * model that is completely in memory needs no sorting. Rays are processed in the given order,
- * because each model sorts its rays itself.
+ * Morton curve of the catalogue's box, so that a range needs few models and few subtrees. If the
+ * catalogue has a single model that is completely in memory, points are not sorted. Rays are
+ * processed in the given order, because each model sorts its rays itself.
  *
- * A result depends only on its point or ray: not on the range, the threads, or the models that are
- * open. A thread has the results of only one range and one model in memory at a time. */
+ * The result of a row depends only on this row, not on its range, the threads, or the models that
+ * are open. A thread has the results of only one range and one model in memory at a time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,7 +25,7 @@
  * in a lap. UNORDERED: up to this number, points are not sorted, because sorting so few points
  * takes more time than it saves. */
 enum { STRETCH_LEAST = 1 << 10, STRETCH_MAX = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
-/* Number of ranges for each thread. A thread gets several ranges, so that no thread waits long for
+/* Number of ranges for each thread. With several ranges for each thread, no thread waits long for
  * the last range of another thread. */
 enum { STRETCHES_EACH = 4 };
 
@@ -46,7 +46,8 @@ static int by_model(const void *a, const void *b)
                             : (x->item > y->item) - (x->item < y->item);
 }
 
-/* Returns the largest number of pairs with the same model. The pairs must be sorted by model. */
+/* Returns the largest number of pairs that have the same model. The pairs must be sorted by model.
+ */
 static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
 {
     uint64_t longest = 0;
@@ -116,7 +117,7 @@ ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a, const double
 
 /* --- ranges of rows --- */
 
-/* The rows and results of a range, in the order of the Morton curve. */
+/* Copies of the rows and results of a range, in the order of the Morton curve. */
 typedef struct gathered {
     double *rows;    /* [rows of the range][job.width] */
     char *out;       /* results, job.result bytes for each row */
@@ -160,7 +161,7 @@ static ebpo_status query_stretch(void *context, uint64_t begin, uint64_t end, un
 
 /* --- laps --- */
 
-/* Returns true if sorting this number of points saves time. */
+/* Returns true if sorting the rows of this job, of which there are `count`, saves time. */
 static bool needs_order(const ebpo_catalogue_job *j, uint64_t count)
 {
     return j->ordered && count > UNORDERED &&

@@ -1,12 +1,13 @@
 /* Writes catalogues as JSON files for ebpo_catalogue_open. When ebpo_catalogue_open reads the file,
- * it gets the same boxes, bit for bit, and the same counts, if they are below 2^53. Entries without
- * `file_bytes` are written without counts.
+ * it gets the same boxes, bit for bit, and the same counts, if the counts are below 2^53. If
+ * `file_bytes` of an entry is 0, the entry is written without counts.
  *
  * Paths that begin with the folder of the file become relative to this folder, so that a folder of
  * models and its catalogue can be moved together. A path that would have another meaning without
- * the folder is not changed. Numbers have the fewest digits from which the same double is read, in
- * any locale. JSON cannot represent a path that is not UTF-8, so such a path is refused before
- * anything is written. The file is replaced atomically (io/publish.h).
+ * the folder is not changed. Numbers are written with the fewest digits from which the same double
+ * is read. The result does not depend on the locale. JSON cannot represent a path that is not
+ * UTF-8, so such a path is an error, and nothing is written. The file is replaced atomically
+ * (io/publish.h).
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -38,8 +39,9 @@ static void write_text(FILE *to, const char *text)
     fputc('"', to);
 }
 
-/* Finds the fewest digits of |x| from which the same double is read, in any locale. Returns the
- * number of digits. Sets `digits`, and *exponent to the power of ten of the first digit. */
+/* Finds the fewest decimal digits of |x| from which the same double is read. The result does not
+ * depend on the locale. Returns the number of digits. Sets `digits` to them, and *exponent to the
+ * power of ten of the first digit. */
 static int fewest_digits(double x, char digits[20], int *exponent)
 {
     char text[40];
@@ -59,7 +61,7 @@ static int fewest_digits(double x, char digits[20], int *exponent)
     return count;
 }
 
-/* Writes a number in the form of printf's %.17g, with the fewest digits. */
+/* Writes a number as printf does with %.17g, but with the fewest digits. */
 static void write_number(FILE *to, double x)
 {
     char digits[20];
@@ -95,9 +97,8 @@ static void write_digest(FILE *to, const char *key, const uint8_t digest[32])
     fputc('"', to);
 }
 
-/* Writes a member with a path. If the path begins with `folder` (which ends in '/', or is "") and
- * continues with a relative path, writes the path without the folder. `before`: text before the
- * member. */
+/* Writes a member with a path. `folder` is "" or ends in '/'. If the path begins with `folder` and
+ * the rest is a relative path, writes only the rest. `before`: text before the member. */
 static void write_path(FILE *to, const char *before, const char *key, const char *path,
                        const char *folder)
 {

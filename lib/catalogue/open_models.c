@@ -1,12 +1,13 @@
-/* Keeps open models of any number of catalogues, all within one memory budget.
+/* Keeps models of any number of catalogues open, within one memory budget.
  *
  * A model is identified by the path and digest of its file, the options of opening, the path of its
- * face indices, and its share of the budget. All models of a catalogue have equal shares, of at
- * least an eighth of the budget. A model is opened by the first query that needs it. A thread that
- * queries a model holds the model, and the model's share is reserved while any thread holds the
- * model. When the budget has no space for a further share, models that no thread holds are closed,
- * the least recently used first. If the budget still has no space, the query waits until other
- * queries end. A thread holds one model at a time, so that no thread waits for itself.
+ * face indices, and its share of the budget. All models of a catalogue have equal shares. A share
+ * is an eighth of the budget, or more if the catalogue has fewer than eight models. A model is
+ * opened by the first query that needs it. A thread that queries a model holds the model, and the
+ * model's share is reserved while any thread holds the model. When the budget has no space for a
+ * further share, models that no thread holds are closed, the least recently used first. If the
+ * budget still has no space, the query waits until other queries end. A thread holds one model at a
+ * time, so that no thread waits for itself.
  *
  * The file is compared with its catalogue: the digest when the file is opened, and the box whenever
  * the model is lent, because two entries may describe one file differently.
@@ -24,36 +25,39 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-/* SHARES: number of shares of the budget, if the catalogue has that many models. OPEN_MAX: maximum
- * number of open models, if the system allows that many open files. DESCRIPTORS_EACH: number of
- * file descriptors that are counted for each model. CONTEXTS_KEPT: maximum number of idle contexts
- * of a model. */
+/* SHARES: maximum number of shares into which the budget is divided. OPEN_MAX: maximum number of
+ * open models; it is lower if the system allows fewer open files. DESCRIPTORS_EACH: number of file
+ * descriptors that are counted for each model. CONTEXTS_KEPT: maximum number of idle contexts of a
+ * model. */
 enum { SHARES = 8, OPEN_MAX = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
 
 /* Identity of a requested model. */
 typedef struct model_key {
     const char *path, *numbers; /* path of the model; path of its face indices, or NULL */
     uint8_t digest[32];
-    uint64_t share; /* maximum bytes; 0: no limit */
+    uint64_t share; /* maximum memory of the model in bytes; 0: no limit */
     ebpo_catalogue_open_fn open_file;
     ebpo_catalogue_close_fn close_file;
     void *user;
 } model_key;
 
 struct ebpo_catalogue_held {
-    /* neighbours in the list of models; the list begins with the most recently used model */
+    /* neighbours in the list of models, which begins with the most recently used model */
     ebpo_catalogue_held *before, *behind;
     model_key key; /* the model owns the texts of its key */
     /* ebpo_catalogue_models.lock protects `users` and `bytes` */
     unsigned users; /* number of threads that hold the model */
     uint64_t bytes; /* bytes of the budget that are counted for the model */
-    /* protects `idle` and `idle_count`; also `file`, `model` and `numbers` until `model` is set */
+    /* protects `idle` and `idle_count`; until `model` is set, also protects `file`, `model` and
+     * `numbers` */
     pthread_mutex_t opening;
-    pthread_rwlock_t query_lock; /* locked by each query: for writing if it must run alone */
+    /* each query locks it for reading; a query that must run alone locks it for writing */
+    pthread_rwlock_t query_lock;
     ebpo_file *file;
-    /* NULL: not open; atomic, because statistics are read without the lock `opening` */
+    /* NULL: the model is not open. Atomic, because statistics are read without the lock `opening`
+     */
     ebpo_model *_Atomic model;
-    ebpo_catalogue_numbers numbers;    /* face indices, if the key has a path of them */
+    ebpo_catalogue_numbers numbers;    /* face indices; not open if key.numbers is NULL */
     ebpo_context *idle[CONTEXTS_KEPT]; /* [idle_count] contexts that no thread uses */
     unsigned idle_count;
 };
@@ -239,7 +243,7 @@ static void link_first(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
     h->first = m;
 }
 
-/* Adds the statistics of a model, if it is open. */
+/* Adds the statistics of a model to the sums, if the model is open. */
 static void add_stats(const ebpo_catalogue_held *m, ebpo_model_stats *sums)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
@@ -272,15 +276,17 @@ static void drop_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
     held_free(m);
 }
 
-/* Returns true if the list has space for `more` models, and the budget for `size` more bytes. */
+/* Returns true if the list has space for `more` further models, and the budget has space for `size`
+ * further bytes. */
 static bool has_capacity(const ebpo_catalogue_models *h, uint64_t size, unsigned more)
 {
     return h->listed + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
 }
 
-/* Closes models that no thread holds, except `kept`, until the budget has space for `size` more
+/* Closes models that no thread holds, except `kept`, until the budget has space for `size` further
  * bytes. If `kept` is NULL, also makes space for a new model in the list. Returns true if there is
- * space, or if no thread holds any model: then waiting would not make space. */
+ * space. Returns true also if no thread holds any model, because then waiting would not make more
+ * space. */
 static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *kept)
 {
     unsigned more = kept == NULL;
@@ -303,7 +309,7 @@ static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const mod
 static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c)
 {
     uint64_t share = h->memory / (c->count < SHARES ? c->count : SHARES);
-    return h->memory && !share ? 1 : share; /* because 0 means no limit */
+    return h->memory && !share ? 1 : share; /* not 0, because a share of 0 means no limit */
 }
 
 /* Returns the model with this key, which may be new, and counts the calling thread as its user.
@@ -331,7 +337,7 @@ static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_c
         link_first(h, m);
         if (!m->users++) {
             h->busy++;
-            /* while the model is used, it may use any memory up to its share */
+            /* while threads query the model, it may use any memory up to its share */
             h->taken += key->share - m->bytes;
             m->bytes = key->share;
         }
@@ -340,7 +346,7 @@ static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_c
     return m;
 }
 
-/* Ends the calling thread's use of a model; removes a model that could not be opened. */
+/* Ends the calling thread's use of a model. Removes the model if it could not be opened. */
 static void release_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
@@ -360,8 +366,8 @@ static void release_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 
 /* --- lending --- */
 
-/* Runs a query while no other query of the model runs. Frees idle contexts first: they keep the
- * last used subtrees in memory, and this query may need that memory. */
+/* Runs a query while no other query of the model runs. Frees idle contexts first, because they keep
+ * the last used subtrees in memory, and this query may need that memory. */
 static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_query, void *user,
                                ebpo_error *error)
 {

@@ -2,9 +2,10 @@
  * dimension (NumPy's format, versions 1 to 3). Any thread may read single indices when they are
  * needed.
  *
- * The file is untrusted input, as is the catalogue that refers to it. Its header is read once: the
- * type, the byte order, and the number of indices, for which the file must be long enough. An index
- * that is negative or beyond 2^63 is refused when it is read. */
+ * The file is untrusted input, as is the catalogue that refers to it. Its header is read once, when
+ * the file is opened. The header states the type, the byte order and the number of indices; the
+ * file must be long enough for this number. If an index is negative or beyond 2^63, reading this
+ * index fails. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -25,7 +26,8 @@ static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *erro
                           "is not a .npy array of integers with one dimension: %s", what);
 }
 
-/* Returns the text after `key` and a colon in the header, or NULL. */
+/* Returns the text after `key` and a colon in the header, or NULL if the header does not have the
+ * key. */
 static const char *value_of(const char *head, const char *key)
 {
     const char *at = strstr(head, key);
@@ -33,7 +35,7 @@ static const char *value_of(const char *head, const char *key)
     return at ? at + 1 + strspn(at + 1, " ") : NULL;
 }
 
-/* Reads a type such as '<i8'; reads nothing beyond the end of the header. */
+/* Reads a type such as '<i8' at `at`. Reads nothing beyond the end of the header. */
 static bool read_type(ebpo_catalogue_numbers *f, const char *at)
 {
     if (!at || (*at != '\'' && *at != '"') || strlen(at) < sizeof "'<i8'" - 1 ||
@@ -45,7 +47,7 @@ static bool read_type(ebpo_catalogue_numbers *f, const char *at)
     return true;
 }
 
-/* Reads the shape, which must be (N,). */
+/* Reads the shape at `at`, which must be (N,). */
 static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
 {
     char *end;
@@ -57,7 +59,8 @@ static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
     return errno == 0 && *end == ',' && end[1 + strspn(end + 1, " ")] == ')';
 }
 
-/* Reads the header. Versions 1 to 3 differ in the size of the header's length. */
+/* Reads the header. Its length is stored in two bytes in version 1, and in four bytes in versions 2
+ * and 3. */
 static ebpo_status read_head(ebpo_catalogue_numbers *f, ebpo_error *error)
 {
     char text[HEAD_MAX + 1];
@@ -87,7 +90,7 @@ ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *p
                                         ebpo_error *error)
 {
     struct stat st;
-    /* O_NONBLOCK: does not wait for the writer of a pipe */
+    /* O_NONBLOCK: the call does not wait for the writer of a pipe */
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     *f = (ebpo_catalogue_numbers){ .path = path, .fd = fd };
     if (fd < 0)

@@ -102,9 +102,11 @@ static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
 /* Reads a face across an open edge, its gate. `gate`: number of the open edge; 1 is the newest.
  * `third`: three times the kind of the face's third vertex c, plus the position of the gate in the
  * face. Returns false if the chunk is invalid. Kinds of c, if the gate leads from a to b:
- *   0: a new vertex 1: the end of the newest open edge that begins at b 2: the beginning of the
- *   newest open edge that ends at a 3: a vertex that is stored as read_vertex reads it 4 and more:
- *   the beginning of an open edge; 4: the newest */
+ *   0: a new vertex
+ *   1: the end of the newest open edge that begins at b
+ *   2: the beginning of the newest open edge that ends at a
+ *   3: a vertex that is stored as read_vertex reads it
+ *   4 and more: the beginning of an open edge; 4: the newest open edge */
 static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t *face)
 {
     uint64_t c = 0;

@@ -121,7 +121,7 @@ static bool refine(ebpo_mesh *mesh, const settings *s, bool round)
 static bool make_torus(ebpo_mesh *mesh, const settings *s)
 {
     double m = 20 * pow(2, (double)s->subdivide), n = 50 * pow(2, (double)s->subdivide);
-    if (s->faces) { /* five squares around the axis for two around the tube */
+    if (s->faces) { /* about five squares around the axis for every two around the tube */
         m = ceil(sqrt((double)s->faces / 5));
         m = m < 3 ? 3 : m;
         n = ceil((double)s->faces / 2 / m);

@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-/* Bound of rounding errors. It is much larger than the sum of a dozen rounding errors of products
- * of these coordinates, and much smaller than the volume for a face of a mesh of a billion faces.
- */
+/* Upper bound of rounding errors of volume(). It is much larger than the sum of a dozen rounding
+ * errors of products of coordinates up to 4, and much smaller than the value of volume() for a face
+ * of a mesh with a billion faces. */
 static const double slack = 1e-14;
 
 typedef struct corners {
@@ -32,6 +32,7 @@ static void cross(double out[3], const double *a, const double *b)
         out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
 
+/* Returns six times the signed volume of the tetrahedron with the corners 0, a, b and c. */
 static double volume(const double *a, const double *b, const double *c)
 {
     double n[3];
@@ -39,9 +40,8 @@ static double volume(const double *a, const double *b, const double *c)
     return dot(n, c);
 }
 
-/* Tests whether a ray from `origin` crosses a face. Returns 1 if it does, 0 if it does not, and -1
- * if it is too close to an edge to decide. The part of the line behind the origin is not on the
- * ray. */
+/* Returns 1 if the ray from `origin` crosses a face, 0 if it does not cross the face, and -1 if the
+ * ray or its origin is too close to the face's edges or plane to decide. */
 static int crossed(const corners *c, const double origin[3], const double direction[3])
 {
     double q[3][3], sides[3];
@@ -56,7 +56,8 @@ static int crossed(const corners *c, const double origin[3], const double direct
     }
     if (left && right)
         return 0;
-    /* position along the ray: ahead / sum */
+    /* the ray crosses the face at origin + ahead / sum * direction, so `ahead` and `sum` must have
+     * the same sign */
     double ahead = volume(q[0], q[1], q[2]), sum = sides[0] + sides[1] + sides[2];
     if (left == 3 || right == 3)
         return fabs(ahead) <= slack ? -1 : (ahead > 0) == (sum > 0);
@@ -89,10 +90,12 @@ bool ebpo_embedded_sphere(const ebpo_mesh *mesh)
     return intersects_once(mesh, centre, oblique);
 }
 
-/* Returns true if the central circle is below the plane of the face where it is nearest to the
- * face. The points of the circle nearest to the face's points are on an arc between those nearest
- * to two of its corners. c^2 / 7 bounds the height of an arc of chord c <= 1 above the chord. This
- * gives the support of the arc in the direction of the normal, and the plane must be beyond it. */
+/* Returns true if the face faces away from the torus's central circle. For each point of the face,
+ * take the nearest point of the circle. These nearest points are on an arc between the nearest
+ * points of two of the face's corners. The arc must be below the plane of the face. The support of
+ * the arc (the greatest n . x, where n is the face's normal) is at most that of its chord, plus a
+ * bound for the height of the arc above the chord; this height is at most c^2 / 7 for a chord of
+ * length c <= 1. */
 static bool faces_outwards(const corners *c)
 {
     double centre[3][3], e[2][3], n[3], support = -INFINITY, longest = 0;
@@ -118,8 +121,8 @@ static bool faces_outwards(const corners *c)
 
 bool ebpo_embedded_torus(const ebpo_mesh *mesh)
 {
-    /* The ray goes outwards and up from the circle, in a half plane that begins at the axis, and
-     * stays in this half plane. */
+    /* The ray begins on the circle and leads outwards and upwards, in a half plane that is bounded
+     * by the axis. It does not leave this half plane. */
     const double x = 0.7431, y = sqrt(1 - x * x), origin[3] = { x, y, 0 },
                  oblique[3] = { 0.8 * x, 0.8 * y, 0.6 };
     for (uint64_t f = 0; f < mesh->face_count; f++) {

@@ -9,8 +9,8 @@ static uint64_t mix(uint64_t z)
     return z ^ z >> 31;
 }
 
-/* Returns the dot product of the lattice point's gradient (one of 12 edge directions) with the
- * offset from it. */
+/* Returns the dot product of the gradient of the lattice point (x, y, z), which is one of 12
+ * directions, with the offset (dx, dy, dz) of a point from this lattice point. */
 static double gradient(int64_t x, int64_t y, int64_t z, uint64_t seed, double dx, double dy,
                        double dz)
 {
@@ -59,7 +59,8 @@ double ebpo_noise_octaves(const double p[3], double longest, double shortest, ui
     return weight > 0 ? sum / weight : 0;
 }
 
-/* Evaluates Taylor series on an eighth of a turn; 11 terms are exact to rounding. */
+/* Computes cosine and sine of an angle of at most an eighth of a turn by Taylor series. With 11
+ * terms, the error is only the rounding error. */
 static void small_angle(double a, double *cosine, double *sine)
 {
     double term = 1, c = 0, s = 0;

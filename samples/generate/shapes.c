@@ -86,7 +86,8 @@ static uint32_t midpoint(midpoints *t, ebpo_mesh *out, uint32_t a, uint32_t b)
              h = key * 0x9e3779b97f4a7c15u;
     for (h = (h ^ h >> 32) & t->mask; t->keys[h] && t->keys[h] != key; h = (h + 1) & t->mask)
         ;
-    if (!t->keys[h]) { /* no key is 0: the higher end is at least 1 */
+    /* 0 marks a free slot; no key is 0, because the higher vertex of an edge is at least 1 */
+    if (!t->keys[h]) {
         const float *p = out->xyz32 + 3 * (uint64_t)a, *q = out->xyz32 + 3 * (uint64_t)b;
         t->keys[h] = key;
         t->vertices[h] = (uint32_t)out->vertex_count;
@@ -145,10 +146,10 @@ void ebpo_to_unit_sphere(ebpo_mesh *mesh)
     }
 }
 
-/* Sums over the faces around a vertex. */
+/* Sums over the faces around a vertex. Each face adds its two edges at the vertex. */
 typedef struct vertex_sums {
     float normal[3]; /* sum of unit normals */
-    float length;    /* sum over the faces of two edges each */
+    float length;    /* sum of the lengths of these edges */
     uint32_t edges;
 } vertex_sums;
 
