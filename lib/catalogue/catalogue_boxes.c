@@ -1,9 +1,9 @@
 /* Finds the boxes that contain a point, that may be near a point, or that a ray may intersect.
  *
- * The boxes are the leaves of a tree. They are ordered along the Morton curve of their centres.
- * Every eight consecutive boxes have a common box on the next higher level, which contains them.
- * The only box of the highest level contains all boxes. A query begins with the highest level and
- * skips boxes that are not relevant. The tree is immutable, so any number of threads may query it.
+ * The boxes are the leaves of a tree, ordered along the Morton curve of their centres. Every eight
+ * consecutive boxes have a common box on the next higher level, which contains them. The only box
+ * of the highest level contains all boxes. A query begins with the highest level and skips boxes
+ * that are not relevant. The tree is immutable, so any number of threads may query it.
  *
  * No relevant box is skipped, in spite of rounding. A length is rounded some ten times in this
  * file, each time by at most 2^-53 of its value. A box is skipped only if its distance exceeds the

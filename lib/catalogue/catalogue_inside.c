@@ -11,8 +11,9 @@
  * winding number is counted along a ray through the files `surface` of the parts, which have no
  * caps. The winding number is the number of faces where the ray leaves the solid, minus the number
  * of faces where the ray enters the solid. If a ray hits an edge or runs along a face, its
- * crossings are not counted, and another ray is cast. The directions are the same in all queries.
- * Every ray whose crossings are counted gives the same winding number.
+ * crossings are not counted, and a ray in another direction is cast. All queries use the same
+ * sequence of directions. The winding number does not depend on the ray whose crossings are
+ * counted.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"

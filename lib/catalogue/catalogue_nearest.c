@@ -1,12 +1,12 @@
 /* Finds the nearest face of all models to a point, and the first face that a ray hits.
  *
- * For a point, the models are queried in the order of the distances of their boxes from the point,
- * until no remaining box can contain a face that is nearer than the nearest face so far. Many
- * points are processed together: in each step, the points are grouped by their next model, and each
- * of these models is queried once, with all points of its group. If several models have the same
- * rounded distance, the first of these models in the catalogue gives the result, independent of the
- * order of queries. To ensure this, a box is skipped only if its distance exceeds the nearest
- * distance by more than the rounding error (catalogue_boxes.c).
+ * For a point, the models are queried in the order of the distances of their boxes from the point.
+ * The search ends when no remaining box can contain a face that is nearer than the nearest face so
+ * far. Many points are processed together: in each step, the points are grouped by their next
+ * model, and each of these models is queried once, with all points of its group. If several models
+ * have the same rounded distance, the first of these models in the catalogue gives the result,
+ * independent of the order of queries. To ensure this, a box is skipped only if its distance
+ * exceeds the nearest distance by more than the rounding error (catalogue_boxes.c).
  *
  * For a ray, the models whose boxes the ray may intersect are queried in the order of the
  * catalogue, each only up to the nearest hit so far. A hit is at the point origin + t direction. If

@@ -1,13 +1,13 @@
 /* Sorts a mesh's vertices and faces along a Morton curve. Afterwards, the vertices of every cell
  * are one contiguous range, and neighbours in space are mostly neighbours in memory.
  *
- * The root box of the grid is chosen first, such that every cell face is exact in doubles at every
- * level in use. Vertices are sorted by the octcode of their cell (the cell's position on the curve)
- * and, within a cell, by position, so that equal positions are neighbours. Vertices without faces
- * ("unreferenced") come after the others. Faces are sorted by the least of their vertices' new
- * indices. Sorting uses the mesh's workspace (arrays in memory or in temporary files), so that a
- * mesh may be larger than memory. The mesh's arrangement stores the source index of each vertex and
- * face. The result depends on the mesh alone, not on the number of threads. */
+ * First the root box of the grid is chosen. At every level in use, the coordinates of cell faces
+ * must be doubles without rounding. Vertices are sorted by the octcode of their cell (the cell's
+ * position on the curve) and, within a cell, by position, so that equal positions are neighbours.
+ * Vertices without faces ("unreferenced") come after the others. Faces are sorted by the least of
+ * their vertices' new indices. Sorting uses the mesh's workspace (arrays in memory or in temporary
+ * files), so that a mesh may be larger than memory. The mesh's arrangement stores the source index
+ * of each vertex and face. The result depends on the mesh alone, not on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -168,8 +168,7 @@ typedef struct vertex_record {
     double p[3];                /* position */
 } vertex_record;
 
-/* The record that is sorted for each vertex of a mesh with float coordinates. It has only 24 bytes.
- */
+/* The record that is sorted for each vertex of a mesh with float coordinates, in 24 bytes. */
 typedef struct float_record {
     uint64_t key;
     uint32_t old_index;

@@ -53,9 +53,9 @@ typedef struct ebpo_build_node {
 /* Data of a node that is not empty. */
 typedef struct ebpo_build_detail {
     int32_t delta[8]; /* corner differences */
-    /* leaf: its list of faces is entries[entry_begin .. entry_end - 1] of the branch; gray node of
-     * a piece: this range has the lists of all leaves below the node; gray node of the top: the
-     * pieces below the node are ebpo_builder.piece[entry_begin .. entry_end - 1] */
+    /* Leaf: its list of faces is entries[entry_begin .. entry_end - 1] of the branch. Gray node of
+     * a piece: this range has the lists of all leaves below the node. Gray node of the top: the
+     * pieces below the node are ebpo_builder.piece[entry_begin .. entry_end - 1]. */
     uint64_t entry_begin, entry_end;
     /* gray: crossing[cross_begin .. cross_end - 1] of the branch are the faces in the cell that are
      * not entirely inside the cell */

@@ -71,17 +71,17 @@ EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, e
 
 /* --- surface.c (format-spec/surface.md) --- */
 
-/* Adds the part EBPO_PART_SURFACE to a tree with levels and mesh, unless it has too few faces.
- * Returns EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. */
+/* Adds the part EBPO_PART_SURFACE to a tree with levels and mesh. Does nothing if the mesh has too
+ * few faces. Returns EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. */
 EBPO_MUST_USE ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads,
                                              const ebpo_progress *progress, ebpo_error *error);
 
 /* --- corner_windings.c: winding numbers at the corners of cells. `delta`: corner differences, the
  * winding numbers at the eight corners minus the winding number at corner 0 --- */
 
-/* Computes the corner differences of the top's gray nodes from those of the pieces' roots. Does
- * nothing for a surface. Returns EBPO_E_NOT_SOLID if two paths to a corner give different winding
- * numbers. */
+/* Computes the corner differences of the top's gray nodes from the corner differences of the
+ * pieces' roots. Does nothing for a surface. Returns EBPO_E_NOT_SOLID if two paths to a corner give
+ * different winding numbers. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 /* Computes, from the children's corner differences, the offset of each child: the winding number at
  * the child's corner 0 minus the winding number at the parent's corner 0. `child`: index of the
@@ -96,9 +96,9 @@ enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);
-/* Computes a gray node's corner differences from those of its children. Returns false if two paths
- * along the children's edges give different winding numbers for a corner; then the mesh does not
- * bound a solid. */
+/* Computes a gray node's corner differences from the corner differences of its children. Returns
+ * false if two paths along the children's edges give different winding numbers for a corner; then
+ * the mesh does not bound a solid. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
 /* Returns a mask: bit i is set if corner i of a cell is inside by the builder's rule. `winding`:

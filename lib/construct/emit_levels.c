@@ -32,8 +32,8 @@ struct ebpo_emit_scratch {
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
     /* [level][3] for the gray node of this level on the path: half of its envelope (cut along z), a
-     * quarter (cut along z and y), and the envelope cut to a child's cell. They are too large for
-     * the stack; NULL until needed. */
+     * quarter (cut along z and y), and the envelope cut to a child's cell. These polytopes are too
+     * large for the stack. NULL until needed. */
     ebpo_polytope (*half[EBPO_LEVELS_MAX])[3];
 };
 
@@ -274,8 +274,7 @@ typedef struct joiner {
     /* [count][EBPO_LEVELS_MAX] stretches of pieces and of the top, depth first */
     ebpo_piece_level **stretch;
     uint64_t count, capacity;
-    /* the last stretches so far, if they are stretches of the top; NULL: the last stretches so far
-     * are those of a piece */
+    /* the last element of `stretch`, if it belongs to the top; NULL: it belongs to a piece */
     ebpo_piece_level *current;
     ebpo_level *level; /* [EBPO_LEVELS_MAX] result */
 } joiner;

@@ -1,7 +1,7 @@
 /* Chooses the planes of gray nodes, from the root down. A candidate is a plane that may be chosen.
- * It has a direction n and an offset, the support of the solid along n: the greatest n . x over the
- * solid within the cell (supports.h). The directions are normals of the convex hull of the solid
- * within the cell:
+ * It has a direction n. Its offset is the support of the solid along n: the greatest n . x over the
+ * points x of the solid within the cell (supports.h). The directions are normals of the convex hull
+ * of the solid within the cell:
  *
  * - If the solid within the cell is given by few points (supports.h), the directions are the
  *   normals of the facets of these points' hull.
@@ -12,9 +12,10 @@
  *   bits. The mean of each bin is tried.
  *
  * The selection (selections.c) takes planes from the candidates. A support is rounded up, so a
- * plane never cuts off a part of the solid, however bad its direction is. This file also computes
- * the envelopes of the top (the nodes above the pieces; a piece is a subtree that one thread
- * builds), level by level, so that every piece gets the envelope of its root's parent. */
+ * plane never cuts off a part of the solid, however bad its direction is. A piece is a subtree that
+ * one thread builds; the top is the set of the nodes above the pieces. This file also computes the
+ * envelopes of the top, level by level, so that every piece gets the envelope of its root's parent.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -222,7 +223,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
 
 /* --- directions of the hull --- */
 
-/* Adds a point to the hull's points, unless one of them is very close. */
+/* Adds a point to the hull's points. Does nothing if one of these points is very close. */
 static void add_hull_point(ebpo_envelope_scratch *s, const double where[3])
 {
     static const double near_squared = 1e-12; /* squared distance, in cells */
@@ -241,8 +242,8 @@ static void add_hull_point(ebpo_envelope_scratch *s, const double where[3])
 }
 
 /* Adds the extreme points of the solid along the directions from the cell's centre to the cell's
- * faces, edges and corners. So the hull has points on all sides, whatever the normals of the
- * model's faces are. */
+ * faces, edges and corners. So the hull has points on all sides, even if the normals of the model's
+ * faces have only a few directions. */
 static void add_points_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
@@ -302,8 +303,9 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 
 /* --- few points --- */
 
-/* On levels deeper than TOP_LEVELS, a point that is outside the hull found so far by less than this
- * distance (in cells) is omitted: it would only add directions that are nearly equal to others. */
+/* On levels deeper than TOP_LEVELS, a point is omitted if it is outside the hull found so far by
+ * less than this distance (in cells). Such a point would only add directions that are nearly equal
+ * to others. */
 static const double hull_tolerance = 1e-3;
 
 /* Makes all points of the solid in the cell the points of the hull. Returns false if there are too

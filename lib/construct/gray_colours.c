@@ -99,7 +99,7 @@ static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sum
 }
 
 /* Returns the byte nearest to colour / weight; halves are rounded up. This byte is the greatest one
- * with 2 * byte * weight <= 2 * colour + weight. It is found bit by bit. */
+ * with 2 * byte * weight <= 2 * colour + weight. The loop finds its bits one after the other. */
 static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
 {
     ebpo_wide limit = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);
@@ -195,7 +195,7 @@ static bool have_equal_colours(const colouring *c)
     return true;
 }
 
-/* Chooses the colours of vertices or those of faces. */
+/* Chooses the colours of vertices or the colours of faces. */
 static void choose_columns(colouring *c)
 {
     const ebpo_attributes *attributes = c->tree->mesh.attributes;

@@ -2,11 +2,11 @@
  * error in this file may enlarge an envelope, but the envelope still contains the model's faces.
  *
  * The hull grows point by point, by a beneath-beyond algorithm in doubles. A point outside the hull
- * is above the planes of some facets, its visible facets. These are replaced by new facets with
- * this point as a corner. Points that are extreme along the axes and diagonals come first, so that
- * most other points are inside the hull when they are tested. The planes of the facets are stored
- * as a structure of arrays (nx, ny, nz, d), for a vectorised loop, a kernel, that tests a point
- * against all planes (sweep.h).
+ * is above the planes of some facets, its visible facets. The visible facets are replaced by new
+ * facets with this point as a corner. Points that are extreme along the axes and diagonals come
+ * first, so that most other points are inside the hull when they are tested. The planes of the
+ * facets are stored as a structure of arrays (nx, ny, nz, d), for a vectorised loop, a kernel, that
+ * tests a point against all planes (sweep.h).
  *
  * Limits: if there are more than EBPO_HULL_POINTS points, no hull is computed (0 facets). When the
  * capacity for facets is reached (at most EBPO_HULL_FACETS), the remaining points are omitted.

@@ -50,7 +50,8 @@ static uint32_t shape_vertex(ebpo_large_polytope *p, ebpo_large_shape *s, const 
     return (uint32_t)s->vertex_count++;
 }
 
-/* Adds a corner to the loop of the current face, unless it is equal to the previous corner. */
+/* Adds a corner to the loop of the current face. Does nothing if the previous corner is the same
+ * vertex. */
 static void shape_corner(ebpo_large_polytope *p, ebpo_large_shape *s, uint32_t vertex)
 {
     uint64_t start = s->first[s->face_count];

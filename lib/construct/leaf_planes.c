@@ -3,11 +3,11 @@
  * leaves.
  *
  * A candidate is a plane that may be chosen. Its direction is a normal of the convex hull of the
- * leaf's points. These are the corners of the faces' parts in the cell, and the cell's corners that
- * are inside the solid. If there are too many points, or if all are in one plane, the directions
- * are the normals of the faces. The offset of a plane with the normal n is its support, which is
- * the greatest n . x of all points, plus a bound of the rounding error. So no part of a face in the
- * cell is cut off. */
+ * leaf's points. The leaf's points are the corners of the faces' parts in the cell, and the cell's
+ * corners that are inside the solid. If there are too many points, or if all are in one plane, the
+ * directions are the normals of the faces. The offset of a plane with the normal n is its support,
+ * which is the greatest n . x of all points, plus a bound of the rounding error. So no part of a
+ * face in the cell is cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>

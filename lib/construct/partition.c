@@ -6,9 +6,9 @@
  * result does not depend on the number of threads or the machine. Sources: EBP 2017, 3.3
  * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
  *
- * While the top is divided, two inputs of each piece are computed that depend on other pieces: its
- * *fresh* faces, which no earlier piece lists, and the winding numbers at the corners of its root.
- */
+ * Two inputs of each piece depend on other pieces, so they are computed together with the top: the
+ * piece's *fresh* faces, which no earlier piece lists, and the winding numbers at the corners of
+ * its root. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

@@ -44,8 +44,8 @@ typedef struct ebpo_offer {
 } ebpo_offer;
 
 /* Data that a node passes to its parent, in the coordinates of the node's cell (EBP 2017, 3.4.1):
- * the node's chosen planes, and corners of the node's envelope. Only corners of envelope faces that
- * were made by planes are passed, not those of the cell's faces. */
+ * the node's chosen planes, and corners of the node's envelope. Only corners of those envelope
+ * faces are passed that planes made. Corners that only faces of the cell have are not passed. */
 typedef struct ebpo_handover {
     ebpo_offer *offers;
     double (*corner)[3];

@@ -72,9 +72,9 @@ typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice
  * and `envelope` is first the parent's envelope, cut to the cell. */
 ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
-/* Sets chosen[i] to true if a selection of the theses takes candidate i, and to false otherwise. It
- * may take planes that cut nothing off. Candidates may have equal normals. Returns false when out
- * of memory. */
+/* Sets chosen[i] to true if a selection of the theses takes candidate i, and to false otherwise.
+ * The selection may take planes that cut nothing off. Candidates may have equal normals. Returns
+ * false when out of memory. */
 bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice, bool *chosen);
 
 /* Selects, again and again, the plane that removes the most volume, until this volume is below
@@ -149,14 +149,14 @@ typedef struct ebpo_hull_facet {
 
 /* Computes the triangular facets of the hull of `count` points, at most EBPO_HULL_POINTS, with
  * coordinates of about 1. Returns the number of facets; 0 if the points are nearly in a plane. At
- * most `capacity` facets are made. (A hull of n points has 2 n - 4 facets, but rounding errors may
- * add some.) Points that are outside the hull found so far by less than `tolerance` are omitted; a
- * tolerance below 1e-9 makes facets of rounding errors. */
+ * most `capacity` facets are made. (A hull of n points has at most 2 n - 4 facets, but rounding
+ * errors may add some.) Points that are outside the hull found so far by less than `tolerance` are
+ * omitted. With a tolerance below 1e-9, rounding errors would make additional facets. */
 int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
                      ebpo_hull_facet *facets, int capacity);
 
-/* Compares two facets for qsort: the largest area first; facets of equal area are ordered by their
- * corners, so that the order is the same on all machines. */
+/* Compares two facets for qsort: the facet with the larger area comes first. Facets of equal area
+ * are ordered by their corners, so that the order is the same on all machines. */
 int ebpo_hull_by_area(const void *a, const void *b);
 
 #endif

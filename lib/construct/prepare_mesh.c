@@ -2,13 +2,13 @@
  *
  * ebpo_mesh_prepare first sorts the mesh along the Morton curve (arrange.h), so that each later
  * step accesses memory in order. Then it checks the mesh, repairs it as the options request, sorts
- * it again and checks it again. A mesh with coordinates beyond 2^1000 cannot be sorted, but it is
- * checked all the same. Later ebpo_build rejects such a mesh.
+ * it again and checks it again. A mesh with coordinates beyond 2^1000 cannot be sorted. It is
+ * checked without sorting, and later ebpo_build rejects it.
  *
  * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
  * first, until one of the results is a solid without doubts. Doubts are reasons why a solid may
- * differ from the author's intention: much of the surface was made by filling holes, or the volume
- * is negative, or the volume is very small for the area (a sheet). */
+ * differ from the author's intention. There are three: much of the surface was made by filling
+ * holes; the volume is negative; the volume is very small for the area (a sheet). */
 #include "core/strict_fp.h"
 
 #include <ebpo/repair.h>

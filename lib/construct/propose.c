@@ -4,9 +4,9 @@
  *
  * A candidate is a plane that may be chosen. The candidates of a leaf are the planes of its faces;
  * the candidates of a gray node are the planes that its children have chosen ("offers"). The chosen
- * planes clip the node's cell. The offset of a plane with the normal n is its support, the greatest
- * n . x. It is computed from the corners of the children's envelopes and from the solid itself. So
- * the envelope contains the solid even if the corners are rounded.
+ * planes clip the node's cell. The offset of a plane with the normal n is its support: the greatest
+ * n . x over the corners of the children's envelopes and over the solid itself. So the envelope
+ * contains the solid even if the corners are rounded.
  *
  * A piece is a subtree that one thread processes. For each piece, the nodes are made, planes are
  * chosen, and the nodes are freed again. Then planes are chosen for the nodes of the top (the nodes

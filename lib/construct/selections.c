@@ -323,7 +323,7 @@ static double angle_of(double y, double x)
     return y < 0 ? -angle : angle;
 }
 
-/* Converts a normal in cell coordinates to a point, such that the distance of two points is the
+/* Converts a normal in cell coordinates to a point. The distance between two such points is the
  * distance of their normals. For EBPO_NORMALS_ANGLE, the point is the unit normal in the model's
  * coordinates. Otherwise its coordinates are the two angles of the theses. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])

@@ -195,7 +195,8 @@ static candidate pop_candidate(simplifier *s)
     return top;
 }
 
-/* Adds the collapse of vertex `from` onto vertex `to` to the heap, unless `from` is fixed. */
+/* Adds the collapse of vertex `from` onto vertex `to` to the heap. Does nothing if `from` is fixed.
+ */
 static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
 {
     if (s->mesh->vertex[from].fixed)

@@ -5,12 +5,12 @@
  * inside or outside the other one, and the winding numbers on both sides of its faces follow from
  * the nesting of components (which component is inside which). Faces are compared only if the boxes
  * of components intersect. A first pass finds, for each component, the faces whose boxes intersect
- * the box of another component. A box that contains the box of the component is skipped, because it
- * would select all faces of the component; the faces of the outer component that intersect the
- * inner box suffice to find a contact. A second pass compares the found faces with faces of other
- * components. Both passes stop after a number of steps that is proportional to the number of faces;
- * then the components count as not apart. `ebpo check` prints the counts; ebpo_measure uses
- * ebpo_component_times. */
+ * the box of another component. If the other box contains the component's box, it is skipped,
+ * because all faces of the component would be found. Instead, the faces of the other component that
+ * intersect the component's box are found, and these faces suffice to find a contact. A second pass
+ * compares the found faces with faces of other components. Both passes stop after a number of steps
+ * that is proportional to the number of faces; then the components count as not apart. `ebpo check`
+ * prints the counts; ebpo_measure uses ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"

@@ -1,7 +1,7 @@
 /* Computes the support of the solid in a cell along a direction n: the greatest n . x over the
- * points x of the solid in the cell. It is sufficient to test the mesh vertices in the cell, the
- * points where faces are cut by cell faces ("crossings"), and the corners of the cell that are
- * inside the solid. The support is the offset of a plane with the normal n.
+ * points x of the solid in the cell. Three kinds of points are sufficient: the mesh vertices in the
+ * cell, the points at which cell faces cut the faces of the mesh ("crossings"), and the corners of
+ * the cell that are inside the solid. The support is the offset of a plane with the normal n.
  *
  * If there are few vertices, all points are gathered, each once, and searched in stretches (32
  * consecutive points that share a box, sweep.h). If there are many vertices, only crossings and
@@ -207,8 +207,9 @@ static bool known_point(ebpo_supports *s, const double x[3], double error)
     return true;
 }
 
-/* Adds a point, unless there is an equal point. `slack`: upper bound of the rounding errors of its
- * coordinates. Returns false when out of memory. */
+/* Adds a point. If there is an equal point already, only raises the error bound of that point.
+ * `slack`: upper bound of the rounding errors of its coordinates. Returns false when out of memory.
+ */
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
 {
     if (!ebpo_array_grow_late(s->workspace, &s->point, &s->capacity, s->count / 4 + 1,

@@ -18,9 +18,9 @@ void ebpo_bounds_free(ebpo_bounds *bounds);
 
 /* --- the support of the solid --- */
 
-/* The points of a node: the support is the maximum of n . x over these points. They are the
- * vertices in the cell, the points where faces are cut by cell faces, and the corners of the cell
- * that are inside the solid. */
+/* The points of a node: the support is the maximum of n . x over these points. There are three
+ * kinds: the vertices in the cell, the points at which cell faces cut the faces of the mesh, and
+ * the corners of the cell that are inside the solid. */
 typedef struct ebpo_supports {
     const ebpo_builder *b;
     ebpo_workspace *workspace; /* the builder's workspace, set at the first use */

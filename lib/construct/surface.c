@@ -14,10 +14,11 @@
  * mean depends on the model only, so neighbouring patches have the same vertex. Vertices on borders
  * do not move when a patch is simplified.
  *
- * The error of a patch bounds its distance from the model. It is the distance between the patch and
- * the surface from which the patch is made, in both directions, plus the error of that surface. The
- * model's faces have the error 0. Nodes with at most TASK_FACES faces, and all nodes below them,
- * are built in parallel; then the nodes above them are built. */
+ * The error of a patch is an upper bound of its distance from the model. It is the sum of two
+ * terms: the distance between the patch and the surface from which the patch is made, in both
+ * directions, and the error of that surface. The model's faces have the error 0. Nodes with at most
+ * TASK_FACES faces, and all nodes below them, are built in parallel; then the nodes above them are
+ * built. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -411,7 +412,7 @@ static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
     return true;
 }
 
-/* Sets position, normal and colour of `v` to those of the vertex of a cell. */
+/* Copies position, normal and colour from the vertex of a cell to `v`. `key`: key of the cell. */
 static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int node_level,
                             uint64_t key)
 {
@@ -685,7 +686,7 @@ static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
     return made;
 }
 
-/* Makes a patch that is a point: a triangle with three equal corners. This is done if all triangles
+/* Makes a patch that is a point: a triangle with three equal corners. It is called if all triangles
  * of a patch vanish because their corners are replaced by vertices of cells. The node needs a
  * patch, because patches of siblings are stored only if all siblings have one. */
 static bool add_point(ebpo_patch_mesh *mesh)

@@ -1,14 +1,15 @@
 /* Bounds the greatest distance of the points of a surface from another surface.
  *
  * The distance of a point from a fixed triangle is a convex function of the point, so over another
- * triangle it is greatest at a corner. Let T be a triangle of the first surface. The distance of
- * the points of T from the second surface has two upper bounds: the greatest distance of the
- * corners of T from one triangle of the second surface; and the distance of the centre of T plus
- * the radius of T (the greatest distance of a corner from the centre). T is cut until one of these
- * bounds is close enough to the greatest distance of a point that was found so far. If possible, T
- * is cut by the sides of the prism over a near triangle of the second surface; otherwise it is
- * halved. Halving alone would make very many parts if both surfaces divide a plane into slivers.
- * The second surface is stored in a complete binary tree of boxes. */
+ * triangle it is greatest at a corner. Let T be a triangle of the first surface. There are two
+ * upper bounds of the distance of the points of T from the second surface. The first bound is the
+ * greatest distance of the corners of T from one triangle of the second surface. The second bound
+ * is the distance of the centre of T from the second surface, plus the greatest distance of a
+ * corner of T from the centre. T is cut until one of these bounds is close enough to the greatest
+ * distance of a point that was found so far. If possible, T is cut by the sides of the prism over a
+ * near triangle of the second surface; otherwise it is halved. Halving alone would make very many
+ * parts if both surfaces divide a plane into slivers. The second surface is stored in a complete
+ * binary tree of boxes. */
 #include "core/strict_fp.h"
 
 #include <math.h>

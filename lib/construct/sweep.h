@@ -1,7 +1,7 @@
 /* Declares two inner loops (kernels): find_visible for convex hulls (hull_directions.c), and
  * `highest` for supports (supports.h). They process four doubles at a time. sweep_kernels.c is
- * compiled once for each instruction set. Each variant does the same operations in the same order,
- * so the results are the same. */
+ * compiled once for each instruction set. All these variants do the same operations in the same
+ * order, so they give the same results. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 

@@ -1,7 +1,7 @@
 /* Implements the two kernels of sweep.h, which process four doubles at a time. The first kernel
  * finds the planes below a point. The second kernel finds the greatest value among points.
- * meson.build compiles this file once for each instruction set. The operations and their order are
- * the same in each variant, so the results are the same; core/cpu.h chooses the variant. */
+ * meson.build compiles this file once for each instruction set. All variants do the same operations
+ * in the same order, so they give the same results. core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"

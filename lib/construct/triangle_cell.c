@@ -2,12 +2,12 @@
  * face misses the cell, and clips the face to the cell.
  *
  * All tests use a bound of the rounding error and are conservative, so no exact arithmetic is
- * needed: a test may keep a face that does not touch the cell, but never drops a face that touches
- * it. (If the list of a cell has a face that does not touch the cell, this costs little time. If a
- * face were missing, the file would be wrong.) The tests use the face's bounding box, its plane,
- * and the cross products of its edges with the axes (separating axes). Clipping enlarges the cell
- * by the bound, so that the clipped polygon of a face that touches the closed cell is never empty.
- */
+ * needed. A test may keep a face that does not touch the cell, but it never drops a face that
+ * touches the cell. (If the list of a cell has a face that does not touch the cell, this costs
+ * little time. If a face were missing, the file would be wrong.) The tests use the face's bounding
+ * box, its plane, and the cross products of its edges with the axes (separating axes). Clipping
+ * enlarges the cell by the bound, so that the clipped polygon of a face that touches the closed
+ * cell is never empty. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -108,11 +108,11 @@ static void separation_prepare(separation *s)
     ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
 }
 
-/* Returns true if the plane of the face, or a plane whose normal is the cross product of one of its
- * edges with an axis, separates the face from the cube around `centre` whose sides have the length
- * 2 * half. Let M be the greatest coordinate and u = 2^-53. The rounding errors are at most 4 u M
- * for edges, 64 u M^2 for cross products, and 512 u M^3 for the plane. The tolerances in this
- * function are at least as large. */
+/* Returns true if a plane separates the face from the cube around `centre` whose sides have the
+ * length 2 * half. Two kinds of planes are tested: the plane of the face, and planes whose normal
+ * is the cross product of an edge of the face with an axis. Let M be the greatest coordinate and u
+ * = 2^-53. The rounding errors are at most 4 u M for edges, 64 u M^2 for cross products, and 512 u
+ * M^3 for the plane. The tolerances in this function are at least as large. */
 static bool is_separated(const separation *s, const double centre[3], double half)
 {
     double m = s->greatest, tolerance = 0x1p-44 * m * m * m;

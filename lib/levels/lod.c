@@ -527,9 +527,9 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
  * enough subtrees for all threads. */
 enum { SEEDS_WANTED = 128 };
 
-/* For each node on the path to the current node, three parts of its envelope: a half (cut at the
- * middle of the cell along z), a quarter (also cut along y), and an eighth (also cut along x). They
- * are too large for the stack. */
+/* For each level of the path to the current node, three parts of the envelope of the path's node: a
+ * half (cut at the middle of the cell along z), a quarter (also cut along y), and an eighth (also
+ * cut along x). These polytopes are too large for the stack. */
 typedef ebpo_polytope path_halves[EBPO_LEVELS_MAX][3];
 
 /* A gray node at the split level, where the walk of a subtree begins. */
@@ -769,7 +769,8 @@ void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
 
 /* Sets the winding numbers of leaves and black nodes. `nodes` is sorted by level, then by octcode,
  * and has every leaf and every black node of these levels. So the rank of a leaf is the number of
- * leaves before it in its level; the same is true for black nodes. */
+ * leaves before it in its level. The rank of a black node is the number of black nodes before it.
+ */
 static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     uint64_t leaf = 0, black = 0;

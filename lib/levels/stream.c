@@ -242,7 +242,8 @@ struct ebpo_stream {
     ebpo_stream_options options;
     ebpo_box box;
     int level; /* last level read; -1: none */
-    /* [level + 1] arrays of the levels read so far, as far as they are still needed */
+    /* [level + 1] arrays of the levels read so far; arrays that are not needed any more are freed
+     */
     ebpo_level kept[EBPO_LEVELS_MAX];
     uint64_t bytes; /* size of the header and of the levels read so far */
     /* volume of the leaves and black nodes in all levels up to `level` */

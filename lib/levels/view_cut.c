@@ -63,8 +63,8 @@ static ebpo_status check_observer(const ebpo_observer *o, ebpo_error *error)
 }
 
 /* Computes the frustum's side planes, and the plane through the eye that is parallel to the
- * picture. The inward normals of the side planes are t * forward + side and t * forward - side,
- * where `side` is the direction to the right or up, and t is the tangent of half the angle of view
+ * picture. The inward normals of the side planes are t * forward + side and t * forward - side.
+ * Here `side` is the direction to the right or up, and t is the tangent of half the angle of view
  * in this direction. */
 static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
                                 ebpo_error *error)

@@ -611,9 +611,10 @@ static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned 
     return status == EBPO_OK && missing.count == 0;
 }
 
-/* If a view ends at a number of bytes or nodes, the level at which it will end is unknown. Then a
- * node is not prefetched yet if it is more than SOON_LEVELS levels deeper than the next node, or
- * (in the order of pixels) smaller than the next node by a factor of more than 2^SOON_LEVELS. */
+/* If a view ends at a number of bytes or nodes, the level at which it will end is unknown. Then
+ * nodes that are refined much later are not prefetched. In the order of levels, these are nodes
+ * more than SOON_LEVELS levels deeper than the next node. In the order of pixels, these are nodes
+ * smaller than the next node by a factor of more than 2^SOON_LEVELS. */
 enum { SOON_LEVELS = 2 };
 
 /* Sets soon_level and soon_pixels. `next`: octcode of the next node to refine. */

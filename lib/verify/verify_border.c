@@ -1,12 +1,13 @@
 /* Verifies the border of a surface, and the winding numbers of the surface together with its caps
  * (triangles that close the holes).
  *
- * - The loops must be the boundary of the faces: for each edge, the uses by faces in one direction
- *   minus the uses in the other direction must equal the weights of the loops that contain it. For
- *   this check, each directed edge gets a pseudo-random value, computed from the positions of its
- *   ends. The value of the opposite edge is its negative. The sum over the faces' edges must equal
- *   the sum over the loops' edges, times the weights. If the loops are wrong, the sums are equal
- *   with a probability of only 2^-64.
+ * - The loops must be the boundary of the faces. For each edge, count how often faces use the edge
+ *   in one direction, minus how often they use it in the other direction. This number must be equal
+ *   to the sum of the weights of the loops that contain the edge. For this check, each directed
+ *   edge gets a pseudo-random value, computed from the positions of its ends. The value of the
+ *   opposite edge is its negative. The sum over the faces' edges must equal the sum over the loops'
+ *   edges, times the weights. If the loops are wrong, the sums are equal with a probability of only
+ *   2^-64.
  * - The area of the caps must be the area that the header states.
  * - Winding numbers are compared with rays through all faces and all caps. This file computes the
  *   caps from the loops, by a method that shares nothing with the builder. */

@@ -158,9 +158,9 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
 }
 
 /* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): a box and a triangle are apart if
- * their projections on some axis are apart. It is sufficient to test the normals of the box, the
- * normal of the face, and the cross products of an edge of the box with an edge of the face. This
- * is also true for a face without area. */
+ * their projections on some axis are apart. The following axes are sufficient, also for a face
+ * without area: the normals of the box, the normal of the face, and the cross products of an edge
+ * of the box with an edge of the face. */
 
 static const double eps = 0x1p-53;
 static const double slack = 0x1p-900; /* upper bound of errors by underflow */
@@ -371,10 +371,10 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
  *
  *     n . x <= (max of (n - m) . v over the face's corners v) + (max of m . y over the unit cube)
  *
- * For one of the following vectors m, the bound is equal to n . x: m = 0; m along one axis such
- * that n - m is perpendicular to an edge of the face; m along two axes such that n - m is normal to
- * the face. A rounded m also gives a valid bound, so most faces need not be clipped. If no bound
- * decides, the face is clipped in rationals. */
+ * For at least one of the following vectors m, the bound is equal to the maximum: m = 0; a vector m
+ * along one axis for which n - m is perpendicular to an edge of the face; a vector m along two axes
+ * for which n - m is normal to the face. A rounded m also gives a valid bound, so most faces need
+ * not be clipped. If no bound decides, the face is clipped in rationals. */
 
 void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
                          const ebpo_reference_node *node)
@@ -419,7 +419,7 @@ static bool is_certified(const local_face *face, const double n[3], const double
     return highest_corner(face, difference) + cube + 16 * eps * size <= bound;
 }
 
-/* Tries m along one axis such that n - m is perpendicular to an edge of the face. */
+/* Tries vectors m along one axis for which n - m is perpendicular to an edge of the face. */
 static bool certified_by_cell_face(const local_face *face, const double n[3], double bound)
 {
     for (int i = 0; i < 3; i++) {
@@ -436,7 +436,7 @@ static bool certified_by_cell_face(const local_face *face, const double n[3], do
     return false;
 }
 
-/* Tries m along two axes such that n - m is normal to the face. */
+/* Tries vectors m along two axes for which n - m is normal to the face. */
 static bool certified_by_two_cell_faces(const local_face *face, const double n[3], double bound)
 {
     double p[3], q[3], normal[3];

@@ -136,7 +136,7 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
 }
 
 /* The different faces that the leaves below a node list. Faces are gathered only until there are
- * more than `limit` different faces. They are kept in a list of at most about twice `limit`
+ * more than `limit` different faces. The faces are kept in a list of at most about twice `limit`
  * entries, which may contain repetitions. If `limit` exceeds LIST_LIMIT_MAX, they are marked in an
  * array with one bit for each face of the mesh instead. */
 typedef struct gathering {

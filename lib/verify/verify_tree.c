@@ -272,8 +272,9 @@ static bool point_kept_above(const ebpo_cell *above, const ebpo_cell *at, const 
 }
 
 /* Returns true if a point is on the inner side of a plane, as point_kept_above does, but transforms
- * the plane. The plane belongs to the node of level `from` of the chain. It is transformed level by
- * level, as readers do, to the coordinates of the point's cell, which is the node of level `to`. */
+ * the plane. The plane belongs to the node of level `from` of the chain. The plane is transformed
+ * level by level, as readers do, to the coordinates of the point's cell, which is the cell of the
+ * node of level `to`. */
 static bool point_kept_below(const chain *c, int from, int to, const int64_t point[3],
                              const int32_t n[3], int64_t d)
 {

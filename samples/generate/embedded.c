@@ -40,8 +40,8 @@ static double volume(const double *a, const double *b, const double *c)
     return dot(n, c);
 }
 
-/* Returns 1 if the ray from `origin` crosses a face, 0 if it does not cross the face, and -1 if the
- * ray or its origin is too close to the face's edges or plane to decide. */
+/* Returns 1 if the ray from `origin` crosses the face, and 0 if it does not. Returns -1 if the ray
+ * is too close to an edge, or its origin is too close to the face's plane, to decide. */
 static int crossed(const corners *c, const double origin[3], const double direction[3])
 {
     double q[3][3], sides[3];
@@ -92,10 +92,10 @@ bool ebpo_embedded_sphere(const ebpo_mesh *mesh)
 
 /* Returns true if the face faces away from the torus's central circle. For each point of the face,
  * take the nearest point of the circle. These nearest points are on an arc between the nearest
- * points of two of the face's corners. The arc must be below the plane of the face. The support of
- * the arc (the greatest n . x, where n is the face's normal) is at most that of its chord, plus a
- * bound for the height of the arc above the chord; this height is at most c^2 / 7 for a chord of
- * length c <= 1. */
+ * points of two of the face's corners. The arc must be below the plane of the face. To test this,
+ * the greatest n . x over the arc is compared with the plane, where n is the face's normal. It is
+ * at most the greatest n . x over the chord of the arc, plus a bound for the height of the arc
+ * above the chord. This height is at most c^2 / 7 for a chord of length c <= 1. */
 static bool faces_outwards(const corners *c)
 {
     double centre[3][3], e[2][3], n[3], support = -INFINITY, longest = 0;
