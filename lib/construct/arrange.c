@@ -396,7 +396,7 @@ static ebpo_status make_faces(void *context, uint64_t begin, uint64_t end, void 
 static int compare_faces(const void *x, const void *y)
 {
     const face_record *a = x, *b = y;
-    return (a->key > b->key) - (a->key < b->key); /* keys differ */
+    return (a->key > b->key) - (a->key < b->key); /* no two keys are equal */
 }
 
 /* Stores sorted records as the faces with the new indices new_index, new_index + 1, ... */
@@ -482,7 +482,7 @@ static ebpo_status arrange_by_curve(arranging a, int level, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement && mesh->arrangement->key && mesh->arrangement->level == level)
-        return EBPO_OK; /* the result would be the same */
+        return EBPO_OK; /* the mesh already has this arrangement */
     a.to = ebpo_alloc_zero(1, sizeof *a.to);
     if (a.to)
         a.to->workspace = mesh->workspace;

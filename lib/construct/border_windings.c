@@ -6,8 +6,9 @@
  * (corner_windings.c). The nodes are visited depth first. Each visit returns the cell's corner
  * differences: the winding numbers at its corners minus the winding number at its lowest corner.
  * For a leaf, these differences are sums of the signed crossings of faces and caps with the edges
- * of the cell. The lowest corner of a child is a corner of an earlier sibling, so its winding
- * number is known before the child is visited. Source: format-spec/border.md. */
+ * of the cell. The lowest corner of a child is also a corner of an earlier sibling (or the lowest
+ * corner of the parent), so its winding number is known before the child is visited. Source:
+ * format-spec/border.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -51,7 +52,7 @@ static const struct {
     int axis, before;
 } edge_to[8] = { { 0, 0 }, { 0, 0 }, { 1, 0 }, { 1, 1 }, { 2, 0 }, { 2, 1 }, { 2, 2 }, { 2, 3 } };
 
-/* Adds the crossings of caps along the edges of a cell to the differences of its corners. */
+/* Adds the crossings of caps along the edges of a cell to the corner differences `delta`. */
 static void add_cap_crossings(const winding_walk *w, ebpo_cell cell, int32_t delta[8])
 {
     double low[3], high[3];
@@ -68,7 +69,7 @@ static void add_cap_crossings(const winding_walk *w, ebpo_cell cell, int32_t del
     }
 }
 
-/* Adds the crossings of faces along the edges of a cell to the differences of its corners. The
+/* Adds the crossings of faces along the edges of a cell to the corner differences `delta`. The
  * indices of the faces are faces[0 .. count - 1]. If `faces` is NULL, they are first .. first +
  * count - 1. */
 static void add_faces(winding_walk *w, ebpo_cell cell, const uint32_t *faces, uint64_t first,

@@ -68,8 +68,8 @@ typedef struct ebpo_build_detail {
 /* A piece, or the top of the tree. Its nodes are stored depth first; nodes[0] is the root. */
 typedef struct ebpo_branch {
     ebpo_cell cell; /* cell of the root */
-    /* [list_count] indices (along the curve) of the faces that touch the cell, ascending; NULL for
-     * the top, so that the elements of its `crossing` are such indices */
+    /* [list_count] indices along the curve of the faces that touch the cell, ascending; NULL for
+     * the top */
     uint32_t *list;
     uint64_t list_count;
     uint8_t *fresh;              /* bit i: no piece before this one lists face list[i] */
@@ -80,7 +80,9 @@ typedef struct ebpo_branch {
     uint64_t detail_count, detail_capacity;
     uint32_t *entries; /* the lists of the leaves, one after the other: indices in `list` */
     uint64_t entry_count, entry_capacity;
-    uint32_t *crossing; /* indices in `list` */
+    /* elements of all ranges of crossing faces (see ebpo_build_detail): indices in `list`; in the
+     * top, indices along the curve */
+    uint32_t *crossing;
     uint64_t cross_count, cross_capacity;
     int32_t winding; /* winding number at the lowest corner of the cell */
     /* type and corner differences of nodes[0]; they remain when the nodes are freed */
@@ -119,7 +121,7 @@ typedef struct ebpo_builder {
     const uint64_t *key;       /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3]; /* [face_count] vertices of each face */
     ebpo_bounds bounds;        /* boxes around ranges of vertices */
-    /* [face] EBPO_NO_INDEX until the piece sets it in which the face is fresh */
+    /* [face] final index; EBPO_NO_INDEX until a piece assigns it */
     uint32_t *final_index;
     ebpo_branch top;    /* each of its leaves is a piece: `detail` is an index in `piece` */
     ebpo_branch *piece; /* [piece_count] the pieces */

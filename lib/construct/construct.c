@@ -4,11 +4,11 @@
  * This file checks options and chooses the deepest level (EBP 2017, equation 3). The tree is cut
  * into pieces, which are subtrees, and the top, which is the set of the nodes above the pieces. In
  * the code, the top and each piece are an `ebpo_branch`: `b->top` and `b->piece[i]` (builder.h).
- * Several threads process the pieces, one piece per thread at a time. The envelopes of a piece need
- * the envelope of the parent of its root, so the envelopes of the top are computed first. A
- * selection chooses the planes of the envelopes. If the selection works from the leaves up, the
- * planes of all nodes are chosen before any envelope is computed. ebpo_build takes over the mesh
- * and frees it, also on failure. */
+ * Several threads process the pieces, one piece per thread at a time. The envelopes of a piece are
+ * computed from the envelope of the parent of the piece's root, so the envelopes of the top are
+ * computed first. A selection chooses the planes of the envelopes. If the selection works from the
+ * leaves up, the planes of all nodes are chosen before any envelope is computed. ebpo_build takes
+ * over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -42,8 +42,8 @@ static int level_limit(const ebpo_mesh_report *report)
     return level;
 }
 
-/* Returns an error if a text option is too long for its field of ebpo_info, which has `capacity`
- * bytes, or has control characters. */
+/* Returns an error if a text option has control characters, or is too long for its field of
+ * ebpo_info. `capacity`: bytes of this field. */
 static ebpo_status check_text(const char *name, const char *text, size_t capacity,
                               ebpo_error *error)
 {
@@ -334,7 +334,7 @@ static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
-    /* requested: the caller's structure, which may have the size of another version */
+    /* requested: the caller's structure; its size may be that of another version of the library */
     ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *requested = NULL;
     ebpo_builder b = { .workspace = mesh->workspace,
                        .top.workspace = mesh->workspace,

@@ -40,7 +40,7 @@
  */
 enum { CANDIDATES_SAMPLE = 4096, CANDIDATES_BINS = 16384 };
 
-/* A bin of the octahedral map: a square of normals. */
+/* A bin: a square of the octahedral map, with the normals of the sample in this square. */
 typedef struct normal_bin {
     uint32_t key;          /* 1 + position of the bin; 0: the entry of the table is free */
     uint32_t count;        /* number of normals in the bin */
@@ -65,7 +65,8 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
     for (; i < end; i += step) {
         ebpo_triangle face;
         uint32_t normal;
-        /* with a large step, each face is on another page of the workspace's files */
+        /* with a large step, each face is on another page of the workspace's files, so pages are
+         * released more often */
         if (step > 64 && *count % 16 == 0)
             ebpo_release_pages(b->workspace);
         ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);

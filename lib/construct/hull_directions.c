@@ -92,7 +92,8 @@ static void move_facet(hull *h, int to, int from)
     memcpy(h->corner[to], h->corner[from], sizeof h->corner[to]);
 }
 
-/* Sets the number of facets and pads the planes. */
+/* Sets the number of facets, and adds planes above which there is no point until the number of
+ * planes is a multiple of four. */
 static void set_count(hull *h, int count)
 {
     static const double none[3];

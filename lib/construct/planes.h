@@ -17,7 +17,8 @@ enum {
     /* maximum number of planes that a leaf, or a gray node deeper than the first levels, adds to
      * the planes of its parent */
     EBPO_PLANES_MAX = 32,
-    EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of a node, from the root down */
+    /* maximum number of candidates of a node, if planes are chosen from the root down */
+    EBPO_PLANES_CANDIDATES = 512,
     /* maximum number of planes of a node in a file, which stores this number in a byte; also the
      * maximum number of planes that the selections of the theses choose */
     EBPO_PLANES_STORED = 255

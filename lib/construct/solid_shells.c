@@ -33,8 +33,8 @@ enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22
 
 typedef struct comparing {
     ebpo_solid_shells *s;
-    /* [faces] 1: the face's box intersects the box of another shell, which does not contain the box
-     * of the face's own shell */
+    /* [faces] 1: the face's box intersects the box of another shell. Boxes that contain the box of
+     * the face's shell do not count */
     uint8_t *exposed;
     uint8_t *reached;          /* [shells] 1: a face of another shell intersects this shell's box */
     ebpo_box_tree faces;       /* faces of reached shells; value: the shell */
@@ -69,8 +69,9 @@ static bool is_near(void *user, const ebpo_box_node *node)
     return boxes_intersect(&((const visitor *)user)->box, node->filled->min, node->filled->max);
 }
 
-/* Compares the face with the boxes of shells. If its box intersects the box of another shell, marks
- * the face as exposed and the other shell as reached. Returns false at the limit of steps. */
+/* Compares the face with the boxes of other shells, except boxes that contain the box of the face's
+ * shell. If the face's box intersects such a box, marks the face as exposed and the other shell as
+ * reached. Returns false at the limit of steps. */
 static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;

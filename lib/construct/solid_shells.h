@@ -12,7 +12,7 @@ typedef struct ebpo_solid_shells {
     const ebpo_mesh *mesh; /* borrowed */
     /* result of ebpo_mesh_find_shells; the nesting uses it as `of_face` of its components */
     uint32_t *closed;
-    ebpo_nesting nesting; /* which shells are inside which others */
+    ebpo_nesting nesting; /* how many shells are around each shell */
     /* [component] index of its shell; EBPO_NO_INDEX: the component is open or has no volume */
     uint32_t *shell_of;
     /* every component is closed, and faces of two different shells have no common point */

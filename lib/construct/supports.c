@@ -220,7 +220,7 @@ static bool add_point(ebpo_supports *s, const double x[3], double slack)
     double(*p)[4] = s->point[s->count / 4],
     values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
     unsigned point_lane = s->count % 4;
-    /* the other lanes of a four are copies of lane 0 until they are set */
+    /* the other lanes of a group of four are copies of lane 0 until they are set */
     for (int k = 0; k < 4; k++)
         for (unsigned lane = point_lane; lane < (point_lane ? point_lane + 1 : 4); lane++)
             p[k][lane] = values[k];

@@ -8,11 +8,11 @@
  * triangles as the faces or patches that it is made from.
  *
  * A vertex is on the border of a patch if faces that do not belong to the patch also use the
- * vertex. Each border vertex is replaced by the vertex of its cell. Its cell is the cell
- * EBPO_PATCH_CELLS levels below the node that contains the border vertex. The vertex of a cell is
- * at the mean of the model's vertices that are in the cell and on borders at the node's level. This
- * mean depends on the model only, so neighbouring patches have the same vertex. Vertices on borders
- * do not move when a patch is simplified.
+ * vertex. Each border vertex is replaced by the vertex of its cell. Its cell is the cell that
+ * contains the border vertex, EBPO_PATCH_CELLS levels below the level of the node. The vertex of a
+ * cell is at the mean of the model's vertices that are in the cell and on borders at the node's
+ * level. This mean depends on the model only, so neighbouring patches have the same vertex.
+ * Vertices on borders do not move when a patch is simplified.
  *
  * The error of a patch is an upper bound of its distance from the model. It is the sum of two
  * terms: the distance between the patch and the surface from which the patch is made, in both

@@ -198,8 +198,8 @@ typedef struct bounding {
     uint64_t guess;
 } bounding;
 
-/* Returns the greatest value that is sufficient as a bound, for the greatest distance of a point so
- * far. */
+/* Returns the bound that is sufficient: the greatest of `known` and of the values that are close
+ * enough to point_most. */
 static double enough_of(const bounding *b)
 {
     return fmax(b->known, fmax(b->point_most * CLOSE_ENOUGH, b->point_most + b->fine));

@@ -307,7 +307,7 @@ static ebpo_status pick_mesh(ebpo_lod_model *out, ebpo_chunks *chunks, unsigned 
     return status;
 }
 
-/* Reads the faces that leaves list: only these faces if they are few, otherwise the whole mesh. */
+/* Reads the faces that leaves list. If they are many, the whole mesh is read. */
 static ebpo_status read_faces(ebpo_lod_model *out, const ebpo_file *file,
                               const ebpo_read_options *read, ebpo_error *error)
 {

@@ -138,7 +138,7 @@ typedef struct level_walk {
     const ebpo_level *level;
     /* target: level whose nodes are returned; depth: level of the next node to visit */
     int target, depth;
-    bool pruned; /* the file is a subset with pruned nodes: their groups are empty */
+    bool pruned; /* the file is a subset with pruned nodes, which have empty groups of children */
     struct {     /* [level] state of the walk */
         /* how many groups, nodes of each type, and planes of gray nodes and leaves were visited */
         uint64_t group, rank[4], plane, leaf_plane;

@@ -4,7 +4,7 @@
  * On its border, a patch has at most one vertex in each "border cell". The border cells are the
  * cells EBPO_PATCH_CELLS levels below the patch's node. Patches are joined from coarse to fine. For
  * each vertex on the border of a finer patch, the border cells that contain this vertex are
- * searched, from coarse to fine. The first of these cells that has a vertex gives the vertex that
+ * searched, from coarse to fine. The search ends at the first cell that has a vertex. This vertex
  * replaces the vertex of the finer patch. Each vertex of the model on the border is in a border
  * cell with a vertex, so both sides of a border get the same vertices. Vertices of the model's
  * faces are replaced in the same way. Source: format-spec/surface.md. */

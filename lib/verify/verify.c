@@ -50,7 +50,7 @@ typedef struct colour_check {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     ebpo_colours colours;
-    bool by_face;    /* true: the colours of faces are used; false: those of vertices */
+    bool by_face;    /* true: the colours of faces are used; false: the colours of vertices */
     double longest;  /* longest side of the root cell */
     uint64_t leaves; /* number of visited leaves */
 } colour_check;

@@ -5,9 +5,9 @@
  *   in one direction, minus how often they use it in the other direction. This number must be equal
  *   to the sum of the weights of the loops that contain the edge. For this check, each directed
  *   edge gets a pseudo-random value, computed from the positions of its ends. The value of the
- *   opposite edge is its negative. The sum over the faces' edges must equal the sum over the loops'
- *   edges, times the weights. If the loops are wrong, the sums are equal with a probability of only
- *   2^-64.
+ *   opposite edge is its negative. Two sums must be equal: the sum of the values over the edges
+ *   of all faces, and the sum over the edges of all loops, each value times the weight of its loop.
+ *   If the loops are wrong, the sums are equal with a probability of only 2^-64.
  * - The area of the caps must be the area that the header states.
  * - Winding numbers are compared with rays through all faces and all caps. This file computes the
  *   caps from the loops, by a method that shares nothing with the builder. */

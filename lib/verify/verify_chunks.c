@@ -35,8 +35,8 @@ typedef struct open_edge_ends {
 } open_edge_ends;
 
 typedef struct gates_reader {
-    const uint8_t *low;                /* next first byte of a vertex */
-    const uint8_t *more, *end;         /* next further byte of a vertex; end of the further bytes */
+    const uint8_t *low;                /* first byte of the next vertex */
+    const uint8_t *more, *end;         /* next of the bytes after the first; end of these bytes */
     open_edge_ends open[OPEN_MAX + 1]; /* newest last */
     size_t count;                      /* number of open edges */
     uint64_t used;                     /* number of vertices used so far */
@@ -200,7 +200,7 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *used, uin
     return true;
 }
 
-/* --- comparison of the corners with those of the library --- */
+/* --- comparison with the corners that the library decoded --- */
 
 enum { CORNERS_MAX = EBPO_CHUNK_BYTES_MAX / 4 };
 

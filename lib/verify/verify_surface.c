@@ -98,7 +98,7 @@ typedef struct triangle_grid {
     uint32_t *triangle;     /* indices of triangles, cell by cell */
 } triangle_grid;
 
-/* A list of triangles: those of a patch, or faces of the model. */
+/* A list of triangles: the triangles of a patch, or faces of the model. */
 typedef struct triangle_list {
     uint64_t count;
     const ebpo_patch *patch; /* NULL: the list has the faces first .. first + count - 1 of `mesh` */

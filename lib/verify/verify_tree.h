@@ -24,7 +24,7 @@ typedef struct ebpo_reference_tree {
     ebpo_box box;
     bool has_mesh, has_planes, has_leaf_planes;
     ebpo_reference_group *groups[EBPO_LEVELS_MAX]; /* [group_count] for each level */
-    ebpo_workspace *workspace;                     /* contains `groups`, or NULL */
+    ebpo_workspace *workspace;                     /* `groups` is allocated here; or NULL */
 } ebpo_reference_tree;
 
 /* A node. */

@@ -2,10 +2,10 @@
  * containment, lists and labels of each node.
  *
  * Nodes with many faces are visited first, one after the other; their faces are distributed to all
- * threads. Each smaller subtree below them is visited by one thread, depth first. Every face is
- * tested exactly against every cell that its bounding box intersects. The points for the check by
- * rays are collected during the visit, and their winding numbers are computed at the end. The tally
- * does not depend on the number of threads. */
+ * threads. The subtree below each of the other nodes is visited by one thread, depth first. Every
+ * face is tested exactly against every cell that its bounding box intersects. The points for the
+ * check by rays are collected during the visit, and their winding numbers are computed at the end.
+ * The tally does not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include "verify/verify_parts.h"
