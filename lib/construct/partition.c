@@ -348,8 +348,8 @@ typedef struct top_split {
 } top_split;
 
 /* Returns a mask of the octants that the face touches. If several octants are possible, an exact
- * test decides. Without this test, a piece could list a face that misses its cell by a rounding
- * error, and that would be in none of its leaves. */
+ * test decides. Without this test, a piece could list a face that misses the piece's cell by a
+ * rounding error; no leaf of the piece would list this face. */
 static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebpo_triangle *face)
 {
     unsigned mask = ebpo_octants_visited(&b->box, cell, face);
@@ -527,7 +527,7 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
         return status;
     }
     node->type = EBPO_LEAF;
-    /* fits in 32 bits: there are fewer pieces than nodes in the top */
+    /* fits in 32 bits: each piece has its own node in the top, and these have 32-bit indices */
     node->detail = (uint32_t)b->piece_count;
     b->piece[b->piece_count++] = s;
     return EBPO_OK;

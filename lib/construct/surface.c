@@ -376,9 +376,9 @@ static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
     return true;
 }
 
-/* Returns the vertex with a key. If there is none, or if the key is UINT64_MAX (a vertex that is on
- * no border), adds a vertex. Sets *is_new to true if a vertex was added. Returns NULL when out of
- * memory. */
+/* Returns the vertex that has the key. If no vertex has the key, or if the key is UINT64_MAX (for a
+ * vertex that is on no border), adds a vertex. Sets *is_new to true if a vertex was added. Returns
+ * NULL when out of memory. */
 static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, uint64_t key,
                                        bool *is_new)
 {
@@ -402,7 +402,7 @@ static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, 
     return made;
 }
 
-/* Returns false when out of memory. */
+/* Appends a triangle. Returns false when out of memory. */
 static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
 {
     if (!ebpo_grow(&mesh->triangle, &mesh->triangle_capacity, mesh->triangle_count + 1,
@@ -440,7 +440,8 @@ static void widen_uses(ebpo_patch_vertex *v, uint64_t lowest, uint64_t highest)
 }
 
 /* Adds the faces first .. end - 1 of the model to a mesh. Also adds faces with repeated corners,
- * because the error must bound their distance, too. Returns false when out of memory. */
+ * because the error of the patch must bound the distance of these faces, too. Returns false when
+ * out of memory. */
 static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t first, uint64_t end)
 {
     const uint32_t *corner = b->tree->mesh.faces + 3 * first;
@@ -552,8 +553,8 @@ static uint64_t key_of_vertex(const surface_builder *b, uint32_t vertex, int nod
 }
 
 /* Copies the mesh `from` to `to`, and replaces the vertices on the border of the node's patch by
- * the vertices of their cells. Omits triangles that have repeated corners after this. Returns false
- * when out of memory. */
+ * the vertices of their cells. Omits triangles that have repeated corners after the replacement.
+ * Returns false when out of memory. */
 static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_patch_mesh *from,
                         ebpo_patch_mesh *to)
 {

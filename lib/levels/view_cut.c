@@ -324,7 +324,8 @@ ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *e
                : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }
 
-/* Moves the node at index i down the heap, until the nodes below are refined later. */
+/* Moves the node at index i down the heap, until all nodes below it in the heap are refined after
+ * it. */
 static void sink_down(ebpo_frontier *f, uint64_t i)
 {
     ebpo_waiting node = f->at[i];

@@ -269,7 +269,8 @@ static uint64_t subtree_of(const fetching *f, const view_group *group)
 }
 
 /* SUBTREES_MAX: maximum length of a list of subtrees. SUBTREES_WITH_FACES: if faces are requested
- * and the view will refine nodes in more subtrees, try_subtrees collects nothing. */
+ * and the view will refine nodes in more subtrees than this number, try_subtrees collects nothing.
+ */
 enum { SUBTREES_MAX = 4096, SUBTREES_WITH_FACES = 64 };
 
 /* A subtree in which the view refines nodes: its index, and the octcode of its root. */
