@@ -5,12 +5,12 @@
  * inside or outside the other one, and the winding numbers on both sides of its faces follow from
  * the nesting of components (which component is inside which). Faces are compared only if the boxes
  * of components intersect. A first pass finds, for each component, the faces whose boxes intersect
- * the box of another component. If the other box contains the component's box, it is skipped,
- * because all faces of the component would be found. Instead, the faces of the other component that
- * intersect the component's box are found, and these faces suffice to find a contact. A second pass
- * compares the found faces with faces of other components. Both passes stop after a number of steps
- * that is proportional to the number of faces; then the components count as not apart. `ebpo check`
- * prints the counts; ebpo_measure uses ebpo_component_times. */
+ * the box of another component. A larger box that contains the component's box is skipped, because
+ * all faces of the component would be found. Instead, the pass finds the faces of the other
+ * component whose boxes intersect the component's box; these faces suffice to find a contact. A
+ * second pass compares the found faces with faces of other components. Both passes stop after a
+ * number of steps that is proportional to the number of faces; then the components count as not
+ * apart. `ebpo check` prints the counts; ebpo_measure uses ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -33,8 +33,8 @@ enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22
 
 typedef struct comparing {
     ebpo_solid_shells *s;
-    /* [faces] 1: the face's box intersects the box of another shell. Boxes that contain the box of
-     * the face's shell do not count */
+    /* [faces] 1: the face's box intersects the box of another shell. Larger boxes that contain the
+     * box of the face's shell do not count */
     uint8_t *exposed;
     uint8_t *reached;          /* [shells] 1: a face of another shell intersects this shell's box */
     ebpo_box_tree faces;       /* faces of reached shells; value: the shell */
@@ -69,9 +69,9 @@ static bool is_near(void *user, const ebpo_box_node *node)
     return boxes_intersect(&((const visitor *)user)->box, node->filled->min, node->filled->max);
 }
 
-/* Compares the face with the boxes of other shells, except boxes that contain the box of the face's
- * shell. If the face's box intersects such a box, marks the face as exposed and the other shell as
- * reached. Returns false at the limit of steps. */
+/* Compares the face with the boxes of other shells, except larger boxes that contain the box of the
+ * face's shell. If the face's box intersects such a box, marks the face as exposed and the other
+ * shell as reached. Returns false at the limit of steps. */
 static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;

@@ -216,7 +216,7 @@ typedef struct polygon {
 } polygon;
 
 /* Cuts a polygon by the plane through the point `on` with normal n. Adds the part in direction n to
- * `front`, and the other part to `back`. Both must be empty before the call. */
+ * `front`, and the other part to `back`. Both polygons must be empty before the call. */
 static void cut_polygon(const polygon *p, const double n[3], const double on[3], polygon *front,
                         polygon *back)
 {

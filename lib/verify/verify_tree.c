@@ -2,8 +2,8 @@
  * nesting and structure.
  *
  * - Nodes are found by rank (number among the nodes of the level and type). For each group of
- *   siblings, the numbers of items before the group are stored. They give the positions of a
- *   node's children, planes, lists and winding number.
+ *   siblings, the numbers of items before the group are stored. These numbers give the positions of
+ *   a node's children, planes, lists and winding number.
  * - Structure: the arrays are consistent (ebpo_check_shape, which runs before all other checks),
  *   and the tree obeys the format: summaries, leaf sizes, the order of faces, the root box,
  *   balanced edges of a solid.
