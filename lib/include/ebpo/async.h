@@ -27,9 +27,9 @@
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
  * - Batches of points and rays keep their completed results if options.done is given (query.h). For
- *   a batch, also begin an operation before each repetition, so that two operations run. After
- *   ebpo_async_needed, end the older operation if the repetition has completed items, so that bytes
- *   that only earlier repetitions used may be removed. If the repetition has completed no items,
+ *   a batch, also begin a second operation before each repetition, and end one of the two after
+ *   ebpo_async_needed. If the repetition has completed items, end the older operation; bytes that
+ *   only earlier repetitions used may then be removed. If the repetition has completed no items,
  *   end the newer operation.
  * - ebpo_ray_all_many keeps no completed results: its hits are one array in the order of the rays,
  *   so the position of a hit depends on all earlier rays. Each call evaluates all rays, so pass few

@@ -29,10 +29,9 @@
  * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
  * range or not initialized with its macro. A function with a progress callback can return
  * EBPO_E_CANCELLED. "The errors of reading" are EBPO_E_IO and EBPO_E_FORMAT, and EBPO_E_PENDING for
- * files with a source of async.h. "Also if ..." after a status gives a further case, in which the
- * status is returned besides its meaning in ebpo_status. If the comment also refers to the errors
- * of another function, the status is returned in the cases of that function and in the further
- * case.
+ * files with a source of async.h. "Also if ..." after a status adds a case in which the function
+ * returns this status. The cases that ebpo_status gives, and those of functions to which the
+ * comment refers, still apply.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
  * on this number. Member `progress`: callback that reports progress; by default none. Parameter
@@ -46,7 +45,7 @@
  * The caller frees an object after all threads have ended their use of the object. A function may
  * start threads. They end before the function returns, unless its comment says otherwise.
  *
- * Stack: of the calling thread's stack, a query (query.h) uses less than 64 KiB, building and
+ * Stack: a query (query.h) uses less than 64 KiB of the calling thread's stack, building and
  * verifying use less than 256 KiB, and all other functions less than 1 MiB. The threads that the
  * library starts have stacks of 4 MiB, independent of the process limit.
  *
@@ -147,8 +146,8 @@ EBPO_API const char *ebpo_version(void);
 /* ---- errors ---- */
 
 /*
- * Result of every function that can fail. Values are never reused. No error state is kept, neither
- * global nor per thread.
+ * Result of every function that can fail. A value is never reused for another status. The library
+ * keeps no error state, neither global nor per thread.
  */
 typedef enum ebpo_status {
     EBPO_OK = 0,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * Evaluates queries of unions, intersections and differences of solids at poses.
+ * Evaluates queries of unions, intersections and differences of solids. Each solid is a model at a
+ * pose.
  *
  *   Expressions     ebpo_boolean_new
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
@@ -45,7 +46,7 @@ typedef struct ebpo_boolean_node {
     uint32_t reserved;
 } ebpo_boolean_node;
 
-/* An operand: a solid at a pose. Several operands may use one model. */
+/* An operand: a solid at a pose. Several operands may use the same model. */
 typedef struct ebpo_boolean_operand {
     ebpo_model *model;
     ebpo_pose pose;
@@ -75,10 +76,10 @@ typedef struct ebpo_boolean_options {
     /*
      * [plane_count][4] half-spaces to which the result is cut. A half-space contains the points p
      * with row[0] p[0] + row[1] p[1] + row[2] p[2] <= row[3]. The half-spaces are additional
-     * operands after the box. Each is a tetrahedron that contains the part of the result in the
-     * half-space. One face of the tetrahedron is in the plane; its three corners are rounded to
-     * doubles, which moves the plane slightly. For an axis-parallel plane, only row[3] / row[k] is
-     * rounded.
+     * operands after the box. Each of these operands is a tetrahedron that contains the part of the
+     * result in the half-space. One face of the tetrahedron is in the plane; its three corners are
+     * rounded to doubles, which moves the plane slightly. For an axis-parallel plane, only row[3] /
+     * row[k] is rounded.
      */
     const double *planes;
 } ebpo_boolean_options;
@@ -122,7 +123,7 @@ typedef struct ebpo_boolean_result {
     /*
      * ebpo_where. EBPO_IN: the point is certainly in the interior of the result. EBPO_OUT: the
      * point is certainly in the interior of the complement of the result. EBPO_ON: the point is on
-     * a posed face of an operand, and the other operands do not decide.
+     * a posed face of an operand, and the other operands leave open if the point is in the result.
      */
     int32_t where;
 
@@ -347,7 +348,7 @@ typedef struct ebpo_boolean_mesh_options {
 
     /*
      * True: each operand has one colour, which its faces get as the attributes red, green and blue.
-     * The operands' own colours are then not carried over.
+     * The colours in the operands' files are then ignored.
      */
     bool colours;
 
@@ -376,7 +377,7 @@ typedef struct ebpo_boolean_mesh_report {
     /* Number of vertices of the result that are not vertices of an operand. */
     uint64_t new_vertices;
 
-    /* Number of parts of the operands' surfaces, each of which was classified by one point. */
+    /* Number of parts of the operands' surfaces. One point of each part was classified. */
     uint64_t patches;
 
     /*
@@ -416,12 +417,13 @@ typedef struct ebpo_boolean_mesh_report {
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
  *
- * EBPO_E_ARGUMENT: operands have different units; or `changed_only` is true, and operand 0 is
- * unused, or `volume` or `attributes` is true too. EBPO_E_ABSENT: an operand is a subset.
- * EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices. EBPO_E_FORMAT: an operand is not closed,
- * although its file says that it is a solid. EBPO_E_UNSUPPORTED: `changed_only` is true, and in the
- * box of the other operands, operand 0 has faces that intersect each other or have no area, or has
- * winding numbers other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
+ * EBPO_E_ARGUMENT: operands have different units; or `changed_only` is true, and the expression
+ * does not use operand 0, or `volume` or `attributes` is also true. EBPO_E_ABSENT: an operand is a
+ * subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices. EBPO_E_FORMAT: an operand is not
+ * closed, although its file says that it is a solid. EBPO_E_UNSUPPORTED: `changed_only` is true,
+ * and in the box of the other operands, operand 0 has faces that intersect each other or have no
+ * area, or has winding numbers other than 0 and 1. Also the errors of reading. On failure `out` is
+ * cleared.
  *
  * Threads: one at a time per expression.
  */
@@ -472,10 +474,10 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 
 /*
  * Makes the cells. Each operand is tested in a ball around the cell. White and black nodes of the
- * operand's tree are tested first, and usually decide if cells are larger than leaves; otherwise
- * the operand's faces are tested. An operand that cannot change the result in a cell is not tested
- * in the cell's children. An operand that is used twice counts as two operands, so cells at its
- * boundary are mixed.
+ * operand's tree are tested first. Usually they decide if the cell is larger than the operand's
+ * leaves. If they do not decide, the operand's faces are tested. An operand that cannot change the
+ * result in a cell is not tested in the cell's children. An operand that is used twice counts as
+ * two operands, so cells at its boundary are mixed.
  *
  * The cells stay valid after the expression is freed.
  *
@@ -554,8 +556,9 @@ typedef enum ebpo_boolean_side {
  * Makes the surface of the cells that `side` selects. It consists of squares of the finest level,
  * each as two triangles, with coordinates in doubles. The mesh is closed
  * (ebpo_mesh_report.balanced), with winding numbers 0 and 1. Where cells touch only along an edge
- * or at a corner, the mesh is not a 2-manifold. The mesh may be written or converted. If it is that
- * of EBPO_BOOLEAN_OUTER, the model and the envelopes of its .ebpo.h5 file contain the result.
+ * or at a corner, the mesh is not a 2-manifold. The mesh may be written or converted. If a mesh of
+ * EBPO_BOOLEAN_OUTER is converted, the model and the envelopes in the .ebpo.h5 file contain the
+ * result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells
  *

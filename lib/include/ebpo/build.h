@@ -28,10 +28,10 @@ extern "C" {
 typedef enum ebpo_selection {
     /*
      * From the root down. Candidates are the facet normals of the convex hull of the solid in the
-     * cell. A node starts with its parent's envelope. The plane that removes the greatest volume is
-     * added, again and again, while this volume is at least a share of the cell (`epsilon` of
-     * ebpo_build_options). Then planes are added that cut off needles. A needle is a long, thin
-     * portion of the envelope that has little volume.
+     * cell. A node starts with its parent's envelope. Repeatedly, the plane that removes the
+     * greatest volume is added. This ends when the volume is less than a share of the cell
+     * (`epsilon` of ebpo_build_options). Then planes are added that cut off needles. A needle is a
+     * long, thin portion of the envelope that has little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 
@@ -42,7 +42,7 @@ typedef enum ebpo_selection {
      * envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
-    EBPO_SELECT_OFFSET = 2,   /* candidates whose planes are moved outwards least */
+    EBPO_SELECT_OFFSET = 2,   /* the candidates whose planes need the least move outwards */
     EBPO_SELECT_RANDOM = 3,   /* consecutive candidates, beginning with a random candidate */
 
     /* Number of selections. */
@@ -119,11 +119,11 @@ typedef struct ebpo_build_options {
     uint32_t leaf_faces;
 
     /*
-     * For EBPO_SELECT_INHERIT: least share of the cell, from 0 to 1, that a plane must remove, for
-     * gray nodes and for leaves (EBPO_PART_LEAF_PLANES). A plane that removes less is also kept if
-     * it cuts off a portion of the envelope that extends beyond the plane by a tenth of the cell.
-     * For gray nodes of levels 0 to 4, the share is epsilon / 10 times the square root of the part
-     * of the cell that the parent's envelope fills.
+     * For EBPO_SELECT_INHERIT: least share of the cell's volume, from 0 to 1, that a plane must
+     * remove. It applies to gray nodes and to leaves (EBPO_PART_LEAF_PLANES). A plane that removes
+     * less is also kept if it cuts off a portion of the envelope that extends beyond the plane by a
+     * tenth of the cell. For gray nodes of levels 0 to 4, the share is epsilon / 10 times the
+     * square root of the part of the cell that the parent's envelope fills.
      */
     double epsilon;
 
@@ -147,7 +147,7 @@ typedef struct ebpo_build_options {
     /*
      * For the selections of the theses: share of the candidates that is selected, in percent, above
      * 0 and at most 100. The number of planes is rounded up (EBP 2017, equation 5). A node has at
-     * most 255 planes, also with k_root.
+     * most 255 planes, also if `k_root` is set.
      */
     double percent;
 
@@ -273,8 +273,8 @@ typedef struct ebpo_thesis_levels {
  * report    as for ebpo_build
  * options   as for ebpo_build, with a selection of the theses; `parts` is ignored
  *
- * EBPO_E_ARGUMENT: an option is out of range, or the selection is not one of the theses. Other
- * errors are those of ebpo_build.
+ * EBPO_E_ARGUMENT: an option is out of range, or the selection is not from the theses. Other errors
+ * are those of ebpo_build.
  *
  * Threads: one at a time per mesh.
  */

@@ -13,12 +13,12 @@
  *     ebpo_catalogue_models_new(NULL, &models, &error);
  *     ebpo_catalogue_inside(catalogue, models, points, count, NULL, out, &error);
  *
- * A *catalogue* is a list of entries, each with the path, the box and the digest of a model.
- * *Parts* are files of one model that was cut; *caps* are faces that close a part where it was cut.
- * A query opens only the models whose boxes can contribute to the result. Distances and rays use
- * the entry's model at `surface`, or at `path` if `surface` is NULL. Results are those of the
- * models (query.h) and do not depend on the budget. docs/guide/clusters.md describes the file
- * format and the results of parts.
+ * A *catalogue* is a list of entries, each with the path, the box and the digest (content_sha256)
+ * of a model. *Parts* are files of one model that was cut; *caps* are faces that close a part where
+ * it was cut. A query opens a model only if its box shows that the model can contribute to the
+ * result. Distances and rays use the entry's model at `surface`, or at `path` if `surface` is NULL.
+ * Results are those of the models (query.h) and do not depend on the budget. docs/guide/clusters.md
+ * describes the file format and the results of parts.
  *
  * A query returns EBPO_E_FORMAT if an opened model does not have the digest of its entry or is not
  * within the entry's box. It also returns EBPO_E_FORMAT if the entry names a file of face indices
@@ -358,9 +358,9 @@ typedef struct ebpo_catalogue_query_options {
 #define EBPO_CATALOGUE_NO_MODEL UINT64_MAX
 
 /*
- * Classifies points[count][3] into out[count]. The winding number is the sum over the models, to
- * which a model adds 0 if the point is on one of its faces. A point is inside if it is inside any
- * model. Otherwise it is on a face if it is on a face of any model.
+ * Classifies points[count][3] into out[count]. The winding number is the sum of the winding numbers
+ * of the models. A model counts as 0 if the point is on one of its faces. A point is inside if it
+ * is inside any model. Otherwise it is on a face if it is on a face of any model.
  *
  * For parts, the rule is applied to the sum. The result is exactly the result for the whole model,
  * also for points on caps. EBPO_E_LIMIT: each of 64 rays from a point on a cap hits an edge or runs

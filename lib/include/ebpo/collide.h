@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Detects collisions of two models, and self-intersections of one.
+ * Detects collisions of two models, and self-intersections of one model.
  *
  *   Two models            ebpo_collider_new (one collider for each thread)
  *   Any contact           ebpo_collide_first
@@ -125,8 +125,8 @@ typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
 
     /*
-     * ebpo_pair_kind of the faces. EBPO_PAIR_APART: no pair was found, or the pair is the nearest
-     * one and its faces do not intersect.
+     * ebpo_pair_kind of the faces. EBPO_PAIR_APART: no pair was found, or this is the nearest pair
+     * and its faces do not intersect.
      */
     int32_t kind;
 
@@ -138,8 +138,9 @@ typedef struct ebpo_face_pair {
  * intersect, and to -1 if this is undecided at the deadline. Only faces count: if one solid is
  * inside another solid and their faces do not intersect, *found is 0.
  *
- * For the same files and poses, the pair is the same on every machine. It need not be the first
- * pair of ebpo_collide_all. For partly loaded models, it also depends on the subtrees in memory.
+ * For the same files and poses, the pair is the same on every machine. The pair need not be the
+ * first pair of ebpo_collide_all. For partly loaded models, the pair also depends on the subtrees
+ * in memory.
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: the budget is too small
  * (ebpo_model_new). Also the errors of reading (base.h).
@@ -162,7 +163,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
  */
 typedef enum ebpo_relation {
     EBPO_DISJOINT = 0,     /* no common point */
-    EBPO_TOUCHING = 1,     /* a common point, but none in the interior of both */
+    EBPO_TOUCHING = 1,     /* common points, but no common interior point */
     EBPO_INTERSECTING = 2, /* common interior points */
     EBPO_A_INSIDE_B = 3,   /* B is a solid and contains all points of A; the sets are not equal */
     EBPO_B_INSIDE_A = 4,   /* A is a solid and contains all points of B; the sets are not equal */
@@ -192,8 +193,8 @@ typedef struct ebpo_relation_result {
  * about 60 bytes per face of a subtree.
  *
  * A subtree of a partly loaded model is loaded if some of its faces intersect the other model. It
- * is also loaded if its model is known to have a face inside the other model and the subtree may
- * have a face outside, or the reverse: the model is then partly inside the other one.
+ * is also loaded if it may show that its model is only partly inside the other model: a face of its
+ * model is known to be inside, and the subtree may have a face outside, or the reverse.
  *
  * Errors are those of ebpo_collide_first. If the deadline passes, the call succeeds with the
  * relation EBPO_RELATION_UNDECIDED. EBPO_E_ABSENT: as for ebpo_inside.
@@ -220,8 +221,8 @@ typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t 
  * with the lower pose, compared bit by bit.
  *
  * Partly loaded models give the same pairs in the same order. Subtrees whose envelopes may
- * intersect are loaded. Each is loaded about once if all pairs fit in `memory` of the options, and
- * about a hundred subtrees fit in the budgets.
+ * intersect are loaded. Each subtree is loaded about once if all pairs fit in `memory` of the
+ * options, and about a hundred subtrees fit in the budgets.
  *
  * EBPO_E_CANCELLED: also if the deadline has passed. `take` has then received the first pairs of
  * the complete list. Other errors are those of ebpo_collide_first.
@@ -235,10 +236,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_all(ebpo_collider *collider,
 
 /*
  * Finds the self-intersections of one model without a pose: pairs of faces that have common points
- * besides a common corner or edge. face_a is before face_b in the file. Common points of two faces
- * at equal corners, or along the edge between two equal corners, do not count. Pairs of kind
- * EBPO_PAIR_COPLANAR always count, for example a fold or a repeated face. Both models of the
- * collider must be the same model.
+ * besides a common corner or edge. face_a is before face_b in the file. If two faces have equal
+ * corners, their common points at these corners, or on the edge between two equal corners, do not
+ * count. Pairs of kind EBPO_PAIR_COPLANAR always count, for example a fold or a repeated face. Both
+ * models of the collider must be the same model.
  *
  * EBPO_E_ARGUMENT: two different models. Other errors are those of ebpo_collide_all.
  *
@@ -254,8 +255,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
 /*
  * Intersection of two crossing faces: a segment from point[0] to point[1], in the direction of the
  * cross product of A's normal and B's normal. The error of a coordinate is at most 0.51 units in
- * the last place plus 2^-60 of the greatest coordinate of the edge on which the point is. face_a,
- * face_b: as in ebpo_face_pair.
+ * the last place, plus 2^-60 times the greatest coordinate of the edge on which the point is.
+ * face_a, face_b: as in ebpo_face_pair.
  */
 typedef struct ebpo_contact_segment {
     double point[2][3];
@@ -305,10 +306,9 @@ typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
  * Joins the segments of ebpo_collide_contacts to lines. Each segment is in one line. The end of one
  * segment is joined to the beginning of another one if both are on the same corner, edge or face of
  * both models, and no third segment begins or ends there. Corners of a model with equal coordinates
- * count as the same corner. Other points are not joined even if their coordinates are equal by
- * chance. Lines are sorted by their first segments, in the order of ebpo_collide_contacts; a closed
- * line begins with its first segment in this order. If A and B are swapped, lines have the reverse
- * direction.
+ * count as the same corner. Ends that meet by chance at equal coordinates are not joined. Lines are
+ * sorted by their first segments, in the order of ebpo_collide_contacts; a closed line begins with
+ * its first segment in this order. If A and B are swapped, lines have the reverse direction.
  *
  * EBPO_E_LIMIT: `memory` of the collider's options is less than 256 bytes per segment. Other errors
  * are those of ebpo_collide_all.
@@ -485,7 +485,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
 typedef struct ebpo_separation {
     /*
      * The separation distance, as a multiple of the direction's length. Its kind is
-     * EBPO_VALUE_EXACT; after the deadline, it is an interval or a bound.
+     * EBPO_VALUE_EXACT; after the deadline, the kind is EBPO_VALUE_INTERVAL or EBPO_VALUE_BOUND.
      */
     ebpo_value_bounds t;
 
@@ -497,12 +497,12 @@ typedef struct ebpo_separation {
 } ebpo_separation;
 
 /*
- * Computes the separation distance of A from B along a direction: the least t >= 0 so that A, moved
- * by any t' * direction with t' > t, has no point in common with B. The points of a solid include
- * its interior. If A is moved by t * direction, the models touch in the returned pair. If there is
- * no pair (t is 0), the models intersect neither at their poses nor during the motion. Posed
- * coordinates are moved without rounding. If the models separate and touch again during the motion,
- * t belongs to the last contact.
+ * Computes the separation distance of A from B along a direction. This is the least t >= 0 with
+ * this property: if A is moved by t' * direction for any t' > t, A and B have no common point. The
+ * points of a solid include its interior. If A is moved by t * direction, the models touch in the
+ * returned pair. If there is no pair (t is 0), the models intersect neither at their poses nor
+ * during the motion. Posed coordinates are moved without rounding. If the models separate and touch
+ * again during the motion, t belongs to the last contact.
  *
  * For partly loaded models, a subtree is loaded if its envelope, moved by the greatest t found so
  * far, may still touch an envelope of the other model.
@@ -524,8 +524,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_separation(ebpo_collider *collid
 /* Result of ebpo_collide_levels. */
 typedef struct ebpo_level_result {
     /*
-     * 1: the models (solids, or faces of surfaces) certainly have a common point. 0: certainly not.
-     * -1: undecided.
+     * 1: the models (solids, or faces of surfaces) certainly have a common point. 0: they certainly
+     * have no common point. -1: undecided.
      */
     int32_t common;
 
@@ -539,8 +539,8 @@ typedef struct ebpo_level_result {
     uint64_t undecided_pairs;
 
     /*
-     * Deepest level that was used of A, and of B. For a partly loaded model it is at most the cut
-     * level.
+     * Deepest level of A that was used, and of B. For a partly loaded model, this is at most the
+     * cut level.
      */
     int32_t level_a, level_b;
 } ebpo_level_result;

@@ -40,9 +40,9 @@ typedef struct ebpo_error_bound_options {
 
     /*
      * `hi` of a coarser level of the same file. Envelopes are nested, so this value also bounds
-     * this level. 0: unknown. If it is unknown and the tolerance is not reached, because `queries`
-     * or the maximum for one node is used up, coarser levels are also computed, each with as many
-     * distances as this level.
+     * this level. 0: unknown. If this value is unknown, and the search reaches `queries` or the
+     * maximum for one node before the tolerance, coarser levels are also computed, each with as
+     * many distances as this level.
      */
     double at_most;
 } ebpo_error_bound_options;
@@ -95,8 +95,8 @@ typedef struct ebpo_error_bound {
  * The level's surface, for `mean` and `rms`, is the part of the envelopes' polygons that is in no
  * other envelope.
  *
- * model    model of `file`, which then must have a mesh; or, if `file` is a subset of any kind,
- *          model of the file from which the subset was made
+ * model    model of `file`, which then must have a mesh. If `file` is a subset of any kind, `model`
+ *          may also be the model of the file from which the subset was made
  *
  * Memory, in addition to the memory of `model`: the entire tree and mesh, and 80 bytes for each
  * node of the level.

@@ -91,8 +91,8 @@ typedef struct ebpo_export_options {
 
     /*
      * GLB with `surface`: the greatest number of triangles. last_level is then ignored, and patches
-     * of any levels are chosen: with the least error that this number of triangles allows. 0: no
-     * limit.
+     * of any levels are chosen, so that the error is as small as this number of triangles allows.
+     * 0: no limit.
      */
     uint64_t triangles;
 
@@ -112,7 +112,7 @@ typedef struct ebpo_export_options {
         sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL }, NULL, 0, false, { 0 } \
     }
 
-/* Statistics of an exported level, of the exported surface, or of the exported mesh. */
+/* Statistics of an exported level, of the simplified surface, or of the mesh. */
 typedef struct ebpo_export_block {
     int level;                    /* -1: the mesh */
     uint64_t nodes;               /* number of polyhedra; 0 for the mesh */
@@ -138,8 +138,9 @@ typedef struct ebpo_export_report {
 
     /*
      * glTF of levels and of the mesh: vertices are relative to this point, which is the translation
-     * of the glTF nodes. 3D Tiles: the translation of the root tile. Otherwise 0: the matrix of its
-     * node places a surface, and programs that keep matrices as float32 round this place.
+     * of the glTF nodes. 3D Tiles: the translation of the root tile. For all other exports 0. A
+     * surface has no translation here, because the matrix of its glTF node contains the position;
+     * programs that keep matrices as float32 round this position.
      */
     double origin[3];
 
@@ -151,9 +152,9 @@ typedef struct ebpo_export_report {
 
     /*
      * Simplified surface: in its `block`, `level` is the level of the deepest patch, and `nodes` is
-     * the number of patches. Each point of the surface is at most `error` from the model, and each
-     * point of the model from the surface, rounding included. Tiles: the error of the coarsest
-     * tile.
+     * the number of patches. Each point of the surface is at most `error` away from the model, and
+     * each point of the model is at most `error` away from the surface, including rounding. Tiles:
+     * the error of the coarsest tile.
      */
     double error;
 
@@ -176,7 +177,7 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
 /*
  * Exports levels, a surface or the mesh to a file, which is replaced atomically. A second file is
  * replaced just before the first one. If replacing the first file then fails (EBPO_E_IO), the
- * second file is already the new one.
+ * second file has already been replaced.
  *
  * For XDMF and VTKHDF, one level is in memory at a time; for other formats, all levels are.
  *

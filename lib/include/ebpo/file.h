@@ -94,9 +94,10 @@ typedef enum ebpo_face_coding {
 } ebpo_face_coding;
 
 /*
- * One level: all its nodes in the order of their octcodes. The eight children of the i-th gray node
- * of a level are the i-th group of the next level. An array is NULL if its count is 0, or if the
- * file does not have the part that contains the array.
+ * One level: all its nodes in the order of their octcodes. The octcode of a node is the path from
+ * the root to the node: a leading 1, then the octant of each level in three bits. The eight
+ * children of the i-th gray node of a level are the i-th group of the next level. An array is NULL
+ * if its count is 0, or if the file does not have the part that contains the array.
  */
 typedef struct ebpo_level {
     /*
@@ -179,9 +180,10 @@ typedef struct ebpo_level {
     double gray_volume;
 
     /*
-     * Volume of the envelopes of this level's leaves, in cubic units of the model. The envelopes
-     * are bounded by the planes of the leaves' ancestors, and by the planes of the leaves if these
-     * are stored. With planes that readers derive from faces, the envelopes are smaller.
+     * Volume of the envelopes of this level's leaves, in cubic units of the model. These envelopes
+     * are bounded by the planes of the leaves' ancestors, and by the stored planes of the leaves if
+     * the file has them. Readers can derive further planes of a leaf from its faces; the envelopes
+     * with derived planes are smaller.
      */
     double leaf_volume;
 
@@ -368,8 +370,8 @@ typedef struct ebpo_info {
     double kept_error;
 
     /*
-     * content_sha256 of the file from which the subset was made. For a subset of a subset: of the
-     * file that is not a subset.
+     * content_sha256 of the file from which the subset was made. For a subset of a subset:
+     * content_sha256 of the original file, which is not a subset.
      */
     uint8_t subset_of[32];
 
@@ -405,8 +407,8 @@ typedef struct ebpo_info {
 
     /*
      * For files with EBPO_PART_SURFACE, the simplified surface: number of patches, of triangles and
-     * of vertices; number of bytes of the triangle codes; number of vertices with colours (no
-     * vertices or all vertices); checksum of the simplified surface.
+     * of vertices; number of bytes of the triangle codes; number of vertices with colours, which is
+     * 0 or the number of vertices; checksum of the simplified surface.
      */
     uint64_t surface_patches, surface_triangles, surface_vertices, surface_code_bytes,
         surface_colours;
@@ -418,8 +420,8 @@ typedef struct ebpo_border_loops {
     uint64_t loop_count, point_count;
 
     /*
-     * [loop_count][2] number of points of each loop, at least 3; weight of each loop, at least 1,
-     * which is the number of times that the loop counts
+     * [loop_count][2] number of points of each loop, at least 3; weight of each loop, at least 1:
+     * number of times that the loop counts in winding numbers
      */
     uint32_t *loop;
 
@@ -477,10 +479,13 @@ typedef struct ebpo_tree {
      */
     ebpo_workspace *workspace;
 
-    /* The border, if the tree has EBPO_PART_BORDER. Its arrays are allocated with malloc. */
+    /* The border, if the tree has EBPO_PART_BORDER; its arrays are allocated with malloc. */
     ebpo_border_loops border;
 
-    /* The simplified surface, if the tree has EBPO_PART_SURFACE; allocated in the same way. */
+    /*
+     * The simplified surface, if the tree has EBPO_PART_SURFACE; its arrays are allocated with
+     * malloc.
+     */
     ebpo_surface surface;
 } ebpo_tree;
 
@@ -494,9 +499,9 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 /* ---- writing ---- */
 
 /*
- * Writing of the list of chunk checksums. Each chunk ends with a checksum, and the list has a copy
- * of the checksums of all chunks (format-spec/checksums.md). With the list, readers detect a chunk
- * that was replaced by another chunk or by another version of the same chunk.
+ * Selects if the list of chunk checksums is written. Each chunk ends with a checksum, and the list
+ * has a copy of the checksums of all chunks (format-spec/checksums.md). With the list, readers
+ * detect a chunk that was replaced by another chunk or by another version of the same chunk.
  */
 typedef enum ebpo_chunk_checksums {
     EBPO_CHECKSUMS_DEFAULT = 0, /* the list is written */
@@ -526,8 +531,8 @@ typedef struct ebpo_write_options {
     /*
      * Least mean number of faces of a subtree. The roots of subtrees (format-spec/subtrees.md) are
      * the gray nodes of the deepest level whose gray nodes have, on average, at least this number
-     * of faces; of level 1 if there is no such level. The data of a subtree is contiguous, so that
-     * one read loads it.
+     * of faces. If there is no such level, they are the gray nodes of level 1. The data of a
+     * subtree is contiguous, so that one read loads it.
      *
      * 0 (default): the number is 1,024, but the file has no table of subtrees if no level reaches
      * this number, or if the mesh has fewer than 131,072 faces.

@@ -98,10 +98,10 @@ typedef struct ebpo_findings_options {
 
     /*
      * Binary PLY file to write, which is replaced atomically; NULL: no file. The file contains the
-     * mesh in the source's order, without dropped faces; coordinates are doubles. A face with
-     * findings has the colour of its kind; all other faces are grey (200, 200, 200). Comments in
-     * the file explain the colours. Vertices have no colours, because most programs would show the
-     * colours of vertices and not those of faces.
+     * mesh in the source's order, except faces that a repair dropped. Coordinates are doubles. A
+     * face with findings has the colour of its kind; all other faces are grey (200, 200, 200).
+     * Comments in the file explain the colours. Vertices have no colours, because most programs
+     * would show the colours of vertices and not those of faces.
      */
     const char *ply;
 } ebpo_findings_options;

@@ -19,7 +19,7 @@
  *         send(result.force);
  *     }
  *
- * The *proxy* is a ball (or a point, or a tool) that follows the haptic device. Where the device
+ * The *proxy* is a ball (or a point, or a tool) that follows the haptic device. If the device
  * passes through a face, the proxy stays on the side from which it came. The proxy's centre moves
  * along segments. Exact arithmetic ensures that no segment intersects a face, so the proxy passes
  * through no face, at any speed, and however thin the solid is. Faces stop the proxy from both
@@ -62,8 +62,8 @@ typedef struct ebpo_haptic_options {
     /*
      * Radius of the ball in the model's unit, at least 0. 0: the ball is a point. `faces` must be
      * large enough for all faces within the radius plus `search_radius` of the device. A step tests
-     * at most 512 of these faces, in the order in which the ball may touch them; the next steps
-     * test the other faces.
+     * at most 512 of these faces, in the order in which the ball may touch them. If there are more,
+     * the next steps test the other faces.
      */
     double radius;
 
@@ -126,8 +126,8 @@ typedef struct ebpo_haptic_options {
  * model      must outlive the object. Contexts may use the model at the same time. The model's
  *            budget limits loading (ebpo_model_options.memory)
  * position   three finite doubles. Ball: outside the solid, and no face may be within the radius
- *            plus 1.5 times `skin` of the position. Tool: the same for each of its points, with
- *            radius 0. Probe: any position
+ *            plus 1.5 times `skin` of the position. Tool: each point of the tool must meet these
+ *            conditions, with radius 0. Probe: any position
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
@@ -203,17 +203,17 @@ typedef struct ebpo_haptic_ball_result {
 
     /*
      * In contact: length of the vector from proxy to device. With EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_PATH_UNFINISHED, only the part of this vector that faces prevent counts. Without
-     * contact: minus the distance from the ball to the nearest face, or minus `search_radius` if no
-     * face is within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face that was not tested
-     * may be nearer.
+     * EBPO_HAPTIC_PATH_UNFINISHED: length of the part of this vector by which faces hold the proxy
+     * back. Without contact: minus the distance from the ball to the nearest face, or minus
+     * `search_radius` if no face is within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face
+     * that was not tested may be nearer.
      */
     double depth;
 
     /*
-     * Nearest face within `search_radius`. face: index as in ebpo_distance_result; EBPO_NO_FACE: no
-     * face. point: point of the face nearest to the proxy. weight: weights of the face's corners at
-     * this point; their sum is 1.
+     * Nearest face within `search_radius`. face: index as in ebpo_distance_result (query.h);
+     * EBPO_NO_FACE: no face. point: the point of the face that is nearest to the proxy. weight:
+     * weights of the face's corners at this point; their sum is 1.
      */
     uint64_t face;
     double point[3], weight[3];
@@ -233,9 +233,9 @@ typedef struct ebpo_haptic_ball_result {
  *
  * The force is that of a spring (stiffness times the vector from device to proxy), minus damping
  * times the device velocity. If the spring pushes the device away from a face, the component of the
- * force towards that face is at most 1e-7 of the length of the force. The force is reduced if
- * needed, so that for any motion the total energy given to the device is at most the energy taken
- * from the device, plus stiffness times the square of the longest step of the device.
+ * force towards that face is at most 1e-7 of the length of the force. If needed, the force is
+ * reduced to limit the energy. For any motion, the total energy given to the device is at most the
+ * energy taken from the device, plus stiffness times the square of the longest step of the device.
  *
  * Threads: one at a time per object.
  */
@@ -301,8 +301,8 @@ typedef struct ebpo_haptic_probe_result {
 } ebpo_haptic_probe_result;
 
 /*
- * Computes one haptic step of a probe, which has no collisions. The result is bounds of the
- * distance from the `position` to the model. The bounds combine three sources in memory:
+ * Computes one haptic step of a probe, which has no collisions. The result has bounds of the
+ * distance from `position` to the model. The bounds combine three sources in memory:
  *   - The near faces, and the sides of these faces on which the probe is. Exact arithmetic tracks
  *   these sides. Within `search_radius` of a face, the result is exact except for rounding.
  *   - The first levels of the octree, at most 2^17 nodes. Leaves and gray nodes bound the distance;
@@ -329,7 +329,7 @@ typedef struct ebpo_haptic_tool_result {
     double force[3], torque[3];
 
     /*
-     * In contact: length of the part of the motion from proxy to device that contacts prevent;
+     * In contact: length of that part of the motion from proxy to device which contacts prevent;
      * rotations count as lengths (ebpo_haptic_step_tool). Without contact: 0.
      */
     double depth;
@@ -358,20 +358,21 @@ typedef struct ebpo_haptic_tool_result {
 /*
  * Computes one haptic step of a tool with the device at `position`, rotated by the quaternion
  * `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or comes closer
- * than half of `skin` to a face; as for a ball, exact arithmetic ensures this. Between its points a
- * tool has no collisions, so the spacing of points must be finer than the features to feel.
+ * than half of `skin` to a face; as for a ball, exact arithmetic ensures this. A tool has no
+ * collisions between its points. So the points must be closer to each other than the size of the
+ * smallest details of the model that the user is to feel.
  *
  * A rotation counts as a length: its angle times the arm of the tool. The arm is the root mean
  * square distance of the points from the tool's position. Among all motions that the contacts
  * allow, the proxy makes the motion that ends nearest to the device. Force and torque are those of
  * a spring for the prevented motion; its stiffness is `stiffness` for translations, and `stiffness`
- * times arm^2 for angles. As in ebpo_haptic_step_ball, force and torque are reduced to bound the
- * energy; rotations count as lengths.
+ * times arm^2 for angles. As in ebpo_haptic_step_ball, force and torque are reduced to limit the
+ * energy; here, too, rotations count as lengths.
  *
- * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near a face since their
- * last test take almost no time. If many points are near faces, and their tests exceed the work
- * limit of a step, the next steps continue the tests (EBPO_HAPTIC_PATH_UNFINISHED). The tool does
- * not move until all tests are done.
+ * Time is bounded as in ebpo_haptic_step_ball. A point takes almost no time if it has not moved far
+ * enough since its last test to be near a face. If many points are near faces, and their tests
+ * exceed the work limit of a step, the next steps continue the tests (EBPO_HAPTIC_PATH_UNFINISHED).
+ * The tool does not move until all tests are done.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,

@@ -14,8 +14,8 @@
  * prefetched in requests of up to 4 MiB, several at a time.
  *
  * Every response is checked: its range, its size, and the version of the file, which must be equal
- * to the version at opening. The version consists of the file size and the ETag (weak or not), or
- * of the file size and Last-Modified if there is no ETag.
+ * to the version at opening. The version consists of the file size and the ETag (weak or strong).
+ * If there is no ETag, it consists of the file size and Last-Modified.
  *
  * If the library was built without libcurl, the functions return EBPO_E_UNSUPPORTED.
  */
@@ -60,9 +60,9 @@ typedef struct ebpo_http_options {
     unsigned connections;
 
     /*
-     * Maximum memory in bytes for prefetched and recently read data. It may be exceeded while
-     * readers wait for responses, which have up to 4 MiB each. This memory is not part of a model's
-     * budget.
+     * Maximum memory in bytes for prefetched and recently read data. The maximum may be exceeded
+     * while readers wait for responses, which have up to 4 MiB each. This memory is not part of a
+     * model's budget.
      */
     uint64_t memory;
 
@@ -73,9 +73,9 @@ typedef struct ebpo_http_options {
     uint64_t whole_limit;
 
     /*
-     * True: the version is only the file size, so a change of the file may not be detected. For
-     * servers that send neither ETag nor Last-Modified, and for an address that several servers
-     * with different ETags share.
+     * True: the version is only the file size, so a change of the file may not be detected. Use
+     * this for servers that send neither ETag nor Last-Modified, and for an address that several
+     * servers with different ETags share.
      */
     bool unversioned;
 

@@ -35,10 +35,10 @@ typedef struct ebpo_lod_options {
     }
 
 /*
- * Computes the envelopes of a level: those of its gray nodes, and those of the leaves and black
+ * Computes the envelopes of a level: the envelopes of its gray nodes, and of the leaves and black
  * nodes of levels 0 to `level`. Each envelope is a convex polyhedron: the intersection of the
- * node's cell with the half-spaces of the node and its ancestors. The half-spaces of a leaf are
- * those stored in the file; if the file has none, they are derived from the leaf's faces (EBP 2017,
+ * node's cell with the half-spaces of the node and its ancestors. If the file stores half-spaces of
+ * leaves, these are used; otherwise the half-spaces of a leaf are derived from its faces (EBP 2017,
  * 3.3.4).
  *
  * The polygons are rounded. Only the decoded half-spaces are guaranteed to contain the solid.
@@ -146,9 +146,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
  * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets the
  * normal of the plane. A polygon on a cell face is only a step between two envelopes. It gets the
  * mean normal, weighted by area, of nearby polygons that are on planes and face roughly the same
- * way as the cell face. If there are no such polygons, it gets the normal of the cell face. Cell
- * faces of the root cell count as planes. Use the normals for images only: they are rounded and
- * guarantee nothing about the solid.
+ * way as the cell face. If there are no such polygons, the polygon gets the normal of the cell
+ * face. Cell faces of the root cell count as planes of the envelope. Use the normals for images
+ * only: they are rounded and guarantee nothing about the solid.
  *
  * info  metadata of the level's file
  * mesh  mesh returned with the nodes
@@ -177,13 +177,14 @@ typedef struct ebpo_surface_mesh {
     /*
      * Greatest error of the patches (ebpo_patch), in the model's unit. To close cracks, some
      * vertices of a finer patch are replaced by vertices of a coarser patch. The error at the new
-     * vertices is at most that of the coarser patch, so this member is a bound for them, too.
+     * vertices is at most the error of the coarser patch, so this member is a bound for the new
+     * vertices, too.
      */
     double error;
 
     /*
-     * Greatest error of the patches in the image, in pixels; see ebpo_view_stream_surface. NAN
-     * without an observer.
+     * Greatest error of the patches in the image of an observer, in pixels; see
+     * ebpo_view_stream_surface (view.h). NAN without an observer.
      */
     double pixels;
 
@@ -198,8 +199,8 @@ typedef struct ebpo_surface_mesh {
 EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
 
 /*
- * Lists the patches of a level, and those patches of coarser levels whose nodes have no patches
- * below. Together these patches replace all faces of the model.
+ * Lists the patches of a level, and the patches of coarser levels that have no patches below their
+ * nodes. Together these patches replace all faces of the model.
  *
  * patches  [*count] indices of patches, ascending; freed by free()
  *

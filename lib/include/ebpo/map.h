@@ -51,10 +51,10 @@ typedef struct ebpo_map_options {
     }
 
 /*
- * Computes the distances of points[count][3], each finite, into distances[count]. As those of
- * ebpo_distance, they are correctly rounded, and negative inside a solid. If not everything is in
- * memory, points are processed along a curve, so that each subtree is loaded only a few times; this
- * takes 24 bytes per point.
+ * Computes the distances of points[count][3], each finite, into distances[count]. As in
+ * ebpo_distance, the distances are correctly rounded, and negative inside a solid. If not
+ * everything is in memory, points are processed along a curve, so that each subtree is loaded only
+ * a few times; this takes 24 bytes per point.
  *
  * EBPO_E_ARGUMENT: an option or a point is not valid; the message has the index of the point.
  * EBPO_E_ABSENT: the file has no mesh. EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also

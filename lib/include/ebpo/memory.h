@@ -11,8 +11,8 @@ extern "C" {
 #endif
 
 /*
- * Returns the number of bytes that this process can still allocate: the least of the available
- * memory of the machine and the unused memory of each of the process's control groups. Memory that
+ * Returns the number of bytes that this process can still allocate: the minimum of the available
+ * memory of the machine and of the unused memory in each control group of the process. Memory that
  * caches files counts as available. Returns half of the machine's memory if the system does not
  * report the available memory.
  *

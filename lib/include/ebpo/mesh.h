@@ -155,8 +155,8 @@ typedef struct ebpo_mesh_read_options {
     ebpo_progress progress;
 
     /*
-     * Workspace that limits the memory for the mesh, and for checking and building it. Free the
-     * workspace after the mesh. NULL: no limit.
+     * Workspace that limits the memory for the mesh, for checking it, and for building a tree from
+     * it. Free the workspace after the mesh. NULL: no limit.
      */
     ebpo_workspace *workspace;
 
@@ -182,8 +182,9 @@ typedef struct ebpo_mesh_read_options {
     }
 
 /*
- * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes. If they do not
- * decide, the file name decides, and then the first word (OBJ).
+ * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes. If the first
+ * bytes do not decide, the file name decides. If the name does not decide, the first word of the
+ * file decides (OBJ).
  *
  * Polygons are triangulated, including concave polygons and polygons that touch themselves (slits,
  * bridges to holes, pinched corners). A polygon whose outline crosses itself, such as a folded
@@ -399,7 +400,7 @@ typedef struct ebpo_repair_record {
     /* Number of holes that were closed by faces. */
     uint64_t filled_holes;
 
-    /* Number of faces that fill holes. These faces are the last ones of the mesh. */
+    /* Number of faces that fill holes. These faces are at the end of the mesh. */
     uint64_t added_faces;
 
     /* Number of chains of boundary edges that form no simple loop, and were not filled. */
@@ -446,8 +447,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_r
 /*
  * Merges vertices of equal position as ebpo_mesh_weld does, and then vertices that are within a
  * distance of each other. Positions are visited in ascending order of x, then y, then z. A vertex
- * is kept unless a kept vertex is within the distance. Each vertex that is not kept is merged into
- * the nearest kept vertex (the first of several at equal distance). Distances are compared exactly.
+ * is kept if no earlier kept vertex is within the distance. Each vertex that is not kept is merged
+ * into the nearest kept vertex (the first of several at equal distance). Distances are compared
+ * exactly.
  *
  * No vertex moves farther than the distance, even in a chain of near vertices. No two kept vertices
  * are within the distance. The result does not depend on the order of vertices. A kept vertex keeps
@@ -503,8 +505,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
                                                             ebpo_error *error);
 
 /*
- * Orients faces consistently. First, neighbours across edges that are used twice get consistent
- * directions. Then shells are turned outwards, or inwards if they bound a cavity.
+ * Orients faces consistently. First, two faces that share an edge used twice get directions that
+ * agree: they use the edge in opposite directions. Then shells are turned outwards, or inwards if
+ * they bound a cavity.
  *
  * Here a *patch* is a set of faces that are connected by edges that are used twice. A patch is a
  * *shell* if it uses each edge equally often in both directions. So two cubes that share only a

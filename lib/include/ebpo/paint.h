@@ -477,8 +477,8 @@ typedef struct ebpo_paint_pen {
     double step;
 
     /*
-     * The pen is lifted where the device is farther from the surface than this distance, in the
-     * model's unit, at least 0. INFINITY: the pen is never lifted.
+     * The pen is lifted while the device is farther from the surface than this distance. In the
+     * model's unit; at least 0. INFINITY: the pen is never lifted.
      */
     double within;
 
@@ -561,7 +561,7 @@ typedef struct ebpo_paint_options {
 
     /*
      * Accuracy of areas, 1 to 65,536. A part of a face that is partly covered is halved until its
-     * longest edge is at most r / fineness, where r is the least radius of the balls that intersect
+     * longest edge is at most r / fineness. Here r is the least radius of the balls that intersect
      * this part. With 256, the bounds of the area of a disc are within 1 % of the area, and `value`
      * is within 0.1 %.
      */
@@ -648,8 +648,8 @@ typedef struct ebpo_paint_baked {
  *           the new colours; alpha and the colours of uncovered vertices are unchanged
  * baked     receives statistics; may be NULL
  *
- * Memory besides the mesh: 4 bytes per vertex, 72 bytes per covered vertex, and 4 bytes per face if
- * some source indices of faces are not used.
+ * Memory besides the mesh: 4 bytes per vertex, and 72 bytes per covered vertex. If the mesh lacks
+ * some faces of the source, also 4 bytes per face.
  *
  * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also if the mesh does not match.
  * EBPO_E_CANCELLED. On failure the colours are unchanged.
@@ -720,8 +720,8 @@ typedef struct ebpo_paint_areas {
 #define EBPO_PAINT_AREAS_INIT EBPO_SIZED(ebpo_paint_areas)
 
 /*
- * Measures the painted area. Invisible layers count too, and opacity does not matter. Where strokes
- * of one layer overlap, the area counts only for the last of these strokes.
+ * Measures the painted area. Invisible layers count too, and opacity does not matter. If strokes of
+ * one layer overlap, the overlap counts only for the last of these strokes.
  *
  * out   freed by ebpo_paint_areas_free
  *

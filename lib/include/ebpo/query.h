@@ -49,7 +49,7 @@ typedef enum ebpo_loading {
     /* One whole subtree is loaded at a time; no other subtree is kept (4.2.5). */
     EBPO_LOAD_SUBTREE = 1,
 
-    /* Only the nodes on the path from the root to the leaf are loaded; none is kept (4.2.4). */
+    /* Only the nodes on the path from the root to the leaf are loaded; no node is kept (4.2.4). */
     EBPO_LOAD_NODES = 2
 } ebpo_loading;
 
@@ -99,8 +99,8 @@ typedef struct ebpo_model_options {
 
     /*
      * Shared budget; `memory` is then ignored. NULL: no shared budget. Requires EBPO_LOAD_CACHE.
-     * The model is entirely in memory if all models of the budget that are entirely in memory,
-     * including this one, take at most half of the budget. Otherwise it is loaded subtree by
+     * The new model is loaded entirely if it takes, together with all models of the budget that are
+     * entirely in memory, at most half of the budget. Otherwise the new model is loaded subtree by
      * subtree.
      */
     ebpo_budget *budget;
@@ -142,10 +142,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
                                                   ebpo_model **out, ebpo_error *error);
 
 /*
- * Estimated memory use for a budget. Numbers of bytes are upper bounds for ordinary models; for
- * subtrees they are 1.05 to 1.4 times the actual use. The budget is met even if the actual use
- * would be higher: other data is removed, or loading fails. If everything will be in memory, all
- * members except `resident`, `budget`, `whole` and `least` are 0.
+ * Estimated memory use for a budget. Numbers of bytes are upper bounds for ordinary models. The
+ * numbers for subtrees are 1.05 to 1.4 times the actual use. The budget is met even if the actual
+ * use would be higher: other data is removed, or loading fails. If everything will be in memory,
+ * all members except `resident`, `budget`, `whole` and `least` are 0.
  */
 typedef struct ebpo_model_plan {
     size_t struct_size;
@@ -379,8 +379,9 @@ enum { EBPO_LEVEL_ALL = -1 };
 /* ---- point in solid ---- */
 
 /*
- * Gray nodes in which a query tests if the point is outside the envelope, which decides early that
- * the point is outside the solid. Results do not depend on this choice.
+ * Gray nodes in which a query tests if the point is outside the node's envelope. A point outside
+ * the envelope is outside the solid, so the query can end early. Results do not depend on this
+ * choice.
  */
 typedef enum ebpo_envelopes {
     EBPO_ENVELOPES_AUTO = 0, /* nodes where the test can avoid loading */
@@ -1015,7 +1016,10 @@ typedef struct ebpo_mass {
      */
     double centroid[3];
 
-    /* Inertia tensor about `centroid`, for density 1 (or the density of `centroid`). */
+    /*
+     * Inertia tensor about `centroid`, for density 1. If the volume is unknown: for the density
+     * described at `centroid`.
+     */
     double inertia[3][3];
 
     /*
@@ -1027,10 +1031,10 @@ typedef struct ebpo_mass {
     int64_t exponent;
 
     /*
-     * Bounds of the volume. If it is known: for a solid, both bounds are `volume`; for a surface
-     * with EBPO_PART_BORDER, `volume` minus and plus the sum of integral_error and caps_integral.
-     * If it is not known: for a solid, the bounds of ebpo_solid_volume; for a surface, 0 and
-     * INFINITY.
+     * Bounds of the volume. If the volume is known: for a solid, both bounds are `volume`; for a
+     * surface with EBPO_PART_BORDER, they are `volume` minus and plus the sum of integral_error and
+     * caps_integral. If the volume is not known: for a solid, the bounds of ebpo_solid_volume; for
+     * a surface, 0 and INFINITY.
      */
     double volume_lo, volume_hi;
 
@@ -1050,8 +1054,8 @@ typedef struct ebpo_mass {
      * For surfaces with EBPO_PART_BORDER, else 0: greatest difference that other caps could make to
      * `integral`, and to the centroid of the winding number (INFINITY: no bound). This holds for
      * caps that satisfy two conditions. First, each cap is in the convex hull of its loop. Second,
-     * the closed mesh of this cap and the cap of format-spec/border.md, reversed, has no winding
-     * numbers other than -1, 0 and 1, times the weight of the loop (border.md).
+     * this cap and the reversed cap of format-spec/border.md form a closed mesh, whose winding
+     * numbers are all -1, 0 or 1, times the weight of the loop (border.md).
      */
     double caps_integral, caps_centroid;
 } ebpo_mass;

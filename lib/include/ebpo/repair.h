@@ -86,9 +86,10 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1: there are
-     * doubts about the mesh of every try, or there are no doubts about the unrepaired mesh, which
-     * then needs no repair (even if dropping repeated faces was tried).
+     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1 in two
+     * cases. Either there are doubts about the mesh of every try, or there are no doubts about the
+     * unrepaired mesh. The unrepaired mesh then needs no repair, even if dropping repeated faces
+     * was tried.
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -147,9 +148,9 @@ typedef struct ebpo_shells {
     /*
      * Difference of two volumes for each ebpo_rule: volume of the solid under this rule, minus the
      * signed volume of the mesh (the integral of the winding number). In cubic units of the source.
-     * If `apart` is 0, the differences are unknown, and 0. All differences are also 0 if every
-     * winding number is 0 or 1, as for bodies that are oriented outwards and have cavities that are
-     * oriented inwards.
+     * If `apart` is 0, the differences are unknown, and the members are 0. All differences are also
+     * 0 if every winding number is 0 or 1, as for bodies that are oriented outwards and have
+     * cavities that are oriented inwards.
      */
     double volume_difference[3];
 } ebpo_shells;

@@ -22,8 +22,8 @@
  *
  * An *instance* is a model at a pose. A *route* is a list of poses with times; an instance or a
  * camera with a route moves along it. Layers and groups are named sets of instances; an instance is
- * in at most one layer and in any number of groups. A *rule* states that pairs of instances are
- * ignored, or which *clearance* (minimum distance) they must have.
+ * in at most one layer and in any number of groups. A *rule* states that certain pairs of instances
+ * are ignored, or that they must keep a *clearance* (minimum distance).
  *
  * Models, instances and cameras have indices in the order in which they were added. Times are in
  * seconds. Before the first time of its route, an instance has the first pose of the route. After
@@ -478,7 +478,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, dou
 typedef enum ebpo_clash_kind {
     EBPO_CLASH_NONE = 0,     /* no faces intersect; one instance may be inside the other */
     EBPO_CLASH_NEAR = 1,     /* no faces intersect, but some are nearer than the clearance */
-    EBPO_CLASH_TOUCHING = 2, /* faces have common points, but none in the interior of both */
+    EBPO_CLASH_TOUCHING = 2, /* faces have common points, but no common interior points */
     EBPO_CLASH_COPLANAR = 3, /* faces are coplanar and overlap, but no faces cross */
     EBPO_CLASH_CROSSING = 4, /* faces cross */
 
@@ -591,7 +591,8 @@ typedef struct ebpo_scene_clash_options {
  * Narrow phase: finds the pairs of ebpo_scene_pairs whose faces intersect at a time, or are nearer
  * than the clearance. Decisions are exact on posed coordinates (collide.h). Clashes are in
  * ascending order of a, then b. If one instance is inside the other and no faces are near, the pair
- * is reported only with options.relate. The required models are made, as by ebpo_scene_model.
+ * is reported only with options.relate. The function makes the models that it needs, as
+ * ebpo_scene_model does.
  *
  * tested   receives the number of tested pairs; may be NULL
  *
@@ -755,10 +756,10 @@ typedef struct ebpo_scene_approach_options {
 /*
  * Finds the time in from .. to at which two instances are first within their clearance of each
  * other; no time is missed. For each pair of ebpo_scene_pairs (from, to), the distance is evaluated
- * at time `from`. This distance and the bound of ebpo_scene_motion give a later time, before which
- * the pair cannot be near. At this later time the distance is evaluated next, and so on. There is
- * one result per pair, in ascending order of a, then b. If one instance is inside another instance
- * from the beginning, and no faces are near, the instances count as apart.
+ * at time `from`. From this distance and the bound of ebpo_scene_motion follows a later time,
+ * before which the pair cannot be near. The distance is evaluated at this later time, and so on.
+ * There is one result per pair, in ascending order of a, then b. If one instance is inside another
+ * instance from the beginning, and no faces are near, the instances count as apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -980,9 +981,9 @@ typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models,
  * contains subsets of the models' files, pose files, and packed.scene.json, which is the scene with
  * these files, their digests and the digests of the source files. `take` may be NULL.
  *
- * Queries of options.purpose at times in from .. to have the same results in the new scene, except
- * that ebpo_scene_approach may evaluate other times, and that intervals of distances beyond the
- * clearance may be wider. Queries that need more data return EBPO_E_ABSENT.
+ * Queries of options.purpose at times in from .. to have the same results in the new scene, with
+ * two exceptions. ebpo_scene_approach may evaluate other times, and intervals of distances beyond
+ * the clearance may be wider. Queries that need more data return EBPO_E_ABSENT.
  *
  * EBPO_E_ARGUMENT: as for ebpo_scene_plan; the scene was not read from a file, or was changed after
  * reading; or target_bytes is too small for a model. EBPO_E_ABSENT: with target_bytes, a file is a

@@ -86,10 +86,9 @@ typedef struct ebpo_subset_options {
     double max_error;
 
     /*
-     * Maximum size of the new file in bytes. The least max_error (to 1 %) with which the new file
-     * has at most this size is found and used. If the new file has at most this size without a
-     * max_error, none is used. 0: no maximum size. target_bytes and max_error cannot be set
-     * together.
+     * Maximum size of the new file in bytes. If the new file would be larger, the least max_error
+     * (to 1 %) with which it has at most this size is found and used. Otherwise no max_error is
+     * used. 0: no maximum size. target_bytes and max_error cannot be set together.
      */
     uint64_t target_bytes;
 
@@ -128,11 +127,11 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * Guarantee for every node that was pruned because of max_error: no point of the node's envelope,
  * including the interior, is farther than max_error from the solid and its faces (for a surface:
  * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is also pruned if the part
- * of its parent's envelope in the leaf's cell has an error bound of at most max_error; in the new
- * file this leaf is a pruned gray node without planes. Leaves that are kept have the same error
- * bound as in `file`, which may be larger than max_error. A smaller max_error keeps all nodes that
- * a larger max_error keeps. With max_error or target_bytes, the whole model is loaded into memory
- * (see ebpo_subset_memory).
+ * of its parent's envelope in the leaf's cell has an error bound of at most max_error. In the new
+ * file, this leaf becomes a pruned gray node without planes. Leaves that are kept have the same
+ * error bound as in `file`, which may be larger than max_error. A smaller max_error keeps all nodes
+ * that a larger max_error keeps. With max_error or target_bytes, the whole model is loaded into
+ * memory (see ebpo_subset_memory).
  *
  * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives

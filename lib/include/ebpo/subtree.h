@@ -34,9 +34,9 @@ typedef struct ebpo_subtree_options {
     uint32_t parts;
 
     /*
-     * Number of levels to read below the subtree's root. -1: all levels. With another value no
-     * faces are read. They would be incomplete, because the leaves below the last level, which list
-     * some of the faces, are not read.
+     * Number of levels to read below the subtree's root. -1: all levels. With any other value, no
+     * faces are read. The faces would be incomplete, because leaves below the last level also list
+     * faces, and these leaves are not read.
      */
     int levels;
 

@@ -24,8 +24,8 @@ typedef struct ebpo_verify_report {
 
     /*
      * The header, the shapes and counts of arrays, the order of values, and the index arrays
-     * (running sums of counts) are valid. Exactly the cells with more than leaf_faces faces are
-     * divided, although no rule of the format requires this.
+     * (running sums of counts) are valid. This check also requires that exactly the cells with more
+     * than leaf_faces faces are divided, although no rule of the format requires this.
      */
     ebpo_verify_count structure;
 
@@ -86,8 +86,8 @@ typedef struct ebpo_verify_options {
 
     /*
      * Number of cells whose labels (`labels` of ebpo_verify_report) are checked, at least one of
-     * each level and type. 0: all cells if there are at most 2^22 cells, else 2^20 cells; but only
-     * 4,096 cells if this would take more than a few seconds.
+     * each level and type. 0: all cells if there are at most 2^22 cells, else 2^20 cells. If these
+     * checks would take more than a few seconds, only 4,096 cells are checked.
      */
     uint64_t label_samples;
 

@@ -189,8 +189,8 @@ typedef struct ebpo_view_node {
     double distance;
 
     /*
-     * Size of the cell in the image: length, in pixels, that the cell's diagonal would have in the
-     * middle of the image, if it were `distance` away from the eye and parallel to the image.
+     * Size of the cell in the image: length of the cell's diagonal in pixels, as if the diagonal
+     * were in the middle of the image, parallel to the image, and `distance` away from the eye.
      * INFINITY: the eye is in the cell. NAN without an observer.
      */
     double pixels;
@@ -303,7 +303,7 @@ typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 
 /*
  * Visits the cut: all delivered nodes that are not replaced by their children, including white
- * nodes. The order is front to back as seen by the observer, or, without an observer, depth first
+ * nodes. The order is front to back as seen by the observer. Without an observer, it is depth first
  * by octcode. In these nodes, `complete` is always true. Before the root is delivered, the cut has
  * no nodes. Reads no data. `visit` must not use the stream.
  *
@@ -355,15 +355,15 @@ EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
  * patches whose nodes have no patches below are replaced by the model's faces. The option
  * `priority` is ignored.
  *
- * Option `pixels`: no visible patch with a greater error in the image is used, unless another
- * option prevents its replacement. The error in the image is the size in pixels of
- * ebpo_patch.error, at the distance from the eye to the nearest point of the node's cell and in the
- * middle of the image. If `pixels` is 0, the finest patches are used.
+ * Option `pixels`: a visible patch with a greater error in the image is used only if another option
+ * prevents its replacement. The error in the image is the size in pixels of ebpo_patch.error, at
+ * the distance from the eye to the nearest point of the node's cell and in the middle of the image.
+ * If `pixels` is 0, the finest patches are used.
  *
  * out     freed by ebpo_surface_mesh_free; cleared on failure. `error` is the greatest error of the
  *         patches that were used, and `pixels` is the greatest error in the image of the visible
- *         patches. Both are bounds for the patches as they are stored; a vertex that was replaced
- *         to close a crack is on a coarser patch
+ *         patches. Both are bounds for the patches as they are stored. To close cracks, some
+ *         vertices of a patch are replaced by vertices of a coarser patch
  *
  * EBPO_E_ABSENT: the file does not have the part, or `faces` is true and the file has no mesh.
  * EBPO_E_LIMIT: options.bytes is too small for the patch of the root. EBPO_E_FORMAT, EBPO_E_IO,

@@ -18,10 +18,10 @@ extern "C" {
 #endif
 
 /*
- * Allocates the arrays of models that are read, built or verified. Arrays are in memory while they
- * fit into half of the budget. All other arrays are in unnamed temporary files, which disappear
- * with the process. These files are mapped, and their resident part stays within the budget.
- * Results do not depend on the workspace.
+ * Allocates the arrays of models that are read, built or verified. A new array is in memory if it
+ * and the other arrays in memory fit into half of the budget. All other arrays are in unnamed
+ * temporary files, which disappear with the process. These files are mapped, and their resident
+ * part stays within the budget. Results do not depend on the workspace.
  */
 typedef struct ebpo_workspace ebpo_workspace;
 
@@ -34,7 +34,7 @@ typedef struct ebpo_workspace_options {
 
     /*
      * Budget: maximum resident memory of the whole process, in bytes. 0: half of the memory of the
-     * machine, or of the process's control group if that is less.
+     * machine, or half of the memory of the process's control group if that is less.
      */
     uint64_t memory;
 
