@@ -36,12 +36,12 @@ void ebpo_bounder_free(ebpo_bounder *b);
  * b->half_spaces. d(x) is the distance of x from the solid and the faces; d is 0 in the solid.
  *
  * The search is a branch and bound over convex fragments of the envelope. When x moves, d changes
- * by at most the length of the move. (The signed distance has this property within the solid, too.)
- * The distance to a single face is convex, so its largest value over a fragment is at a corner of
- * the fragment. Fragments are first cut along the cells of the model's tree, down to leaves. Within
- * leaves, fragments are cut along the faces' planes, until each fragment is inside or outside. The
- * order and the cuts depend on the envelope alone, so a larger goal->enough never needs more
- * queries. */
+ * by at most the length of the move. (The same is true for the signed distance, also within the
+ * solid.) The distance to a single face is convex, so its largest value over a fragment is at a
+ * corner of the fragment. Fragments are first cut along the cells of the model's tree, down to
+ * leaves. Within leaves, fragments are cut along the faces' planes, until each fragment is inside
+ * or outside. The order and the cuts depend on the envelope alone, so a larger goal->enough never
+ * needs more queries. */
 EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell,
                                               const ebpo_bound_goal *goal, ebpo_envelope_bound *out,
                                               ebpo_error *error);
@@ -55,7 +55,7 @@ EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell,
                                              const ebpo_bound_goal *goal, ebpo_envelope_bound *out,
                                              ebpo_error *error);
 
-/* --- the decision which envelopes are close enough to the model --- */
+/* --- deciding which envelopes are close enough to the model --- */
 
 /* A model, and the results of the tests of its nodes so far. The results are used again for other
  * values of max_error. */

@@ -34,8 +34,8 @@ typedef enum ebpo_block_order {
 /* Frees a block, also after a failure. */
 void ebpo_block_free(ebpo_block *block);
 
-/* A column of values: one value for each node of a level, or for each polygon of a level (the value
- * of the polygon's node), or for each triangle of the mesh. */
+/* A column of values. It has one value for each node of a level, for each polygon of a level (the
+ * value of the polygon's node), or for each triangle of the mesh. */
 typedef struct ebpo_column {
     const char *name;
     ebpo_h5_number number; /* type of the values */
@@ -73,8 +73,9 @@ typedef struct ebpo_export_job ebpo_export_job;
 
 /* A format: a row of the table in export.c. */
 typedef struct ebpo_export_row {
-    const char *name;          /* also the default ending of its files */
-    bool folder;               /* the output is a folder, with all levels of the surface */
+    const char *name; /* also the default ending of its files */
+    /* the output is a folder with tiles of all levels of the simplified surface */
+    bool folder;
     const char *second_ending; /* ending of a second file; NULL: the format has one file */
     /* true: second_ending replaces the ending of the first file's name; false: it is appended */
     bool replaces_ending;
@@ -96,7 +97,7 @@ struct ebpo_export_job {
 };
 
 /* Reads block i and adds it to the report. The caller frees the block by ebpo_block_free, also
- * after a failure. Fails with EBPO_E_CANCELLED if the callback for progress requests an end. */
+ * after a failure. Returns EBPO_E_CANCELLED if the progress callback returns false. */
 EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i,
                                                  ebpo_block_order order, ebpo_block *out,
                                                  ebpo_error *error);

@@ -48,11 +48,12 @@ double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
                                 const double triangle[3][3]);
 
-/* Fragments of an envelope are convex polytopes in the cell coordinates of the node. Together they
- * cover the envelope. Every cut keeps a little too much on both sides. */
+/* Fragments of an envelope are convex polytopes in the cell coordinates of the node (0 to 1 on each
+ * axis of the cell). Together they cover the envelope. After a cut, both parts extend a little
+ * beyond the cut. */
 
-/* Both parts of a cut extend beyond the cut by this width, in cell coordinates. The width is more
- * than the tolerance of clipping, if the normal of the cut has a length of at least 1/sqrt(3). */
+/* Both parts extend beyond a cut by this width, in cell coordinates. If the normal of the cut has a
+ * length of at least 1/sqrt(3), this width is more than the tolerance of ebpo_polytope_clip. */
 #define EBPO_CUT_SLACK 4e-10
 
 /* The box of a polytope, in cell coordinates. */
@@ -70,7 +71,7 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 /* --- trees: the levels of a file, with the faces of leaves ---
  *
  * A search reads two trees: the tree whose envelopes are bounded, and the tree of the whole model,
- * which determines the solid. Both may be the same. */
+ * which determines the solid. Both trees may be the same tree. */
 
 /* Reads all levels of a file. Fails with EBPO_E_ABSENT if the file has no mesh or is a subset. The
  * caller frees the result by ebpo_lod_model_free. */
@@ -164,12 +165,12 @@ EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragmen
                                                    const ebpo_node *leaf);
 
 /* Cuts a fragment, which the caller has popped from the stack, and pushes the parts. If no cut is
- * needed, raises the upper bound of the search to the fragment's bound. */
+ * needed, the upper bound of the search becomes at least the fragment's upper bound. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
                                             const ebpo_fragment_measure *measure);
 
-/* Raises the upper bound of the search to `upper`, the upper bound of a fragment that is not
- * examined further. */
+/* Raises the upper bound of the search to `upper` if it is lower. `upper` is the upper bound of a
+ * fragment that is not examined further. */
 static inline void ebpo_bound_raise(ebpo_bounder *b, double upper)
 {
     b->hi = b->hi < upper ? upper : b->hi;

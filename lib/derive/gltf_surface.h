@@ -16,8 +16,8 @@ typedef struct ebpo_gltf_surface {
     const uint8_t *colours;    /* [vertex_count][colour_bytes] sRGB; NULL: none */
     unsigned colour_bytes;     /* 3, or 4 with opacity */
     double origin[3];          /* point that becomes (0, 0, 0) */
-    /* step: distance of the grid's planes on each axis; 0: positions are stored as floats.
-     * grid: a point of the grid */
+    /* Positions are stored as points of a grid. step: distance between neighbouring points on each
+     * axis; 0: positions are stored as floats, without a grid. grid: one point of the grid */
     double step[3], grid[3];
     bool rotates; /* the file's y is the surface's z, as in 3D Tiles */
     const char *name;
@@ -31,9 +31,9 @@ typedef struct ebpo_gltf_written {
     double min[3], max[3]; /* bounds of the vertices, relative to the origin */
 } ebpo_gltf_written;
 
-/* Writes a GLB file; the caller checks the stream for errors. Steps are doubled until all positions
- * fit into 16 bits. `path`: for messages. Returns EBPO_E_LIMIT (a coordinate beyond float32, a file
- * of 4 GiB) or EBPO_E_MEMORY. */
+/* Writes a GLB file; the caller checks the stream for errors. The steps of the grid are doubled
+ * until all positions fit into 16 bits. `path`: for messages. Returns EBPO_E_LIMIT (a coordinate
+ * beyond float32, a file of 4 GiB) or EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_gltf_surface_write(FILE *file, const char *path,
                                                   const ebpo_gltf_surface *surface,
                                                   ebpo_gltf_written *out, ebpo_error *error);

@@ -1,7 +1,7 @@
 /* Reads, checks and encodes the border of a surface: closed loops of points with weights. The file
- * stores the coordinates of the points, coded like the vertices of the mesh, and not the indices of
- * vertices, because subsets number vertices anew, and because a reader needs all loops at once.
- * Source: format-spec/border.md. */
+ * stores the coordinates of the points, coded like the vertices of the mesh. It does not store
+ * indices of vertices, for two reasons: the vertices of a subset have other indices, and a reader
+ * needs the points of all loops at once, without the mesh. Source: format-spec/border.md. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,11 +1,11 @@
 /* Finds the offset, the stored size and the checksum of every chunk of an open file. Offsets and
- * sizes are read from the file's list of all chunks, /subtrees/chunk_directory, or, in a file
- * without this list, from HDF5's chunk index of each array. The list and the indexes may be long or
- * remote, so they are read only when needed, and only once, under the file's lock. The checksums in
- * the list /chunk_checksums detect an intact chunk that belongs to another position or another
- * version of the file. Both lists are single chunks, however long, so they have a separate encoder
- * and decoder. The sum of stored sizes is checked against the size of the file before chunks are
- * decoded. Source: format-spec/subtrees.md and checksums.md. */
+ * sizes are read from the file's list of all chunks, /subtrees/chunk_directory. In a file without
+ * this list, they are read from HDF5's chunk index of each array. The list and the indexes may be
+ * long or remote, so they are read only when needed, and only once, under the file's lock. The
+ * checksums in the list /chunk_checksums detect an intact chunk that belongs to another position or
+ * another version of the file. Each of the two lists is a single chunk of any size, so the lists
+ * have a separate encoder and decoder. The sum of stored sizes is checked against the size of the
+ * file before chunks are decoded. Source: format-spec/subtrees.md and checksums.md. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -41,7 +41,7 @@ uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
 }
 
 /* Returns the array with this number in a list, or EBPO_ARRAYS for an unknown number. *level: level
- * of the array; of an attribute array, its number in /attributes. */
+ * of the array; for an array of attributes, its number in /attributes. */
 static ebpo_array_id find_array(uint32_t number, int *level)
 {
     *level = 0;
@@ -65,8 +65,8 @@ static ebpo_array_id find_array(uint32_t number, int *level)
  * decoded. */
 static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
 
-/* Returns true if the pipeline shuffles the elements. The functions below shuffle lists themselves,
- * as the coder's scratch memory is too small for a long list. */
+/* Returns true if the pipeline shuffles the elements. In this case, the functions below shuffle the
+ * list, because the coder's scratch memory is too small for a long list. */
 static bool is_shuffled(ebpo_pipeline pipeline)
 {
     return ebpo_pipeline_facts_of(pipeline)->compresses;
@@ -168,7 +168,7 @@ ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, 
 /* --- stored sizes --- */
 
 /* Returns the stored bytes of a level. If `located` is false, counts only arrays with a single
- * chunk, as the sizes of other arrays are not known yet. */
+ * chunk, because the sizes of other arrays are not known yet. */
 static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
 {
     uint64_t bytes = 0;

@@ -1,6 +1,6 @@
 /* Declares the lists of all chunks of a file. The chunk directory gives the offset and stored size
- * of each chunk (format-spec/subtrees.md). The list of chunk checksums gives the chunk's checksum
- * (checksums.md). A chunk is the unit of compression in HDF5. */
+ * of each chunk (format-spec/subtrees.md). The list of chunk checksums gives the checksum of each
+ * chunk (checksums.md). A chunk is the unit of compression in HDF5. */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H
 
@@ -54,7 +54,7 @@ static inline uint64_t ebpo_list_row(uint32_t number, uint64_t value)
 static inline uint32_t ebpo_list_row_number(uint64_t row) { return (uint32_t)(row >> 32); }
 static inline uint32_t ebpo_list_row_value(uint64_t row) { return (uint32_t)row; }
 
-/* --- lists of uint64_t that are stored as a single chunk, however long --- */
+/* --- lists of uint64_t, of any length, that are stored as a single chunk --- */
 
 /* Encodes a list into *stored, which the caller frees. *bytes is its size. `codec_level`: as in
  * ebpo_write_options. */
@@ -78,7 +78,7 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo
 /* --- stored sizes --- */
 
 /* Returns EBPO_E_FORMAT if the arrays whose chunks are located take more bytes than the file has.
- */
+ * Does not count the border and the simplified surface. */
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* Returns EBPO_E_LIMIT if the decoded size of all arrays exceeds both `most` times the file size
@@ -89,8 +89,8 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 /* --- checksums --- */
 
 /* The list /chunk_checksums contains the last four bytes of every chunk of a file, which are its
- * checksum. The list is necessary because a chunk with a correct checksum may be a wrong chunk: one
- * of another position or of another version of the file. Source: format-spec/checksums.md. */
+ * checksum. The list is necessary because a chunk with a correct checksum may come from another
+ * position or from another version of the file. Source: format-spec/checksums.md. */
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */

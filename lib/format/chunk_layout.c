@@ -83,8 +83,8 @@ static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
     }
 }
 
-/* Returns the number of rows in a chunk in a file with subtrees, or UINT64_MAX for as many rows as
- * a chunk can have. */
+/* Returns the number of rows in a chunk of an array in a file with subtrees. UINT64_MAX: as many
+ * rows as a chunk can have. */
 static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t row_bytes)
 {
@@ -123,7 +123,7 @@ uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, 
                                     bool kept)
 {
     static const struct {
-        const char *path; /* of an array, or of a group (ends with "/") */
+        const char *path; /* path of an array, or of a group (ends with "/") */
         uint32_t rows;
         bool fixed; /* the format fixes the number of rows */
     } known[] = {
@@ -250,8 +250,8 @@ enum {
     DEFAULT_FACES = 1024, /* default number of faces in a subtree */
     LEAST_FACES =
         131072, /* a file has subtrees by default if its mesh has at least this number of faces */
-    /* subtrees after which pages of the workspace are released; the rows of a subtree in all arrays
-     * take tens of kilobytes */
+    /* pages of the workspace are released after this number of subtrees; the rows of one subtree in
+     * all arrays take tens of kilobytes */
     SUBTREES_A_TIME = 128
 };
 
@@ -306,7 +306,8 @@ static uint64_t first_group(const counting *c, uint64_t subtree, int level)
                                                : level_sum(c, subtree, level - 1, EBPO_S_GRAY);
 }
 
-/* Adds the items of a subtree's leaves, ranks [leaf, end), to `sum`, the columns of the level. */
+/* Adds the items of a subtree's leaves to `sum`, the columns of the level. [leaf, end): ranks of
+ * these leaves. */
 static void count_leaves(const counting *c, const ebpo_level *level, uint64_t leaf, uint64_t end,
                          uint64_t *sum)
 {
@@ -366,7 +367,8 @@ static void count_faces(const counting *c)
     for (uint64_t i = 0; i < c->sums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         owned_faces(c, i, &first, &end);
-        first = end < at || first == UINT64_MAX ? at : first; /* the subtree has no leaves: `at` */
+        /* `at` if the subtree has no owned faces */
+        first = end < at || first == UINT64_MAX ? at : first;
         end = end < first ? first : end;
         to[EBPO_S_FACES_BEFORE] = from[EBPO_S_FACES_BEFORE] + first - at;
         to[EBPO_S_FACES] = from[EBPO_S_FACES] + end - first;
@@ -374,8 +376,8 @@ static void count_faces(const counting *c)
     }
 }
 
-/* *used: number of vertices that the faces before *face use. Adds the number of vertices that the
- * faces [*face, end) use first, and moves *face to `end`. */
+/* Adds to *used the number of vertices that the faces [*face, end) use first, and moves *face to
+ * `end`. On entry, *used is the number of vertices that the faces before *face use. */
 static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *used)
 {
     EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)

@@ -39,21 +39,22 @@ typedef struct ebpo_array_out {
     int level;
     char path[EBPO_PATH_BYTES];
     ebpo_shape shape; /* of the values; ebpo_stored_shape gives the shape in the file */
-    bool gates; /* true: faces that are stored as gates across edges (hdf5_read/face_gates.h) */
+    /* true: the array has faces that are stored as gates (EBPO_GATES_CODING of schema.h) */
+    bool gates;
     /* native integers, row by row; NULL for arrays with a special coding */
     const void *values;
     uint8_t value_size;
     ebpo_h5_id handle; /* HDF5 handle of the array, while the file is written */
-    bool columns;      /* for attributes: true if written as columns */
-    /* for attributes: array of the mesh that has the same rows (EBPO_A_VERTICES or EBPO_A_FACES);
-     * EBPO_A_ATTRIBUTE: neither */
+    bool columns;      /* for attributes: true if written column after column */
+    /* for attributes of vertices or faces: array of the mesh with the same number of rows
+     * (EBPO_A_VERTICES or EBPO_A_FACES); EBPO_A_ATTRIBUTE for other attributes */
     ebpo_array_id rows_of;
 } ebpo_array_out;
 
 /* Properties of an attribute array that its HDF5 attributes state. */
 typedef struct ebpo_attribute_plan {
-    bool columns;       /* the values are written as columns */
-    bool items_columns; /* the items of the lists are written as columns */
+    bool columns;       /* the values are written column after column */
+    bool items_columns; /* the items of the lists are written column after column */
     bool has_range;
     double range[2]; /* least and greatest value */
 } ebpo_attribute_plan;
@@ -81,9 +82,9 @@ uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, 
 
 /* Returns the number of rows that each chunk of an array had before another program rewrote the
  * file with other chunks (callback ebpo_h5_chunk_rows_fn of hdf5_write/h5.h). Codes restart at each
- * chunk, so the values can only be decoded with the original number of rows. `kept`: true: an array
- * whose chunk size the format does not fix keeps its current chunk size, if the format allows this
- * size. */
+ * chunk, so the values can only be decoded with the original number of rows. `subtrees`: true if
+ * the file has a table of subtrees. `kept`: if true, an array keeps its current chunk size if the
+ * format allows several chunk sizes, including this size. */
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
                                     bool kept);
 
@@ -96,7 +97,8 @@ typedef struct ebpo_ordered_chunk {
 } ebpo_ordered_chunk;
 
 typedef struct ebpo_chunk_order {
-    ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/chunk_directory */
+    /* [count] all chunks except the two lists of all chunks (chunk_directory.h) */
+    ebpo_ordered_chunk *chunk;
     uint64_t count;
     uint64_t top; /* the first `top` chunks are needed to locate a subtree */
 } ebpo_chunk_order;

@@ -20,7 +20,8 @@ enum {
     CHUNK_BITS = 48, /* bits of a key for the number of the chunk */
     AROUND = 4       /* number of adjacent chunks that are fetched together */
 };
-/* Limits of prefetched bytes of a counted cache (ebpo_chunks_capacity). */
+/* Limits of the bytes that a counted cache prefetches and has not yet read (ebpo_chunks_capacity).
+ */
 enum {
     AHEAD_MAX = 4 << 20, /* bytes */
     AHEAD_SHARE = 4,     /* a quarter of the remaining limit */
@@ -49,7 +50,7 @@ static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
                : &c->file->attributes.array[number - levels - EBPO_A_ATTRIBUTE - 1];
 }
 
-/* Returns the chunk's number of a key. */
+/* Returns the number of the chunk with this key, in its array. */
 static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
 
 /* Returns the number of rows of a chunk, without padding. */
@@ -238,9 +239,10 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
 
 static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* Returns a quarter of the remaining limit, minus the prefetched bytes that are not yet read. These
- * bytes may remain unread for long, for example when a view turns away. The result is therefore at
- * least a sixteenth of the remaining limit, so that chunks are not fetched one by one. */
+/* Returns a quarter of the remaining limit (at most AHEAD_MAX), minus the prefetched bytes that are
+ * not yet read. Prefetched bytes may remain unread for long, for example when a view turns away.
+ * The result is therefore at least a sixteenth of the remaining limit (at most a sixteenth of
+ * AHEAD_MAX), so that chunks are not fetched one by one. */
 uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),

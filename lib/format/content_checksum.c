@@ -18,9 +18,9 @@
 
 enum {
     PLAIN_FACE_ROWS = 4096, /* faces in a chunk of a file without subtrees */
-    /* number of chunks that PLAIN_FACE_ROWS faces take in a file with subtrees. There
-     * /mesh/faces_index has a row for each chunk; without subtrees it has every SKIPPED-th of these
-     * rows */
+    /* number of chunks that PLAIN_FACE_ROWS faces take in a file with subtrees. In such a file,
+     * /mesh/faces_index has a row for each chunk. In a file without subtrees, it has only every
+     * SKIPPED-th of these rows */
     SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK
 };
 

@@ -28,8 +28,8 @@ struct ebpo_idle_reader {
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
 };
 
-/* Idle chunk readers for reuse, as creating a decoder takes longer than decoding a chunk. The file
- * keeps a few of them, which count toward no budget. */
+/* Idle chunk readers for reuse, because creating a decoder takes longer than decoding a chunk. The
+ * file keeps a few idle readers, whose memory counts toward no budget. */
 typedef struct ebpo_idle_readers {
     pthread_mutex_t lock; /* protects `first` and `count` */
     ebpo_idle_reader *first;
@@ -40,10 +40,12 @@ typedef struct ebpo_idle_readers {
 typedef struct ebpo_array_in {
     bool present; /* false: the file lacks the array, and no other field is valid */
     ebpo_array_id id;
-    int level; /* of attributes: number of the array; 0 for other arrays without a level */
+    /* for attributes: number of the array in /attributes; 0 for other arrays without a level */
+    int level;
     char path[EBPO_PATH_BYTES];
     ebpo_shape shape; /* shape of the rows that ebpo_reader_chunk returns */
-    bool gates;       /* true: faces that are stored as gates, in the shape of ebpo_stored_shape */
+    /* true: faces stored as gates; ebpo_stored_shape returns their shape in the file */
+    bool gates;
     uint64_t stored_bytes; /* size in the file; 0: the chunks are not located yet */
     /* [ebpo_shape_chunks(&shape)] location of each chunk; NULL when the array is absent. Valid
      * after ebpo_reader_locate, or always for a single chunk */
@@ -100,8 +102,8 @@ EBPO_MUST_USE ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_
 EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,
                                              ebpo_error *error);
 
-/* Returns an array of the file, which may be absent. `level`: of attributes, the array's number; of
- * other arrays of the root, not used. */
+/* Returns an array of the file, which may be absent. `level`: the array's level; for attributes,
+ * the array's number in /attributes; not used for other arrays of the root. */
 static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id,
                                                      int level)
 {
@@ -116,8 +118,8 @@ static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace
     return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };
 }
 
-/* Returns a file as mutable, for the state that reading changes: counters, chunk offsets, idle
- * readers. These members are atomic or protected by the file's locks. */
+/* Returns a mutable pointer to the file, so that a reader can change counters, chunk offsets and
+ * idle readers. These members are atomic or protected by the file's locks. */
 static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 {
     return (ebpo_file *)(uintptr_t)file;

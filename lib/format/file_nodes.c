@@ -201,8 +201,8 @@ static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_
 
 const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };
 
-/* Returns the first item of the block that contains an item. A block is the EBPO_INDEX_ROWS items
- * after the sums of one index row. */
+/* Returns the first item of the block that contains an item. An index array has a row of sums for
+ * every EBPO_INDEX_ROWS-th item; a block is the items from one of these items to the next. */
 static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
 
 /* Reads the types and ranks of a group, and counts its nodes by type. */

@@ -1,9 +1,9 @@
 /* Writes and reads the HDF5 attributes of a file's root and of its levels: the values of ebpo_info.
  * A fact is one attribute. The tables in the first part have one row for each attribute. Writing
- * and reading loop over these rows, and so agree on names and types. A reader rejects a newer
- * version and unknown required parts before it reads anything else. Then the functions check_...
- * test ranges of values, and sums over the levels, before these values determine sizes of memory.
- * Source: format-spec/README.md, section 5. */
+ * and reading loop over these rows, so both use the same names and types. A reader rejects a newer
+ * version and unknown required parts before it reads any other attribute. Then the functions
+ * check_... test the ranges of values and the sums over the levels, before memory of these sizes is
+ * allocated. Source: format-spec/README.md, section 5. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -47,7 +47,7 @@ typedef struct fact {
 #define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
 
 /* A word in the attributes required_parts and optional_parts. A reader may ignore an unknown
- * optional part, but without a required part it would return wrong results. */
+ * optional part. A reader that ignored a required part would return wrong results. */
 typedef struct part_word {
     const char *word;
     unsigned part; /* an ebpo_part, a WORD_ constant, or 0: in every file */
@@ -183,7 +183,7 @@ static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(s
                   colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
                   top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
 
-/* Attributes of surfaces with their border; the last one is the checksum. */
+/* Attributes of surfaces with the part EBPO_PART_BORDER; the last attribute is the checksum. */
 static const fact border_facts[] = {
     { "border_loops", FACT_COUNT, FACT_AT(border_loops) },
     { "border_points", FACT_COUNT, FACT_AT(border_points) },
@@ -193,7 +193,7 @@ static const fact border_facts[] = {
 };
 static const int border_fact_count = sizeof border_facts / sizeof border_facts[0];
 
-/* Attributes of files with a simplified surface; the last one is the checksum. */
+/* Attributes of files with a simplified surface; the last attribute is the checksum. */
 static const fact surface_facts[] = {
     { "surface_patches", FACT_COUNT, FACT_AT(surface_patches) },
     { "surface_triangles", FACT_COUNT, FACT_AT(surface_triangles) },

@@ -11,9 +11,9 @@
 #include "hdf5_read/head.h"
 #include "hdf5_write/h5.h"
 
-/* Writes the root's attributes. The functions _put_..._digest, _put_index and _put_top overwrite
- * the checksums, chunk_index_offset, chunk_index_bytes and top_bytes later, when the arrays have
- * been written and these values are known. */
+/* Writes the root's attributes. Some values are known only after the arrays have been written: the
+ * checksums, chunk_index_offset, chunk_index_bytes and top_bytes. The functions _put_..._digest,
+ * _put_index and _put_top then overwrite these attributes. */
 EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
@@ -46,9 +46,9 @@ EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object 
                                                 const char *object, const char *name,
                                                 uint8_t digest[32], ebpo_error *error);
 
-/* Checks that the values are in range and that the levels' counts add up. `shown`: the file's name
- * for messages. `as`: status of an error, EBPO_E_FORMAT for files and EBPO_E_ARGUMENT for callers'
- * trees. */
+/* Checks that the values are in range and that the counts of the levels agree with each other and
+ * with the counts of the mesh. `shown`: the file's name for messages. `as`: status of an error,
+ * EBPO_E_FORMAT for files and EBPO_E_ARGUMENT for callers' trees. */
 EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,
                                            ebpo_error *error);
 

@@ -507,7 +507,7 @@ ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(e
 
 enum {
     PIECE = 4 << 20,         /* bytes of one read of a download */
-    BYTES_A_SECOND = 4 << 20 /* least speed of copying, for the limit of time */
+    BYTES_A_SECOND = 4 << 20 /* speed of copying, in bytes, that the default time limit assumes */
 };
 
 /* A temporary file that libhdf5 opens by its name. fd: -1 if there is no file. */
@@ -657,7 +657,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     if (status == EBPO_OK)
         status = make_temporary(&copy, shown, error);
     limits.file_bytes += 2 * bytes;
-    if (!limits.seconds) /* ample: decoding and encoding a MiB take about 1/20 second */
+    if (!limits.seconds) /* enough: decoding and encoding a MiB take about 1/20 second */
         limits.seconds = 60 + (unsigned)(bytes / BYTES_A_SECOND);
     ebpo_error copy_error = EBPO_ERROR_INIT, open_error = EBPO_ERROR_INIT;
     if (status == EBPO_OK)

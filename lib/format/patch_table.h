@@ -1,5 +1,5 @@
 /* Reads single patches of a file's simplified surface through a cache of chunks. A patch is the
- * simplified faces of one node. The table of all patches is in memory; a patch is read when it is
+ * simplified surface of one node. The table of all patches is in memory; a patch is read when it is
  * needed. Values that are read are checked: wrong values in a file give EBPO_E_FORMAT, never an
  * index out of range. */
 #ifndef EBPO_FORMAT_PATCH_TABLE_H

@@ -490,9 +490,9 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
 }
 
 /* Computes the position of each item in the order of source indices. The indices are distinct and
- * below `limit`. The caller frees *position. A header may state a limit far above the number of
- * items, so a set of bits marks the indices: one bit for each possible index is little, and the
- * system allocates no memory for pages of zeros. */
+ * below `limit`. The caller frees *position. A set of bits marks the indices, because a header may
+ * state a limit far above the number of items. A bit for each possible index takes little memory,
+ * and the system allocates no memory for pages that contain only zeros. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **position, ebpo_error *error)
 {
@@ -633,7 +633,7 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     return status;
 }
 
-/* --- recomputing checksums: each array is read by one thread, as its chunks must come in order ---
+/* --- recomputing checksums: one thread reads an array, because the chunks must come in order ---
  */
 
 /* Digest of an array that is being read. */

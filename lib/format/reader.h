@@ -38,7 +38,8 @@ void ebpo_hint_tree(const ebpo_file *file);
  * subtrees' roots, the sums before the subtrees, and the chunk offsets. Does nothing unless the
  * file has subtrees and states the size of these data (top_bytes). */
 void ebpo_hint_top(const ebpo_file *file);
-/* Returns true if chunks are collected: for the source, or because of `local` or `counts_bytes`. */
+/* Returns true if ebpo_hint_chunks collects chunks: if the source uses prefetch hints, or because
+ * of `local` or `counts_bytes`. */
 bool ebpo_hints_wanted(const ebpo_hints *hints);
 /* Sends hints for the collected chunks, and clears the collection. */
 void ebpo_hint_all(ebpo_hints *hints);
@@ -85,8 +86,10 @@ EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id 
                                            const ebpo_read_options *options, size_t size,
                                            void *values_out, ebpo_error *error);
 
-/* Decodes a leaf's references in place. The stored gaps, counted down from the leaf's first new
- * face `first`, become ascending face indices. Returns false when an index would be below 0. */
+/* Decodes a leaf's references in place. A reference is a face that an earlier leaf lists, so its
+ * index is below `first`, the leaf's first new face. The file stores gaps between references, from
+ * `first` downwards. The result is ascending face indices. Returns false if an index would be below
+ * 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 
 /* Makes an empty list of idle readers. */

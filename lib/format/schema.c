@@ -430,7 +430,8 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     return EBPO_OK;
 }
 
-/* Checks that all required arrays are present, and that a surface has no winding numbers. */
+/* Checks that all required arrays are present, and that a surface has no arrays of winding numbers
+ * that only solids have. */
 static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info, int level,
                                   const ebpo_level *arrays, ebpo_error *error)
 {

@@ -22,7 +22,7 @@ typedef enum ebpo_array_id {
 #define TABLE_ARRAY(ID, ...) EBPO_A_##ID,
 #define SUM_ARRAY(ID, ...)   EBPO_A_##ID,
 #include "format/array_table.inc"
-    /* stands for every array of /attributes; `level` is then the array's number there */
+    /* stands for every array of /attributes; `level` is then the array's number in /attributes */
     EBPO_A_ATTRIBUTE,
     EBPO_ARRAYS
 } ebpo_array_id;
@@ -48,9 +48,9 @@ typedef enum ebpo_per {
     EBPO_PER_PATCH_COLOUR,  /* vertex of any patch, if the vertices have colours */
     EBPO_PER_SUBTREE_CHUNK, /* chunk of /subtrees/counts */
     EBPO_PER_SUBTREE,
-    EBPO_PER_SHARED_BLOCK, /* chunk of faces or vertices that a subtree uses, but that precedes it
-                            */
-    EBPO_PER_CHUNK         /* chunk of the file */
+    /* chunk of faces or vertices that a subtree uses, and that precedes the subtree */
+    EBPO_PER_SHARED_BLOCK,
+    EBPO_PER_CHUNK /* chunk of the file */
 } ebpo_per;
 
 /* Conditions for the presence of an array, as bits. Most conditions are that the file has a part.
@@ -73,7 +73,7 @@ enum {
 };
 
 enum {
-    EBPO_INDEX_ROWS = 4096,            /* items between two rows of an index array */
+    EBPO_INDEX_ROWS = 4096,            /* number of items between two rows of an index array */
     EBPO_COLOUR_OF_NOTHING = 0x808080, /* for gray nodes without a known colour */
     EBPO_PATH_BYTES = 48,              /* size of an array's path, including the final zero byte */
     EBPO_COLUMNS_BYTES = 2048, /* size of the attribute `columns`, including the final zero byte */
@@ -180,7 +180,7 @@ static inline uint64_t ebpo_schema_groups(const ebpo_info *info, int level)
     return level == 0 ? 1 : info->level[level - 1].gray_count;
 }
 
-/* Returns the conditions (EBPO_NEEDS_...) that a file or tree meets. */
+/* Returns the conditions (EBPO_NEEDS_...) that the file or tree with this header meets. */
 static inline uint32_t ebpo_schema_has(const ebpo_info *info)
 {
     return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) |
@@ -243,7 +243,8 @@ static inline uint64_t ebpo_level_rows(const ebpo_level *level, int id)
 /* Returns true if all values are the default, so that the array can be omitted. */
 bool ebpo_level_is_default(const ebpo_level *level, int id);
 
-/* Frees the arrays that only these `needs` require. The level's counts do not change. */
+/* Frees the arrays that only the conditions in `needs` (EBPO_NEEDS_...) require. The level's counts
+ * do not change. */
 void ebpo_level_drop(ebpo_level *level, uint32_t needs);
 
 /* Returns the counts and volumes of a level, as a file's header states them. Counts of parts that

@@ -1,10 +1,10 @@
 /* Reads slices: a complete subtree or the whole tree. A subtree is a contiguous range of nodes in
  * every level. A slice contains these ranges, the faces that its leaves list, and the vertices of
- * these faces. Faces have local indices: first the shared faces (an earlier leaf of the file lists
- * them), in ascending order of their file indices, then the owned faces (no earlier leaf lists
- * them). A hash table (ebpo_compact) maps scattered indices to dense indices.
- * A caller may limit the memory (ebpo_quota); the bytes of each array are reserved before it is
- * allocated. Source: format-spec/README.md, sections 6 and 7. */
+ * these faces. Faces have local indices: first the shared faces, which a leaf before the subtree
+ * also lists, in ascending order of their file indices; then the owned faces, which no leaf before
+ * the subtree lists. A hash table (ebpo_compact) maps scattered indices to dense indices. A caller
+ * may limit the memory (ebpo_quota); the bytes of each array are reserved before it is allocated.
+ * Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -261,7 +261,7 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     return EBPO_OK;
 }
 
-/* Collects the slice's vertices before `begin`: earlier faces of the file use these vertices first.
+/* Collects the slice's vertices before `begin`, which faces before the owned faces use first.
  * *bytes: size of the table `older`. */
 static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quota *space,
                                  ebpo_compact *older, uint64_t *bytes, ebpo_error *error)
@@ -544,7 +544,7 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
 {
     const ebpo_info *info = &chunks->file->info;
-    /* the table states the faces of a whole subtree only */
+    /* the table states only the faces of whole subtrees */
     return info->subtree_level && root->cell.level == info->subtree_level &&
            root->type == EBPO_GRAY && x->end == info->level_count;
 }
@@ -731,7 +731,7 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_
 
 /* --- the whole tree --- */
 
-/* Removes data that slices do not contain: planes of leaves, and volumes. */
+/* Removes data that ebpo_slice_read does not read: planes of leaves, and volumes. */
 static void drop_arrays(ebpo_level *level)
 {
     ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);

@@ -12,9 +12,10 @@
 #include "format/file_nodes.h"
 
 /* A subtree (or the whole tree) with all faces that its leaves list. Levels are counted from the
- * subtree's root: level[0] has one group with octant 0, the root. Faces have local indices in file
- * order. The first `shared_count` faces are shared: an earlier leaf of the file lists them first.
- * The next face_count faces are owned; in the file, they are first_face .. first_face + face_count
+ * subtree's root: level[0] has one group with octant 0, the root. Faces have local indices, which
+ * ascend with the indices in the file. The first `shared_count` faces are shared: a leaf before the
+ * subtree lists them, too. The next face_count faces are owned; in the file, they are first_face ..
+ * first_face + face_count
  * - 1. leaf_first and leaf_refs of the levels contain local indices. */
 typedef struct ebpo_slice {
     ebpo_node root;
@@ -70,7 +71,7 @@ typedef struct ebpo_slice_size {
     uint64_t refs;      /* references of leaves to faces that an earlier leaf already lists */
     uint64_t new_faces; /* owned faces */
     uint64_t shared;    /* maximum number of shared faces */
-    uint64_t planes;    /* planes of gray nodes and of leaves, each only if requested */
+    uint64_t planes;    /* planes of gray nodes and of leaves, if these planes are requested */
 } ebpo_slice_size;
 /* Computes the sizes of the slice that ebpo_slice_read would read for the node `root`. Reads no
  * faces. */
@@ -90,8 +91,8 @@ static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t lo
 
 /* --- set of indices --- */
 
-/* Set of indices below 2^32 - 1. After sorting, gives the position of each index in the sorted
- * order. */
+/* Set of indices below 2^32 - 1. After it has been sorted, the set gives the position of each index
+ * in the sorted order. */
 typedef struct ebpo_compact {
     /* hash table with open addressing, at most half full; a free slot has number UINT32_MAX */
     struct {

@@ -1,9 +1,10 @@
 /* Checks the faces of a subtree against the file's table of subtrees (/subtrees/counts). A new face
- * of a leaf is in the list of no earlier leaf, depth first. A wrong value in the column EBPO_S_ENDS
- * shifts the new faces of the leaves of one level, and no sum detects this error. So this check
- * visits all leaves of the subtree in depth-first order. Readers of a whole subtree check its
- * leaves themselves (slice.c); this check is for readers of a part of a subtree. It pins at most
- * one chunk of each array and level at a time, and allocates no memory. Source:
+ * of a leaf is in the list of no earlier leaf, depth first. The leaves' new faces are stored as
+ * differences, and the column EBPO_S_ENDS of the table has the start value for each level. A wrong
+ * start value shifts the new faces of the leaves of one level, and no sum of counts detects this
+ * error. So this check visits all leaves of the subtree in depth-first order. Readers of a whole
+ * subtree check its leaves themselves (slice.c); this check is for readers of a part of a subtree.
+ * It pins at most one chunk of each array and level at a time, and allocates no memory. Source:
  * format-spec/subtrees.md, rule RC.4. */
 #include <string.h>
 

@@ -1,5 +1,5 @@
-/* Checks the faces of a subtree against the file's table of subtrees (/subtrees/counts). Any thread
- * may call this function. */
+/* Checks the faces of a subtree against the file's table of subtrees (/subtrees/counts). A new face
+ * of a leaf is a face that no earlier leaf of the file lists. Any thread may call this function. */
 #ifndef EBPO_FORMAT_SUBTREE_FACES_H
 #define EBPO_FORMAT_SUBTREE_FACES_H
 

@@ -205,7 +205,7 @@ struct ebpo_kept_rows {
     uint8_t faces_known[]; /* a bit for each subtree: its faces were checked */
 };
 
-/* Returns the number of subtrees that faces_known has a bit for. */
+/* Returns the number of subtrees that have a bit in faces_known. */
 static uint64_t remembered_subtrees(const ebpo_info *info)
 {
     uint64_t subtrees = info->level[info->subtree_level].gray_count;
@@ -661,11 +661,11 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* Reads the row of leaf_index, or of the table, that precedes a leaf. The values are those of the
- * leaves of the level before the row: row[0] is the end of their new faces (one past the last),
- * row[1] counts their references, and row[2] their planes. If the row is of the table, sets *from
- * to the subtree's first leaf of the level, and checks the row's sums: of faces if `faces` is true,
- * of planes if it is false. */
+/* Reads the row of leaf_index, or of the table, that precedes a leaf. The row describes all leaves
+ * of the level before the row: row[0] is the end of their new faces (one past the last), row[1] is
+ * the number of their references, and row[2] is the number of their planes. If the row is of the
+ * table, sets *from to the subtree's first leaf of the level, and checks the row's sums: of faces
+ * if `faces` is true, of planes if `faces` is false. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
@@ -819,8 +819,8 @@ static void hint_owned_faces(const hinting *t)
 }
 
 /* Adds to the hints the chunks with a subtree's shared faces and vertices. The subtree's rows of
- * /subtrees/shared_chunks list these chunks. The values are not checked, as only hints depend on
- * them. */
+ * /subtrees/shared_chunks list these chunks. The values are not checked, because only hints depend
+ * on them. */
 static void hint_shared(const hinting *t, const ebpo_subtree_row *row)
 {
     enum { SHARED_MAX = 1 << 16 }; /* maximum number of chunks for which hints are sent */

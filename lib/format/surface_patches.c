@@ -4,8 +4,9 @@
  * Most triangles share an edge with a recent triangle. The coder and the decoder keep the last
  * edges and the last vertices; a byte of the code names an edge and the third vertex of a triangle.
  * Vertices are numbered in the order in which the triangles use them first. The position of a
- * vertex is stored as the difference from a prediction: the fourth corner of a parallelogram. Its
- * other corners are the triangle on the other side of the edge. Source: format-spec/surface.md. */
+ * vertex is stored as the difference from a prediction: the fourth corner of a parallelogram. The
+ * other three corners are the vertices of the triangle on the other side of the edge. Source:
+ * format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -33,7 +34,7 @@ enum {
 
 /* --- state of coder and decoder --- */
 
-/* An edge, in the direction that it has in the next triangle at this edge. */
+/* An edge, in the direction in which the next triangle at this edge uses it. */
 typedef struct recent_edge {
     uint32_t from, to, beyond; /* beyond: third vertex of the triangle that has the edge */
 } recent_edge;
@@ -114,7 +115,7 @@ typedef struct coder {
     bool *done;       /* [triangles] true: the triangle is encoded */
     uint32_t *number; /* [vertices] new number of each vertex of `in`; NONE: not used yet */
     uint32_t *vertex; /* [vertices] for each new number: the vertex of `in` */
-    prediction *from; /* [vertices] for each new number: how its position is predicted */
+    prediction *from; /* [vertices] for each new number: how the vertex's position is predicted */
     uint32_t next;    /* next new number */
     bool short_of_memory;
 } coder;
@@ -211,9 +212,9 @@ static void put_free(coder *c, uint64_t triangle)
     add_edges(&c->recent, t, true);
 }
 
-/* Encodes all triangles. The next triangle is one at the most recent edge that has a triangle which
- * is not yet encoded. If no recent edge has such a triangle, the next triangle is the first that is
- * not yet encoded. Vertices without triangles get the last numbers. */
+/* Encodes all triangles. Each step takes a triangle that is not yet encoded, at the most recent
+ * edge that has such a triangle. If no recent edge has such a triangle, the step takes the first
+ * triangle that is not yet encoded. Vertices without triangles get the last numbers. */
 static void put_triangles(coder *c)
 {
     uint64_t first = 0;
@@ -706,7 +707,7 @@ ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
 /* Rows that are copied from the chunks of an array. */
 typedef struct taking {
     void *to;            /* receives the rows [first, end) */
-    unsigned size;       /* of an element, in the file and in memory */
+    unsigned size;       /* bytes of an element, in the file and in memory */
     uint64_t first, end; /* rows to copy */
 } taking;
 

@@ -1,5 +1,6 @@
 /* Encodes, decodes and checks the patches of the part `surface` of a file. A patch is the
- * simplified faces of a node. Source: format-spec/surface.md. */
+ * simplified surface of a node: triangles that replace the faces below the node. Source:
+ * format-spec/surface.md. */
 #ifndef EBPO_FORMAT_SURFACE_PATCHES_H
 #define EBPO_FORMAT_SURFACE_PATCHES_H
 

@@ -11,14 +11,15 @@ EBPO_MUST_USE ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char
                                                const char *shown, const ebpo_write_options *options,
                                                ebpo_error *error);
 
-/* Writes a tree to a temporary file in `folder`, and opens the file. The file has a name, which
- * begins with `name`, only until it is open, because libhdf5 needs a name for writing. */
+/* Writes a tree to a temporary file in `folder`, and opens the file. libhdf5 needs a name for
+ * writing, so the file first has a name that begins with `name`. This name is removed after the
+ * file has been opened. */
 EBPO_MUST_USE ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *folder,
                                           const char *name, const ebpo_write_options *options,
                                           ebpo_file **out, ebpo_error *error);
 
-/* Callback of ebpo_repack_with: adds parts to the tree. These parts must be parts with a separate
- * checksum (colours, surface), because the content checksum must not change. */
+/* Callback of ebpo_repack_with: adds parts to the tree. The content checksum must not change, so
+ * only parts with a separate checksum (colours, border, surface) may be added. */
 typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, unsigned threads, ebpo_error *error);
 /* Same as ebpo_file_repack, but calls `change` after reading the tree and before writing it.
  * `change` may be NULL. */

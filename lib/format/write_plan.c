@@ -355,8 +355,8 @@ static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint6
     }
 }
 
-/* Returns the block of EBPO_INDEX_ROWS leaves that contains reference number `ref`: the last row of
- * leaf_index that counts at most `ref` references before its first leaf. */
+/* Returns the block of EBPO_INDEX_ROWS leaves that contains reference number `ref`: the last block
+ * that has at most `ref` references before its first leaf, by leaf_index. */
 static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t ref)
 {
     uint64_t low = 0, high = (leaves - 1) / EBPO_INDEX_ROWS;
@@ -409,7 +409,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         break;
     case EBPO_A_FACES:
         used = plan->faces_index[row / array->shape.chunk_rows]; /* vertices of earlier chunks */
-        /* does not fail, as index_faces has checked the faces */
+        /* does not fail, because index_faces has checked the faces */
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, encoded);
         break;
     case EBPO_A_BORDER_POINTS:
