@@ -162,7 +162,7 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
 /* --- the search --- */
 
 /* Sets the stack to one fragment, which is the whole envelope. The envelope of a black node is in
- * the solid, so for a black node the stack is empty, and the bounds stay 0. */
+ * the solid. For a black node, the stack is therefore empty, and the bounds stay 0. */
 static ebpo_status begin_search(ebpo_bounder *b)
 {
     ebpo_node node;
@@ -192,8 +192,8 @@ static ebpo_status begin_search(ebpo_bounder *b)
     return node.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &node) : EBPO_OK;
 }
 
-/* Takes a fragment from the stack. If its upper bound is above the target, measures the fragment,
- * and cuts it if its upper bound is then still above the target. */
+/* Takes a fragment from the stack. If the fragment's upper bound is above the target, measures the
+ * fragment. If the measured upper bound is still above the target, cuts the fragment. */
 static ebpo_status search_step(ebpo_bounder *b)
 {
     ebpo_fragment fragment;
@@ -287,7 +287,7 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
     }
 }
 
-/* --- the decision which envelopes are close enough to the model --- */
+/* --- deciding which envelopes are close enough to the model --- */
 
 /* Maximum number of queries for a node. If a node needs more queries, its envelope is not accepted,
  * and the caller uses its children, whose envelopes are smaller and closer to the model. */
@@ -306,7 +306,8 @@ typedef struct earlier_results {
 struct ebpo_tolerance {
     ebpo_model *model;
     ebpo_lod_model tree;
-    bool planes; /* true: envelopes are bounded by planes; false: they are the nodes' whole cells */
+    /* true: envelopes are bounded by planes; false: an envelope is the whole cell of its node */
+    bool planes;
     unsigned threads;
     ebpo_progress progress;
     /* for each level, the earlier results of its gray nodes, and of its leaves, by rank */
@@ -374,8 +375,8 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
     free(n);
 }
 
-/* Decides for one node if its envelope is within n->max_error, from earlier results if possible,
- * otherwise by a search. */
+/* Decides for one node if its envelope is within n->max_error of the model: from earlier results if
+ * possible, otherwise by a search. */
 static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
                               ebpo_error *error)
 {
@@ -444,9 +445,9 @@ ebpo_status ebpo_tolerance_max(ebpo_tolerance *n, double *out, ebpo_error *error
         n->bounders[0].half_spaces.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
     /* judge_node searches in another way, so it may not accept the root's envelope with found.hi as
-     * max_error. So max_error is increased until judge_node accepts it. The loop ends, because
-     * judge_node accepts the envelope without queries when max_error is the root cell's diagonal.
-     */
+     * max_error. Therefore max_error is increased until judge_node accepts the envelope. The loop
+     * ends, because judge_node accepts the envelope without queries when max_error is the root
+     * cell's diagonal. */
     ebpo_tolerance_node node = { root, true, false };
     double upper = found.hi > 0 ? found.hi : DBL_MIN;
     *out = upper;

@@ -131,7 +131,7 @@ static void scene_file_begin(scene_file *file, const char *path)
 }
 
 /* Sets `io` to functions that give assimp access to this file, and to no other file. assimp knows
- * the file by the last part of its path. `io` refers to `file`. */
+ * the file by the last part of its path. `io` keeps a pointer to `file`. */
 static void scene_file_offer(scene_file *file, struct aiFileIO *io)
 {
     *io = (struct aiFileIO){ open_file, close_file, (aiUserData)(void *)file };
@@ -165,8 +165,8 @@ enum { BLOCKS_MAX = EBPO_LEVELS_MAX + 1 };
 /* assimp has one error text for the whole process, so only one thread at a time may call it. */
 static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
 
-/* All data that assimp borrows. assimp does not change the data; where it needs changes, it copies
- * the data first. */
+/* All data that assimp borrows. assimp does not change the data; if assimp needs changes, it makes
+ * them in a copy. */
 typedef struct scene {
     struct aiScene root;
     struct aiNode top, node[BLOCKS_MAX], *children[BLOCKS_MAX];

@@ -109,7 +109,7 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
             continue;
         }
         m->count++;
-        /* check before the next block is read */
+        /* check the size before the next block is read */
         status = m->bin_name ? EBPO_OK : ebpo_export_check_glb(job->path, 0, bin_bytes(m), error);
         if (status != EBPO_OK)
             return status;
@@ -132,7 +132,8 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
 
 /* --- the text --- */
 
-/* Prints a file name as a URI. In a URI, characters other than these are written as %XX. */
+/* Prints a file name as a URI. Letters, digits and "-._~" are printed unchanged; other bytes are
+ * printed as %XX. */
 static void print_name(FILE *f, const char *name)
 {
     static const char hex[] = "0123456789ABCDEF";

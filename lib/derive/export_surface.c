@@ -1,8 +1,9 @@
-/* Exports the simplified surface as GLB: that of a level, or the best one with at most a given
- * number of triangles.
+/* Exports the simplified surface as GLB: the surface of a level, or the surface with the least
+ * error that has at most a given number of triangles.
  *
- * Positions are stored on a grid of 2^16 steps along the root cell. This grid contains the grids of
- * patches of levels 0 to 6, so the vertices of these patches are stored exactly. */
+ * Positions are stored on a grid that has 2^16 steps along each axis of the root cell. This grid
+ * contains the grids of patches of levels 0 to 6, so the vertices of these patches are stored
+ * exactly. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -18,7 +19,7 @@
 
 enum { GRID_BITS = 16 };
 
-/* The patches of a file, and those to export. */
+/* The patches of a file, and the patches to export. A patch is the simplified surface of a node. */
 typedef struct choice {
     ebpo_surface table; /* only `patch` and the counts are read */
     uint64_t *child;    /* [patch_count + 1] index of each patch's first child; ascending */
@@ -37,7 +38,8 @@ static ebpo_octcode octcode_of(const choice *c, uint64_t patch)
     return row_of(c, patch)[EBPO_PATCH_OCTCODE];
 }
 
-/* Finds the first child of each patch. Patches ascend by octcode, so their children do too. */
+/* Finds the first child of each patch. Patches ascend by octcode (locational code), so the children
+ * of successive patches also ascend. */
 static ebpo_status find_children(choice *c, ebpo_error *error)
 {
     uint64_t child = 1;
@@ -61,9 +63,9 @@ static bool is_divided(const choice *c, uint64_t patch)
            ebpo_octcode_parent(octcode_of(c, child)) == octcode_of(c, patch);
 }
 
-/* Chooses the coarsest patches with at most this error. Where no patch has so small an error, the
- * finest patch is chosen. Returns the number of triangles of the chosen patches. `replaced`:
- * [patch_count] scratch. */
+/* Chooses the coarsest patches with at most this error. In a region where no patch has so small an
+ * error, the finest patch is chosen. Returns the number of triangles of the chosen patches.
+ * `replaced`: [patch_count] scratch. */
 static uint64_t choose_by_error(choice *c, uint64_t error, uint8_t *replaced)
 {
     uint64_t triangles = 0;
@@ -109,7 +111,7 @@ static ebpo_status choose_by_triangles(choice *c, uint64_t most, ebpo_error *err
         for (uint64_t i = 0; i < count; i++)
             errors[i] = row_of(c, i)[EBPO_PATCH_ERROR];
         qsort(errors, count, sizeof *errors, compare_numbers);
-        while (low < high) { /* the greatest error selects the root alone */
+        while (low < high) { /* with the greatest error, only the root's patch is chosen */
             uint64_t middle = low + (high - low) / 2;
             if (choose_by_error(c, errors[middle], replaced) <= most)
                 high = middle;

@@ -1,14 +1,15 @@
 /* Exports the simplified surface, and the model's faces, as 3D Tiles 1.1.
  *
- * Each patch is a tile. The patches of the node's children are the tile's children; viewers replace
- * the tile by them (REPLACE). If the mesh is exported, a patch without patches below has one child:
- * a tile with the model's faces that the patch simplifies. Tiles are written one after the other,
- * and then tileset.json. The table of patches, the bounds of all tiles, and one tile are in memory.
- * A tile's geometricError is the greatest of the certified errors of this tile and the tiles below,
- * because readers expect that children have no greater error.
+ * Each patch is a tile. The patches of the node's children are the tile's children. Viewers replace
+ * the tile by its children (REPLACE). If the mesh is exported, a patch without patches below has
+ * one child: a tile with the model's faces that the patch simplifies. Tiles are written one after
+ * the other, and then tileset.json. The table of patches, the bounds of all tiles, and one tile are
+ * in memory. A tile's geometricError is the greatest of the certified errors of this tile and the
+ * tiles below, because readers expect that children have no greater error.
  *
  * Coordinates are relative to an origin, which is the translation of the root tile. In glTF, y
- * points upwards, and readers of 3D Tiles turn y to z. So the glTF nodes of tiles turn z to y.
+ * points upwards, and readers of 3D Tiles turn y to z. So the glTF nodes of tiles first turn z to
+ * y.
  *
  * Source: OGC, "3D Tiles Specification 1.1". */
 #include "core/strict_fp.h"
@@ -38,9 +39,10 @@ static const char TILESET[] = "tileset.json";
 
 /* A tile; all lengths are in the model's unit. */
 typedef struct tile {
-    double min[3], max[3]; /* bounds of the content, and (include_children) of the tiles below */
-    double error;          /* geometricError */
-    uint64_t number;       /* number of the tile's file */
+    /* bounds of the content; include_children extends them to the tiles below */
+    double min[3], max[3];
+    double error;    /* geometricError */
+    uint64_t number; /* number of the tile's file */
 } tile;
 
 typedef struct tiler {
@@ -180,7 +182,8 @@ static void include_tile(tile *upper, const tile *below)
     upper->error = fmax(upper->error, below->error);
 }
 
-/* Extends the bounds and the errors of tiles by those of the tiles below. */
+/* Extends the bounds of each tile to the bounds of the tiles below, and raises its error to the
+ * greatest of their errors. */
 static void include_children(tiler *t)
 {
     for (uint64_t i = t->table.count; i-- > 0;) {

@@ -1,8 +1,8 @@
 /* Cuts an envelope into fragments, for bounds of the distance by which the envelope extends beyond
  * the model. Fragments are convex polytopes in the cell coordinates of a node; together they cover
- * the envelope. The unit of length is a power of two near the cell's longest side, so that no
- * length overflows or underflows. At every cut, both parts extend slightly beyond the cut, so that
- * no point is lost within the tolerances of ebpo_polytope_clip.
+ * the envelope. The unit of length is a power of two near the longest side of the node's cell, so
+ * that no length overflows or underflows. At every cut, both parts extend slightly beyond the cut,
+ * so that no point is lost within the tolerances of ebpo_polytope_clip.
  *
  * Fragments are first cut along the cells of the model's tree, down to leaves. Within leaves, they
  * are cut along the planes of faces, or halved, until each fragment is inside the solid, outside
@@ -18,8 +18,8 @@
 #include "format/reader.h"
 #include "geometry/distance.h"
 
-/* Factor by which a computed root of a sum of three squares is multiplied; the product is an upper
- * bound despite rounding. */
+/* A computed root of a sum of three squares, multiplied by this factor, is an upper bound despite
+ * rounding. */
 static const double rounding_factor = 1 + 0x1p-40;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell)
@@ -145,12 +145,13 @@ static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo
     ebpo_polytope_copy(out, p);
     n[axis] = side ? -1 : 1;
     if (!high_is_thin && !low_is_thin)
-        /* if clipping still fails, the part stays larger than necessary */
+        /* if clipping fails, the part stays larger than necessary */
         (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG);
     return true;
 }
 
-/* Computes the part of `p` with n . x <= d, |n| = 1. Returns false when clipping fails. */
+/* Computes the part of `p` with n . x <= d. The length of n is 1. Returns false when clipping
+ * fails. */
 static bool cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
@@ -332,10 +333,10 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Raises the upper bound of the search to the bound of a fragment in a black cell. The fragment is
- * inside the solid, except for thin parts of neighbouring cells that stayed with it. Parts within
- * EBPO_CUT_SLACK of the cell are ignored, because fragments of the neighbouring cells cover them,
- * too. */
+/* Raises the upper bound of the search to the bound of a fragment in a black cell, if this bound is
+ * greater. The fragment is inside the solid, except for thin parts of neighbouring cells that
+ * stayed with it. Parts within EBPO_CUT_SLACK of the cell are ignored, because fragments of the
+ * neighbouring cells cover them, too. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
@@ -437,8 +438,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     return true;
 }
 
-/* Cuts a fragment along a plane, with |n| = 1, and pushes both parts. Sets *done to false if
- * clipping fails; then no part is pushed. */
+/* Cuts a fragment along the plane n . x = d, and pushes both parts. The length of n is 1. Sets
+ * *done to false if clipping fails; then no part is pushed. */
 static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
                              ebpo_fragment_kind kind, const double n[3], double d, bool *done)
 {
@@ -458,8 +459,8 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
 /* Cuts a fragment that is outside the solid. The cut is along a side of the prism that stands
  * perpendicularly on the face nearest to the fragment's centre. Within this prism, the distance to
  * the face's plane is the distance to the face, so no small fragments are needed where the surface
- * is flat. If the fragment is much larger than the face, or no side of the prism cuts it, it is
- * halved. */
+ * is flat. If the fragment is much larger than the face, or no side of the prism cuts the fragment,
+ * the fragment is halved. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
                              const ebpo_fragment_measure *measure)
 {
@@ -553,14 +554,14 @@ static bool is_flat(const ebpo_bounder *b)
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* Cuts a fragment within a leaf of a solid. If the plane of a listed face cuts the fragment, cuts
- * it along this plane. If no such plane cuts the fragment, it is inside or outside the solid,
- * except for thin outermost parts. Then the fragment's bound is computed, or the fragment is cut in
- * another way if its bound is not good enough. */
+/* Cuts a fragment within a leaf of a solid. If the plane of a listed face cuts the fragment, the
+ * fragment is cut along this plane. If no such plane cuts the fragment, the fragment is inside or
+ * outside the solid, except for thin outermost parts. Then its bound is computed. If this bound is
+ * not good enough, the fragment is cut in another way. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
                             const ebpo_fragment_measure *measure)
 {
-    /* usable: all planes so far are certain, and there are not too many faces */
+    /* usable: all planes so far are certain, and the fragment does not have too many faces */
     bool done = false, usable = fragment->face_count <= CUT_FACES;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < fragment->face_count && usable && !done && status == EBPO_OK; i++) {

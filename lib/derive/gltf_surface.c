@@ -1,7 +1,7 @@
 /* Writes a surface as GLB. Vertices are numbered in the order of their first use, and vertices
- * without triangles are omitted. Each array is a buffer view. The view also states the place of the
- * decoded array in a second buffer, which is not stored. Sources: Khronos, "glTF 2.0 Specification"
- * and the extensions KHR_mesh_quantization and EXT_meshopt_compression. */
+ * without triangles are omitted. Each array is a buffer view. The view also states the position of
+ * the decoded array in a second buffer, which is not stored in the file. Sources: Khronos, "glTF
+ * 2.0 Specification" and the extensions KHR_mesh_quantization and EXT_meshopt_compression. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -26,7 +26,7 @@ enum { POSITIONS, NORMALS, COLOURS, INDICES, ARRAYS };
 enum { STEPS_MAX = 65535, SHORT_VERTICES_MAX = 65535 };
 
 typedef struct gltf_array {
-    uint64_t count;  /* of elements; 0: the array is absent */
+    uint64_t count;  /* number of elements; 0: the array is absent */
     unsigned stride; /* bytes of an element */
     uint8_t *encoded;
     uint64_t bytes;                /* number of encoded bytes */
@@ -171,7 +171,7 @@ static void fill_colours(const gltf_writer *w, uint8_t *to)
 
 /* --- encoding --- */
 
-/* Gives an array its places after the previous arrays in both buffers. */
+/* Sets the positions of an array in both buffers, after the previous arrays. */
 static void place_array(gltf_writer *w, gltf_array *a)
 {
     a->first = w->bytes;
@@ -235,7 +235,7 @@ static void print_matrix(FILE *f, const gltf_writer *w)
         scale[k] = w->step[k];
         at[k] = w->low[k];
     }
-    /* stored by columns; `rotates` turns (x, y, z) to (x, z, -y) */
+    /* stored column by column; `rotates`: (x, y, z) becomes (x, z, -y) */
     m[0] = scale[0];
     m[w->surface->rotates ? 6 : 5] = w->surface->rotates ? -scale[1] : scale[1];
     m[w->surface->rotates ? 9 : 10] = scale[2];

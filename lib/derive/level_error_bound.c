@@ -1,6 +1,6 @@
 /* Measures the error of a level: bounds of the largest distance by which its envelopes extend
- * beyond the model, and the mean distance, from samples. The level may be that of a subset;
- * distances are always measured to the whole model.
+ * beyond the model, and the mean distance, from samples. The level may be a level of a subset.
+ * Distances are always measured to the whole model.
  *
  * A level's bounds are the largest bounds of its nodes. A short search for each node
  * (error_bound.h) shows for most nodes that they do not have the largest distance. The other nodes
@@ -43,7 +43,7 @@ typedef struct sampling {
     unsigned threads;
 } sampling;
 
-/* Returns random number `index` of the sequence that `seed` selects; it is between 0 and 1. */
+/* Returns random number `index`, between 0 and 1, of the sequence that `seed` selects. */
 static double random_unit(uint64_t seed, uint64_t index)
 {
     uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + index + 1;
@@ -481,7 +481,7 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
     free(s->order);
     s->order = NULL;
     s->count = 0;
-    s->first = 0; /* not 0 after the search in a finer level */
+    s->first = 0; /* a search in a finer level may have changed it */
     ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
@@ -536,8 +536,8 @@ static ebpo_status make_bounders(survey *s, ebpo_model *model)
 }
 
 /* Returns NULL if the file may be the model's file or a subset of it. Otherwise returns the name of
- * the properties that differ. Digests alone cannot decide: a subset of a subset names the original
- * file only, and a subset with all nodes names no file. */
+ * the properties that differ. Digests alone cannot decide: a subset of a subset contains only the
+ * digest of the original file, and a subset with all nodes contains no digest of another file. */
 static const char *find_difference(const ebpo_info *info, const ebpo_info *model)
 {
     if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 ||

@@ -236,8 +236,9 @@ static bool load_listed_faces(const job *j, scratch *s)
 
 /* --- a node's points --- */
 
-/* Returns the winding number at a node's lowest corner. A gray node has none in the file, so it is
- * taken from the white, black or leaf node below it at this corner. */
+/* Returns the winding number at a node's lowest corner. The file has no winding numbers of gray
+ * nodes, so for a gray node, the function uses the white node, black node or leaf at this corner.
+ */
 static int32_t lowest_winding(const job *j, ebpo_node node)
 {
     while (node.type == EBPO_GRAY)

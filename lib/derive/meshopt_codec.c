@@ -10,12 +10,14 @@
 
 enum {
     ATTRIBUTES_HEADER = 0xa0,
-    GROUP = 16,      /* elements; store_group chooses how one byte of each is stored */
-    BLOCK_MAX = 256, /* elements */
-    BLOCK_BYTES = 8192,
-    TAIL_BYTES = 32
+    /* number of elements of a group; store_group chooses how one byte of each element is stored */
+    GROUP = 16,
+    BLOCK_MAX = 256,    /* maximum number of elements of a block */
+    BLOCK_BYTES = 8192, /* maximum number of bytes of a block's elements */
+    TAIL_BYTES = 32     /* minimum number of bytes of the end, which has the first element */
 };
 
+/* Returns the number of elements of a full block. */
 static uint64_t block_elements(unsigned stride)
 {
     uint64_t n = BLOCK_BYTES / stride & ~(uint64_t)(GROUP - 1);
@@ -29,8 +31,9 @@ uint64_t ebpo_meshopt_attributes_bound(uint64_t count, unsigned stride)
            (stride < TAIL_BYTES ? TAIL_BYTES : stride);
 }
 
-/* Stores 16 differences in `bits` bits each. The largest value of these bits means that the
- * difference is at least this value and follows as a byte. */
+/* Stores 16 differences in `bits` bits each, followed by bytes. If a difference is at least the
+ * largest value of these bits, this value is stored for it, and the difference itself is one of the
+ * bytes. */
 static uint8_t *pack_group(const uint8_t *difference, unsigned bits, uint8_t *out)
 {
     unsigned each = 8 / bits;
@@ -47,7 +50,8 @@ static uint8_t *pack_group(const uint8_t *difference, unsigned bits, uint8_t *ou
     return out;
 }
 
-/* Stores a group in the shortest of the four ways, and sets *way to its number. */
+/* Stores a group in the shortest of four ways, and sets *way to the number of this way. 0: all
+ * differences are 0, nothing is stored; 1: 2 bits each; 2: 4 bits each; 3: a byte each. */
 static uint8_t *store_group(const uint8_t *difference, unsigned *way, uint8_t *out)
 {
     unsigned zeros = 0, large2 = 0, large4 = 0;
@@ -67,7 +71,7 @@ static uint8_t *store_group(const uint8_t *difference, unsigned *way, uint8_t *o
 }
 
 /* Stores one byte of each element of a block, as its difference from the same byte of the previous
- * element. last: this byte of the element before the block. */
+ * element. `last`: this byte in the element before the block. */
 static uint8_t *store_byte(const uint8_t *elements, uint64_t count, unsigned stride, uint8_t last,
                            uint8_t *out)
 {
@@ -113,23 +117,25 @@ uint64_t ebpo_meshopt_attributes(const uint8_t *elements, uint64_t count, unsign
 
 enum {
     TRIANGLES_HEADER = 0xe1,
-    RECENT = 16,      /* entries of both lists */
+    RECENT = 16,      /* number of entries of the list of edges, and of the list of vertices */
     EDGES_USED = 15,  /* a code can name one of the latest 15 edges */
-    BESIDE_EDGE = 12, /* triangle at such an edge: a code can name recent vertices 1 to 12 */
-    BESIDE_NONE = 14, /* triangle without such an edge: recent vertices 0 to 13 */
-    CODE_NEW = 0,
-    CODE_BEFORE = 13,
-    CODE_AFTER = 14,
-    CODE_OTHER = 15,
-    TABLE_BYTES = 16,
-    NUMBER_MAX = 5 /* bytes */
+    BESIDE_EDGE = 12, /* for a triangle at a recent edge, a code can name recent vertices 1 to 12 */
+    BESIDE_NONE = 14, /* for other triangles, a code can name recent vertices 0 to 13 */
+    /* codes of a vertex that is not named as a recent vertex */
+    CODE_NEW = 0,     /* the next vertex that was not used */
+    CODE_BEFORE = 13, /* the vertex before triangle_encoder.last */
+    CODE_AFTER = 14,  /* the vertex after triangle_encoder.last */
+    CODE_OTHER = 15,  /* any other vertex, stored by store_vertex */
+    TABLE_BYTES = 16, /* size of the table of codes at the end */
+    NUMBER_MAX = 5    /* maximum number of bytes that store_vertex writes */
 };
 
 typedef struct triangle_encoder {
     uint32_t edge[RECENT][2], vertex[RECENT];
-    unsigned edges, vertices; /* positions of the next entries */
-    uint32_t next;            /* first vertex that was not used */
-    uint32_t last;            /* vertex last stored by store_vertex, CODE_BEFORE or CODE_AFTER */
+    /* index of the next entry in each list; the oldest entry is overwritten */
+    unsigned edges, vertices;
+    uint32_t next; /* first vertex that was not used */
+    uint32_t last; /* vertex last stored by store_vertex, CODE_BEFORE or CODE_AFTER */
     uint8_t *data;
 } triangle_encoder;
 
@@ -183,6 +189,8 @@ static void store_vertex(triangle_encoder *e, uint32_t v)
     e->last = v;
 }
 
+/* Encodes the triangle (a, b, c) at the recent edge from a to b, which has number `edge`. Returns
+ * the triangle's code. */
 static uint8_t encode_at_edge(triangle_encoder *e, unsigned edge, uint32_t a, uint32_t b,
                               uint32_t c)
 {
@@ -215,6 +223,7 @@ static unsigned code_of(triangle_encoder *e, uint32_t v)
     return recent < BESIDE_NONE ? recent + 1 : CODE_OTHER;
 }
 
+/* Encodes a triangle without a recent edge; returns the triangle's code. */
 static uint8_t encode_apart(triangle_encoder *e, uint32_t a, uint32_t b, uint32_t c)
 {
     uint8_t code = 0xff;
@@ -224,11 +233,11 @@ static uint8_t encode_apart(triangle_encoder *e, uint32_t a, uint32_t b, uint32_
     }
     unsigned b_code = code_of(e, b), c_code = code_of(e, c);
     if (code == 0xfe && !b_code && !c_code) {
-        code = 0xf0; /* the first entry of the table: all three are new */
+        code = 0xf0; /* the first entry of the table: all three vertices are new */
     } else {
-        /* This byte is never 0, which would tell the decoder to restart its vertex numbers. It
-         * would be 0 only if b and c were new and a were not, but triangles are rotated so that a
-         * is new if b or c is. */
+        /* This byte is never 0. A byte 0 would make the decoder restart its vertex numbers. The
+         * byte would be 0 only if b and c were new and a were not new. But triangles are rotated so
+         * that a is new if b or c is new. */
         *e->data++ = (uint8_t)(b_code << 4 | c_code);
     }
     if (code == 0xff)
@@ -257,7 +266,7 @@ uint64_t ebpo_meshopt_triangles(const uint32_t *triangles, uint64_t count, uint8
     for (uint64_t i = 0; i < count; i++) {
         const uint32_t *t = triangles + 3 * i;
         unsigned first, edge = find_edge(&e, t, &first);
-        if (edge == EDGES_USED) /* the first corner is new, if one is */
+        if (edge == EDGES_USED) /* if a corner is a new vertex, it becomes the first corner */
             first = t[1] == e.next ? 1 : t[2] == e.next ? 2 : 0;
         if (edge == EDGES_USED && t[0] == e.next)
             first = 0;

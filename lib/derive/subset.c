@@ -42,8 +42,8 @@ typedef struct counting {
     const ebpo_subset_options *options;
     ebpo_box box;
     ebpo_chunks *top; /* cache of the chunks that are read to find subtrees */
-    /* a second cache, which has no chunks of the subtrees, so that all of these chunks are counted
-     */
+    /* a second cache, which is never used for reading, so that no chunk of a subtree is in memory
+     * and all of them are counted */
     ebpo_chunks *subtree_chunks;
     ebpo_hints hints; /* collects the chunks that are needed, and counts their bytes */
     uint32_t needs;   /* the data that the subset needs (EBPO_NEEDS_...) */
@@ -156,8 +156,8 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
 }
 
 /* Checks that the box intersects the root cell. If the file is itself a subset for a box, also
- * checks that the two boxes intersect, because the file has nothing outside its box. Sets the kept
- * box. */
+ * checks that the two boxes intersect, because the file has nothing outside its box. Sets kept_box
+ * of the subset's info. */
 static ebpo_status resolve_box(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
@@ -226,8 +226,9 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     return resolve_box(c);
 }
 
-/* Sends prefetch hints for whole arrays, so that a remote source fetches them in few requests. Does
- * so only if there is neither a box nor a max_error, because only then are whole arrays read. */
+/* Sends prefetch hints, so that a remote source fetches the data in few requests: for the data that
+ * locate subtrees, if subtrees are read, and for whole arrays. With a box or a max_error, whole
+ * arrays are not read, so no hints for them are sent. */
 static void hint_cut(const ebpo_cutting *c)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -253,9 +254,9 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-/* Lists the patches (of the simplified surface) that are kept: the patches of nodes in the kept
- * levels. With a box, a patch other than the root's is kept only if the cell of its node's parent
- * intersects the box. Returns their number. `kept`: [table->count] false on entry. */
+/* Lists the patches of the simplified surface that are kept, and returns their number. Patches of
+ * nodes in the kept levels are kept. With a box, a patch other than the root's is kept only if the
+ * cell of its node's parent intersects the box. `kept`: [table->count] false on entry. */
 static uint64_t list_patches(const ebpo_cutting *c, const ebpo_patch_table *table, bool *kept,
                              uint64_t *list)
 {
@@ -486,8 +487,8 @@ static ebpo_status find_error(fitting *f)
     if (status != EBPO_OK || (may_fit && bytes <= f->options->target_bytes))
         return status;
     status = bracket_size(f, &pruned);
-    /* All trials fit, but still have pruned nodes: envelopes that coincide with the solid are
-     * pruned for any max_error above 0. */
+    /* All trials fit, but even the finest trial has pruned nodes, because envelopes that coincide
+     * with the solid are pruned for any max_error above 0. */
     if (status == EBPO_OK && f->too_large == 0 && pruned && !tried_all)
         return try_error(f, 0, &bytes, &pruned);
     while (status == EBPO_OK && f->too_large > 0 && f->fits > size_precision * f->too_large) {

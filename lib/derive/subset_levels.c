@@ -3,12 +3,13 @@
  *
  * Levels are made from the root downwards. Each level determines the groups (the eight children of
  * a gray node) of the next level that are needed, so only these groups are read. A gray node whose
- * children are omitted becomes a pruned node, and so does a leaf that is omitted. All arrays of a
- * level (ebpo_schema) are copied node by node for the remaining nodes. Faces keep their indices in
- * the source until subset_faces.c gives them new ones. With max_error, all envelopes of a level are
- * tested together (error_bound.h). The volume of a node is that of its envelope: the node's cell,
- * cut by the planes that the file stores for the node and its ancestors. (If the file stores no
- * planes of leaves, ebpo_lod_level derives them, but this file does without them.) */
+ * children are omitted becomes a pruned node. A leaf that is omitted also becomes a pruned node.
+ * All arrays of a level (ebpo_schema) are copied node by node for the remaining nodes. Faces keep
+ * their indices in the source until subset_faces.c gives them new indices. With max_error, all
+ * envelopes of a level are tested together (error_bound.h). The volume of a node is the volume of
+ * its envelope: the node's cell, cut by the planes that the file stores for the node and its
+ * ancestors. (If the file stores no planes of leaves, ebpo_lod_level derives planes of leaves. The
+ * volumes here are computed without derived planes.) */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -60,8 +61,9 @@ typedef struct kept_nodes {
         kept_list list[EBPO_LEVEL_ARRAYS];
         unsigned columns, counts, lists; /* lengths of the three arrays */
     } of_type[4];
-    uint64_t next[4];           /* for each type: rank in `from` of the next node to copy or omit */
-    uint64_t read[EBPO_COUNTS]; /* for each kind of counts: the first item of the next node */
+    uint64_t next[4]; /* for each type: rank in `from` of the next node to copy or omit */
+    /* for each kind of items: index of the first item of the next node */
+    uint64_t read[EBPO_COUNTS];
 } kept_nodes;
 
 /* Returns the kind of arrays with one value for each node of a type. */
@@ -74,7 +76,8 @@ static ebpo_per per_of(ebpo_node_type type)
     return per[type];
 }
 
-/* Returns the number of values for which an array of `to` needs space; see kept_begin. */
+/* Returns the number of values for which an array of the result's level needs space; see
+ * kept_begin. */
 static uint64_t capacity_of(const ebpo_level *from, ebpo_per per, const uint64_t more[4])
 {
     int type = ebpo_schema_node_type(per);
@@ -355,7 +358,7 @@ static void add_child(descent *d, ebpo_cell cell, uint64_t group)
 }
 
 /* Returns true if the envelope of the next gray node or leaf is within max_error of the model. Must
- * be called once for each gray node and leaf, in their order. */
+ * be called exactly once for each gray node and leaf, in stored order. */
 static bool is_close_enough(descent *d)
 {
     return d->tolerance_nodes && d->tolerance_nodes[d->next_tolerance_node++].enough;
@@ -448,7 +451,7 @@ static void copy_group(descent *d, uint64_t group, uint16_t types)
     }
 }
 
-/* --- the decision which envelopes of a level are close enough --- */
+/* --- deciding which envelopes of a level are close enough --- */
 
 /* With max_error, tests the envelopes of those gray nodes and leaves of the level that would
  * otherwise keep their children or stay leaves. */
@@ -583,8 +586,8 @@ static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const u
 }
 
 /* Adds the volumes of the envelopes of the level's next group, and of all groups below it, to the
- * volumes of their levels. `parent` is the envelope of the group's parent; NULL: the group is that
- * of the root. */
+ * volumes of their levels. `parent` is the envelope of the group's parent; NULL: the group contains
+ * the root. */
 static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
 {
     ebpo_tree *tree = m->c->out;

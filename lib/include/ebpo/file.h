@@ -809,8 +809,9 @@ typedef struct ebpo_array_facts {
 #define EBPO_ARRAY_FACTS_INIT EBPO_SIZED(ebpo_array_facts)
 
 /*
- * Describes the n-th array of the file; arrays are in the order of their bytes in the file. Returns
- * false if the file has fewer arrays; `out` is then unchanged.
+ * Describes the n-th array of the file. First come the arrays of the levels, from level 0 on, then
+ * the arrays of the root, then the arrays of attributes. Returns false if the file has fewer
+ * arrays; `out` is then unchanged.
  *
  * Threads: any.
  */
