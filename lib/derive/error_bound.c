@@ -1,4 +1,5 @@
-/* Bounds the distance by which an envelope extends beyond the model.
+/* Bounds the distance by which an envelope extends beyond the model. The envelope of a node is a
+ * convex polyhedron that contains the part of the solid in the node's cell.
  *
  * ebpo_bound_envelope is a branch and bound over fragments (fragments.c), the convex parts into
  * which an envelope is cut. The upper bound of a fragment is computed from the distance of its
@@ -295,8 +296,9 @@ enum { NODE_QUERIES = 4096 };
 
 /* Results of earlier searches for a node. They decide the test for some other values of max_error,
  * because a search for a larger max_error never needs more queries (error_bound.h). The upper bound
- * that an earlier search found is not kept: a search with this bound as max_error might use up its
- * queries first and fail, and the result of a test must not depend on earlier calls. */
+ * that an earlier search found is not kept, because the result of a test must not depend on earlier
+ * calls. A search with this bound as max_error might use up its queries and fail, while the kept
+ * bound would accept the envelope. */
 typedef struct earlier_results {
     double enough; /* least max_error for which the envelope was accepted; INFINITY: none */
     double failed; /* largest max_error for which it was not accepted; -1: none */

@@ -1,5 +1,7 @@
-/* Declares the search for bounds of an envelope's error, the distance by which the envelope extends
- * beyond the model, and the tests of envelopes against a limit of this distance (max_error). */
+/* Declares the search for bounds of an envelope's error, and the tests of envelopes against a limit
+ * of the error (max_error). The error is the distance by which an envelope extends beyond the
+ * model. The envelope of a node is a convex polyhedron that contains the part of the solid in the
+ * node's cell. */
 #ifndef EBPO_DERIVE_ERROR_BOUND_H
 #define EBPO_DERIVE_ERROR_BOUND_H
 

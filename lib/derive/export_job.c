@@ -1,7 +1,8 @@
 /* Reads the data that all export formats share. A block is a level with its nodes and colours, or
  * the mesh with its source indices and colours. The functions of this file read a block, add the
- * block to the report, make columns (arrays of values of the block's nodes, polygons or faces),
- * make float32 coordinates for formats that need them, and check the limits of formats. */
+ * block to the report, and make columns (arrays of values of the block's nodes, polygons or faces).
+ * They also make float32 coordinates for formats that need them, and check the limits of formats.
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

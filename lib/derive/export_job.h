@@ -120,8 +120,8 @@ void ebpo_json_numbers(FILE *file, const char *before, const double *x, int coun
 /* Sets 16-bit linear values for the 256 values of sRGB. */
 void ebpo_linear_colours(uint16_t linear[256]);
 
-/* Returns the point that becomes (0, 0, 0) in files with float32 coordinates: (0, 0, 0), or the
- * middle of the root cell, rounded to float32, if the model is far from zero. */
+/* Returns the point that becomes (0, 0, 0) in files with float32 coordinates. If the model is far
+ * from zero, it is the middle of the root cell, rounded to float32; otherwise it is (0, 0, 0). */
 void ebpo_choose_origin(const ebpo_info *info, double origin[3]);
 
 /* Sets *out to the mesh's vertices minus the origin, as floats [vertex_count][3] to be freed by the

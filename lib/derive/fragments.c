@@ -458,9 +458,9 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
 
 /* Cuts a fragment that is outside the solid. The cut is along a side of the prism that stands
  * perpendicularly on the face nearest to the fragment's centre. Within this prism, the distance to
- * the face's plane is the distance to the face, so no small fragments are needed where the surface
- * is flat. If the fragment is much larger than the face, or no side of the prism cuts the fragment,
- * the fragment is halved. */
+ * the face's plane is the distance to the face, so a flat surface needs no small fragments. If the
+ * fragment is much larger than the face, or no side of the prism cuts the fragment, the fragment is
+ * halved. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
                              const ebpo_fragment_measure *measure)
 {
@@ -508,9 +508,9 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
 /* Returns a bound of the distance from the solid for the points of a fragment whose centre is
  * inside the solid. The planes of the fragment's faces must cut off only thin outermost parts of
  * the fragment. A segment from the centre to a point of the fragment can leave the solid only
- * behind such a plane, and the part of the segment behind the plane is at most as long as the
+ * behind the plane of a face. The part of the segment behind the plane is at most as long as the
  * returned bound. If the fragment extends beyond a cell face of the leaf by more than
- * EBPO_CUT_SLACK, the cell face counts as such a plane, because this leaf does not list the faces
+ * EBPO_CUT_SLACK, the cell face counts as a plane, too, because the leaf does not list the faces
  * behind it. Returns INFINITY if the planes are too uncertain for a bound. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                            const ebpo_fragment_measure *measure)

@@ -1,5 +1,7 @@
-/* Makes subsets. A subset is a smaller file that contains only some levels or parts, or a box, or
- * only nodes down to those whose envelopes are within max_error of the model. This source file
+/* Makes subsets. A subset is a smaller file that contains only some levels or parts, or only the
+ * data in a box. With max_error, a subset omits all nodes below a node whose envelope is within
+ * max_error of the model. The envelope of a node is a convex polyhedron that contains the part of
+ * the solid in the node's cell. This source file
  * - counts the bytes of a file that a subset needs, from headers and tables alone;
  * - resolves the options and makes the subset's tree, with subset_levels.c and subset_faces.c;
  * - searches for the smallest max_error whose subset fits a target size;
@@ -477,9 +479,9 @@ static ebpo_status find_error(fitting *f)
 {
     uint64_t bytes = 0;
     bool pruned = false;
-    /* The subset with all nodes (max_error 0) is tried first, but only if the target is at least a
-     * quarter of the file's size, because this subset would hardly fit a smaller target. With
-     * choose_parts, the caller has already tried this subset. */
+    /* The subset with all nodes (max_error 0) is tried first if the target is at least a quarter of
+     * the file's size. It would hardly fit a smaller target. With choose_parts, the caller has
+     * already tried this subset. */
     bool may_fit =
              !f->options->choose_parts && f->options->target_bytes >= f->file->info.file_bytes / 4,
          tried_all = f->options->choose_parts || may_fit;

@@ -1,9 +1,9 @@
-/* Copies the faces, vertices, maps and attributes of a subset, with new indices. The order is that
- * of the specification: by a depth-first walk through the remaining leaves. The arrays that map old
- * indices to new indices have an entry for each face or vertex of the original file. For a small
- * subset, these arrays still take little memory. Pages that are never written take no memory, and
- * few pages are written, because faces that are close in space have close indices. Source:
- * format-spec/README.md, section 7. */
+/* Copies the faces, vertices, maps and attributes of a subset, with new indices. As the
+ * specification requires, the new indices are given in a depth-first walk through the remaining
+ * leaves. The arrays that map old indices to new indices have an entry for each face or vertex of
+ * the original file. For a small subset, these arrays still take little memory. Pages that are
+ * never written take no memory, and few pages are written, because faces that are close in space
+ * have close indices. Source: format-spec/README.md, section 7. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -50,7 +50,7 @@ static int compare_indices(const void *a, const void *b)
  * the earlier leaves that list a reference, the reference becomes a new face of this leaf. These
  * former references get the first new indices of the leaf. The faces that were new faces of the
  * leaf in the original file get the next indices. Both sets keep the order of their old indices.
- * All other references stay references; their new indices are written over the old ones. */
+ * All other references stay references; their new indices are written over the old indices. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];

@@ -1,6 +1,6 @@
 /* Reads, checks and encodes the border of a surface: closed loops of points with weights. The file
  * stores the coordinates of the points, coded like the vertices of the mesh. It does not store
- * indices of vertices, for two reasons: the vertices of a subset have other indices, and a reader
+ * indices of vertices, for two reasons. The vertices of a subset have other indices, and a reader
  * needs the points of all loops at once, without the mesh. Source: format-spec/border.md. */
 #include <math.h>
 #include <stdlib.h>

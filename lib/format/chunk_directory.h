@@ -11,8 +11,8 @@
 #include "format/schema.h"
 #include "hdf5_read/chunk.h"
 
-/* Indices of all arrays that a file can have: first the arrays of the levels, then those of the
- * root, then attributes. Ascending indices have ascending numbers in the format
+/* Indices of all arrays that a file can have: first the arrays of the levels, then the arrays of
+ * the root, then the arrays of attributes. Ascending indices have ascending numbers in the format
  * (ebpo_array_list_number). */
 enum {
     EBPO_ARRAYS_OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,

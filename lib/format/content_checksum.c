@@ -55,9 +55,9 @@ static uint64_t encode_zigzag(uint64_t value, unsigned size)
 }
 
 /* Recodes the first row of a chunk of differences as in a file without subtrees, and writes it to
- * `joined`. `continues`: true if this chunk and the previous one belong to one larger chunk of that
- * file; the row is then the difference from the last row of the previous chunk. Keeps the values of
- * this chunk's last row in digest->last. */
+ * `joined`. `continues`: true if that file would have this chunk and the previous chunk in one
+ * larger chunk. The row is then the difference from the last row of the previous chunk. Keeps the
+ * values of this chunk's last row in digest->last. */
 static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool continues,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {

@@ -368,10 +368,10 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
 
 /* --- chunks of a group that are not in memory --- */
 
-/* Adds to `keys` the missing chunks that are needed to read the counts of the items
- * [item, item + items), and to sum the counts before `item`: the preceding row of the array `index`
- * (or of the table of subtrees), and the array `counts` from this row on. Returns true if chunks
- * are missing. */
+/* Adds to `keys` the missing chunks that are needed to read the counts of the items [item, item +
+ * items), and to sum the counts before `item`. These chunks contain the preceding row of the array
+ * `index` (or of the table of subtrees), and the array `counts` from this row on. Returns true if
+ * chunks are missing. */
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {

@@ -1,9 +1,9 @@
 /* Opens a file: reads the header, and checks that every array is present in the shape that the
  * counts in the header require. head_facts.c checks each count before memory of this size is
  * allocated. The decoded size of the arrays is limited relative to the file size. The second part
- * opens files that other programs have rewritten with another HDF5 layout. libhdf5 copies such a
- * file in a separate process with limits of memory, time and bytes written. The copy is opened like
- * any other file. Source: format-spec/README.md, sections 4 and 5; docs/develop/threats.md. */
+ * opens files that other programs have rewritten with another HDF5 layout. In a separate process,
+ * libhdf5 copies such a file, with limits of memory, time and bytes written. The copy is opened
+ * like any other file. Source: format-spec/README.md, sections 4 and 5; docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>

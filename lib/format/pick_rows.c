@@ -587,8 +587,8 @@ static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_att
 }
 
 /* Computes the file indices of the items of all selected lists. before[i]: begin of selected list i
- * in the file. a->ends[i]: its end in the file, which is replaced by its end among the selected
- * items. */
+ * in the file. a->ends[i]: end of this list in the file; the function replaces it by the end of the
+ * list among the selected items. */
 static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
                                 const uint64_t *before, uint32_t **items)
 {

@@ -1,7 +1,7 @@
 /* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees,
  * /subtrees/counts, which has a row of counts for each subtree. It computes the sums of all counts
- * before a subtree: from the sums in /subtrees/index, which has a row for each chunk of the table,
- * and from the rows since this chunk's first row. It caches recently used rows.
+ * before a subtree. /subtrees/index has a row of sums for each chunk of the table; the rows of the
+ * chunk before the subtree are added to this row. It caches recently used rows.
  *
  * The second part computes ranks: the numbers of planes, faces and nodes of each type before a
  * node. In levels below the subtrees' roots, counting begins at the row of the node's subtree. In
@@ -553,9 +553,9 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
 /* Checks column EBPO_S_ENDS of a row. The *end of the new faces* is one past the last new face of
  * the leaves of the level so far. The column has the end after the subtree's leaves, minus the end
  * before these leaves. The column must be the sum of leaf_new and leaf_skip over these leaves.
- * leaf_new is the number of new faces of a leaf. leaf_skip is the number of new faces of other
- * levels' leaves between the previous leaf of the level and the leaf. Also checks that the new
- * faces of these leaves are owned faces of the subtree. */
+ * leaf_new is the number of new faces of a leaf. leaf_skip of a leaf is the number of new faces
+ * that leaves of other levels have between the previous leaf of the level and this leaf. Also
+ * checks that the new faces of these leaves are owned faces of the subtree. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {

@@ -187,9 +187,8 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
 
 /* Writes all headers and the first chunk. The headers are one metadata block of `head_bytes` bytes.
  * While this block is the last block of the file, HDF5 enlarges the block instead of using its free
- * space. So the first chunk is written early, before the attributes of the first array: it is
- * stored after the block, which then cannot grow, and all later headers use the block's free space.
- */
+ * space. So the first chunk is written early, before the attributes of the first array. It is
+ * stored after the block. The block then cannot grow, and all later headers use its free space. */
 static ebpo_status write_headers(file_headers *h, const char *path, const char *shown,
                                  uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {

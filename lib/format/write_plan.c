@@ -371,8 +371,8 @@ static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t r
 }
 
 /* Encodes rows of leaf_refs. A leaf's references are stored from the last to the first. A reference
- * is stored as the number of faces between it and the next greater reference of the leaf; the last
- * reference, as the number of faces between it and the leaf's first new face. */
+ * is stored as the number of faces between it and the next greater reference of the leaf. For the
+ * last reference, the leaf's first new face takes the place of the next greater reference. */
 static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uint64_t row,
                         uint64_t rows, uint8_t *encoded)
 {
@@ -468,8 +468,9 @@ static bool texts_ok(const ebpo_info *info)
 }
 
 /* Returns true if faces are to be stored as gates (hdf5_read/face_gates.h). By default, faces are
- * stored as gates if the tree was read from a file with gates (`tree_has_gates`) and the new
- * file is compressed, because gates contain many zero bytes. */
+ * stored as gates if the tree was read from a file with gates (`tree_has_gates`) and the new file
+ * is compressed. Without compression, gates take more space, because they contain many zero bytes.
+ */
 static bool gates_wanted(const ebpo_info *info, bool tree_has_gates, ebpo_face_coding coding)
 {
     bool by_default = tree_has_gates && info->codec != EBPO_CODEC_NONE;

@@ -71,7 +71,7 @@
  *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
  *
  * From version 1.0 on, a program that uses these macros runs with every later library of the same
- * major version: members that the program's structs lack keep their default values, or are not
+ * major version. Members that the program's structs lack have their default values, or are not
  * filled in. The program also runs with an earlier library, unless the program sets a member that
  * the earlier library does not know (EBPO_E_UNSUPPORTED). A wrong struct_size is EBPO_E_ARGUMENT.
  *

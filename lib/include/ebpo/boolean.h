@@ -94,9 +94,9 @@ typedef struct ebpo_boolean ebpo_boolean;
  * Several nodes may refer to the same node or operand. Both arrays are copied; the models must
  * outlive the expression.
  *
- * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node, an operation is not valid,
- * a complement has no box, a box or plane is not valid, or a pose is not valid (ebpo_pose_check).
- * EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
+ * EBPO_E_ARGUMENT: an index is out of range, or a node refers to a node that is not before it; an
+ * operation, box, plane or pose (ebpo_pose_check) is not valid; or there is a complement, but no
+ * box. EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
  * surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or
  * the number of the operand (from 1 on) and its file.
  *
@@ -129,8 +129,8 @@ typedef struct ebpo_boolean_result {
 
     /*
      * 1: `where` is certain; EBPO_ON then means that the point is a boundary point of the result.
-     * 0, which is possible only with EBPO_ON: the point may or may not be a boundary point, because
-     * faces in different planes intersect at the point, as on edges and at vertices.
+     * 0: the point may or may not be a boundary point. This is possible only with EBPO_ON, if faces
+     * in different planes intersect at the point, as on edges and at vertices.
      */
     int32_t certain;
 } ebpo_boolean_result;
@@ -317,9 +317,9 @@ typedef struct ebpo_boolean_mesh_options {
     bool doubles;
 
     /*
-     * True: each face of the mesh has the attributes `operand` (uint8) and `operand_face` (uint32):
-     * the index of the operand from which the face comes, and the source index of the face of this
-     * operand.
+     * True: each face of the mesh has the attributes `operand` (uint8) and `operand_face` (uint32).
+     * `operand` is the index of the operand from which the face comes. `operand_face` is the source
+     * index of the operand's face.
      */
     bool origins;
 
@@ -327,13 +327,13 @@ typedef struct ebpo_boolean_mesh_options {
     bool volume;
 
     /*
-     * True: the mesh omits the faces of operand 0 that are unchanged in the result. Its attribute
-     * `removed` (columns `first` and `count`) has the ranges of the faces of operand 0, in the
-     * order of its file, that are not faces of the result; ebpo_mesh_write_ply writes `removed` as
-     * an element. The mesh and the faces of operand 0 outside these ranges together are the result.
-     * Faces of operand 0 outside the box of the other operands are unchanged, even if they
-     * intersect each other. Only the part of operand 0 in this box is read, and its faces must fit
-     * in memory. `volume` and `attributes` must be false.
+     * True: the mesh omits the faces of operand 0 that are unchanged in the result. The attribute
+     * `removed` (columns `first` and `count`) of the mesh has the ranges of the faces of operand 0
+     * that are not faces of the result. Indices are indices in the file of operand 0.
+     * ebpo_mesh_write_ply writes `removed` as an element. The mesh and the faces of operand 0
+     * outside these ranges together are the result. Faces of operand 0 outside the box of the other
+     * operands are unchanged, even if they intersect each other. Only the part of operand 0 in this
+     * box is read, and its faces must fit in memory. `volume` and `attributes` must be false.
      */
     bool changed_only;
 
@@ -421,9 +421,9 @@ typedef struct ebpo_boolean_mesh_report {
  * does not use operand 0, or `volume` or `attributes` is also true. EBPO_E_ABSENT: an operand is a
  * subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices. EBPO_E_FORMAT: an operand is not
  * closed, although its file says that it is a solid. EBPO_E_UNSUPPORTED: `changed_only` is true,
- * and in the box of the other operands, operand 0 has faces that intersect each other or have no
- * area, or has winding numbers other than 0 and 1. Also the errors of reading. On failure `out` is
- * cleared.
+ * and operand 0 has one of these properties in the box of the other operands: faces that intersect
+ * each other, faces without area, or winding numbers other than 0 and 1. Also the errors of
+ * reading. On failure `out` is cleared.
  *
  * Threads: one at a time per expression.
  */
@@ -481,10 +481,10 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
  *
  * The cells stay valid after the expression is freed.
  *
- * EBPO_E_ARGUMENT: the level is not valid. EBPO_E_LIMIT: there are too many cells (`most`); or
+ * EBPO_E_ARGUMENT: the level is not valid. EBPO_E_LIMIT: there are too many cells (`most`). Also if
  * doubles cannot represent the corners of the cells, because the result is too small or too far
- * from the origin; or the result is larger than 2^300 or smaller than 2^-300, so that volumes are
- * out of range. Other errors are those of ebpo_boolean_inside.
+ * from the origin. Also if the result is larger than 2^300 or smaller than 2^-300, so that volumes
+ * are out of range. Other errors are those of ebpo_boolean_inside.
  *
  * Threads: one at a time per expression.
  */
@@ -522,8 +522,8 @@ typedef struct ebpo_boolean_volume {
 
     /*
      * Number of tests of an operand in a cell. by_box: tests that the operand's box decided.
-     * by_nodes: tests that the white and black nodes of its tree decided. by_faces: tests that its
-     * faces decided.
+     * by_nodes: tests that white and black nodes of the operand's tree decided. by_faces: tests
+     * that the operand's faces decided.
      */
     uint64_t by_box, by_nodes, by_faces;
 

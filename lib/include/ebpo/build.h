@@ -10,7 +10,9 @@
  *     ebpo_tree_write(&tree, "bunny.ebpo.h5", NULL, &error);
  *     ebpo_tree_free(&tree);
  *
- * The methods are those of EBP 2017, section 3, and BP 2008, section 3.
+ * The tree is an octree. The envelope of a node is a convex polyhedron, bounded by planes, that
+ * contains the part of the solid in the node's cell. Gray nodes have children, and leaves list
+ * faces. The methods come from the theses EBP 2017, section 3, and BP 2008, section 3 (README.md).
  */
 #ifndef EBPO_BUILD_H
 #define EBPO_BUILD_H
@@ -38,8 +40,8 @@ typedef enum ebpo_selection {
     /*
      * EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET and EBPO_SELECT_RANDOM are from the theses.
      * Candidates are the normals of the faces below the node. These selections go from the leaves
-     * up: each plane of a node is moved outwards until its half-space contains the children's
-     * envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
+     * up. Each plane of a node is moved outwards until its half-space contains the envelopes of the
+     * node's children (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
     EBPO_SELECT_OFFSET = 2,   /* the candidates whose planes need the least move outwards */

@@ -22,8 +22,8 @@
  *
  * A query returns EBPO_E_FORMAT if an opened model does not have the digest of its entry or is not
  * within the entry's box. It also returns EBPO_E_FORMAT if the entry names a file of face indices
- * (`numbers`), and this file does not have one index for each face of the model that distances and
- * rays use.
+ * (`numbers`) with a wrong number of indices. The file must have one index for each face of the
+ * model that distances and rays use.
  */
 #ifndef EBPO_CATALOGUE_H
 #define EBPO_CATALOGUE_H
@@ -394,9 +394,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
- * have the same rounded t, the first of them in the catalogue is used. Exception: if the nearest
- * hits of several models all have t = INFINITY (ebpo_ray_hit), they are compared by their t along a
- * direction that is longer by a power of two. The returned t stays INFINITY.
+ * have the same rounded t, the first of them in the catalogue is used. Exception: the nearest hits
+ * of several models may all have t = INFINITY (ebpo_ray_hit). These hits are compared by their t
+ * along the same direction, multiplied by a power of two. The returned t stays INFINITY.
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -81,8 +81,9 @@ EBPO_API void ebpo_collider_free(ebpo_collider *collider);
  * Checks that a model can be queried at a pose.
  *
  * EBPO_E_ARGUMENT: the matrix is not a rotation, a value is not finite, or the scale or the posed
- * model is out of range. If the matrix is not a rotation, the message gives the difference of its
- * columns from length 1 or from right angles (2^-20 is allowed), or reports a mirror image.
+ * model is out of range. If the matrix is not a rotation, the message reports a mirror image, or
+ * gives the difference of the matrix's columns from length 1 or from right angles. A difference of
+ * 2^-20 is allowed.
  *
  * Threads: any.
  */
@@ -184,9 +185,9 @@ typedef struct ebpo_relation_result {
 } ebpo_relation_result;
 
 /*
- * Computes the exact relation of the models. Usually one pair of crossing faces decides. If no
- * faces intersect, one face of each shell decides. If models only touch, every face that intersects
- * the other model is tested.
+ * Computes the exact relation of the models. Usually one pair of crossing faces is sufficient. If
+ * no faces intersect, one face of each shell (closed set of faces) is sufficient. If models only
+ * touch, every face that intersects the other model is tested.
  *
  * Memory: for a model entirely in memory, the collider takes 4 bytes per face, and about 60 bytes
  * more per face during the call. For a partly loaded model, it takes half a byte per face, and
@@ -304,11 +305,12 @@ typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
 
 /*
  * Joins the segments of ebpo_collide_contacts to lines. Each segment is in one line. The end of one
- * segment is joined to the beginning of another one if both are on the same corner, edge or face of
- * both models, and no third segment begins or ends there. Corners of a model with equal coordinates
- * count as the same corner. Ends that meet by chance at equal coordinates are not joined. Lines are
- * sorted by their first segments, in the order of ebpo_collide_contacts; a closed line begins with
- * its first segment in this order. If A and B are swapped, lines have the reverse direction.
+ * segment is joined to the beginning of another segment under two conditions. In both models, the
+ * two ends are on the same corner, edge or face, and no third segment begins or ends at this point.
+ * Corners of a model with equal coordinates count as the same corner. Ends that meet by chance at
+ * equal coordinates are not joined. Lines are sorted by their first segments, in the order of
+ * ebpo_collide_contacts; a closed line begins with its first segment in this order. If A and B are
+ * swapped, lines have the reverse direction.
  *
  * EBPO_E_LIMIT: `memory` of the collider's options is less than 256 bytes per segment. Other errors
  * are those of ebpo_collide_all.

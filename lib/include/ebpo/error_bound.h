@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Computes the error bound of a level: the distance of its envelopes from the model.
+ * Computes the error bound of a level: the distance by which its envelopes extend beyond the model.
+ * The envelope of a node is a convex polyhedron that contains the part of the solid in the node's
+ * cell.
  */
 #ifndef EBPO_ERROR_BOUND_H
 #define EBPO_ERROR_BOUND_H

@@ -375,8 +375,8 @@ typedef struct ebpo_haptic_tool_result {
  * The tool does not move until all tests are done.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
- * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
- * tested only if they can have come near a face).
+ * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of
+ * points).
  *
  * Threads: one at a time per object.
  */

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Computes the least possible volume of convex envelopes, for comparison.
+ * Computes the least possible volume of convex envelopes, for comparison with the envelopes in a
+ * file. The envelope of a node is a convex polyhedron that contains the part of the solid in the
+ * node's cell.
  */
 #ifndef EBPO_LIMIT_H
 #define EBPO_LIMIT_H
@@ -56,14 +58,14 @@ typedef struct ebpo_limit {
 #define EBPO_LIMIT_INIT EBPO_SIZED(ebpo_limit)
 
 /*
- * Computes, for each cell of a level, the volume of the convex hull of the part of the solid in the
- * cell (for a surface: of the parts of faces in the cell), and sums these volumes. qhull computes
- * the hull from the parts of faces in the cell, and from the corners of the cell that are inside
- * the solid.
+ * For each cell of a level, computes the convex hull of the part of the solid in the cell (for a
+ * surface: of the parts of faces in the cell). Sums the volumes of these hulls. qhull computes the
+ * hull from the parts of faces in the cell, and from the corners of the cell that are inside the
+ * solid.
  *
  * The sum is rounded and not certified, so use it only for comparison. In cubic units of the model,
- * the sum is infinite or 0 if the volume of a cell is out of the range of doubles, that is, with
- * coordinates beyond about 1e102 or below 1e-102.
+ * the sum is infinite or 0 if the volume of a cell is out of the range of doubles. This happens
+ * with coordinates beyond about 1e102 or below 1e-102.
  *
  * The decoded tree, the mesh, and one number for each node of the level are in memory. The cost of
  * a hull depends on the faces in the cell. Memory and time are not limited; `progress` can stop the

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Computes the envelopes of a level as closed polygons.
+ * Computes the envelopes of a level as closed polygons. The envelope of a node is a convex
+ * polyhedron that contains the part of the solid in the node's cell. Gray nodes have children,
+ * leaves list faces, and black nodes are inside the solid (ebpo_node_type in file.h).
  */
 #ifndef EBPO_LOD_H
 #define EBPO_LOD_H

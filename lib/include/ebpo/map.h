@@ -144,9 +144,9 @@ typedef struct ebpo_map_stats {
     double mean, mean_unsigned, rms, standard_deviation;
 
     /*
-     * For each percentage (ebpo_map_percent): the least value v such that at least this percentage
-     * of the finite values are <= v. percentile: of the values. percentile_unsigned: of the
-     * absolute values.
+     * For each percentage (ebpo_map_percent): the least value v with the property that at least
+     * this percentage of the finite values are <= v. percentile: for the values.
+     * percentile_unsigned: for the absolute values.
      */
     double percentile[EBPO_MAP_PERCENTILES], percentile_unsigned[EBPO_MAP_PERCENTILES];
 } ebpo_map_stats;

@@ -164,8 +164,8 @@ typedef struct ebpo_mesh_read_options {
      * 1: also reads attributes, which ebpo_build stores. From PLY files: all properties of
      * vertices, faces and other elements, and comments. From other formats: colours, normals,
      * texture coordinates and names of materials. For PLY and OBJ files, attributes include the
-     * names of texture images to which the file or its material libraries refer, and the digests of
-     * those images that are in the file's folder or below. 0: reads no attributes.
+     * names of the texture images to which the file or its material libraries refer. If an image is
+     * in the file's folder or below, its digest is included, too. 0: reads no attributes.
      */
     uint64_t attributes;
 
@@ -269,12 +269,14 @@ typedef struct ebpo_finding {
 typedef struct ebpo_mesh_report {
     /*
      * True if each edge is used equally often in both directions. Then winding numbers are well
-     * defined, and the mesh is a solid. The theses require more: a closed 2-manifold (see
-     * `manifold`).
+     * defined, and the mesh is a solid. The theses (README.md) require a closed 2-manifold
+     * (`manifold`).
      */
     bool balanced;
 
-    /* True for a closed, consistently oriented 2-manifold (EBP 2017, section 3.1). */
+    /*
+     * True for a closed, consistently oriented 2-manifold (EBP 2017, section 3.1).
+     */
     bool manifold;
 
     /* Edges that are used once. */
@@ -524,7 +526,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  *
  * A shell gets a positive volume, or a negative volume if it is inside an odd number of other
  * shells. Shell A is inside shell B if the least and the greatest vertex of A along each axis are
- * inside B: their exact winding numbers with respect to B are not zero.
+ * inside B. A vertex is inside B if its exact winding number with respect to B is not zero.
  *
  * An open patch is oriented so that most of its faces are unchanged. A patch that cannot be
  * oriented is unchanged. A set of joined patches whose faces cannot alternate around all edges is

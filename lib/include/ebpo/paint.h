@@ -221,8 +221,8 @@ typedef struct ebpo_paint_layer {
     size_t struct_size;
 
     /*
-     * The texts have at most 255, 255, 31 and 4,095 bytes, in this order. The date is "" or valid
-     * for ebpo_is_date. A date that was read from a file may be any text, and may be kept.
+     * Maximum sizes in bytes: title 255, author 255, date 31, description 4,095. The date is "" or
+     * valid for ebpo_is_date. A date that was read from a file may be any text, and may be kept.
      */
     const char *title, *author, *date, *description;
 
@@ -323,8 +323,8 @@ typedef struct ebpo_paint_note {
     size_t struct_size;
 
     /*
-     * The texts have at most 255, 255, 31 and 32,767 bytes, in this order. Other rules are those of
-     * ebpo_paint_layer.
+     * Maximum sizes in bytes: title 255, author 255, date 31, body 32,767. The other rules of
+     * ebpo_paint_layer also apply.
      */
     const char *title, *author, *date, *body;
 

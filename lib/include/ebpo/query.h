@@ -22,7 +22,10 @@
  * coordinates, for all finite doubles. Results do not depend on the compiler, the floating-point
  * environment, the number of threads, the memory budget or the loading mode.
  *
- * Methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 10.
+ * A model is an octree of cells. Gray nodes have children, leaves list faces, white nodes are
+ * outside the solid, and black nodes are inside. The envelope of a node is a convex polyhedron that
+ * contains the part of the solid in the node's cell. Methods: the theses BP 2008, chapter 5, and
+ * EBP 2017, chapter 4 (README.md); format-spec/README.md, section 10.
  */
 #ifndef EBPO_QUERY_H
 #define EBPO_QUERY_H
@@ -73,9 +76,9 @@ typedef struct ebpo_model_options {
     uint64_t memory;
 
     /*
-     * Levels 0 to cut_level stay in memory. The subtrees below this level are loaded on demand; a
-     * subtree is a node with all nodes and faces below it. -1: the level is chosen so that the
-     * budget is met. If everything fits, everything is loaded at once, except for a remote file
+     * Levels 0 to cut_level stay in memory. The subtrees below this level are loaded on demand. A
+     * subtree is a node with all nodes and faces below this node. -1: the level is chosen so that
+     * the budget is met. If everything fits, everything is loaded at once, except for a remote file
      * that has a table of subtrees and is larger than 2 MiB.
      */
     int cut_level;
@@ -110,9 +113,9 @@ typedef struct ebpo_model_options {
      * Such surfaces have an inside, and signed distances, by the generalized winding number w: the
      * sum of the solid angles of all faces, divided by 4 pi. The file's winding rule defines the
      * inside. Nonzero: |w| > threshold. Positive: w > threshold. Evenodd: |w - e| > threshold,
-     * where e is the nearest even integer. Decisions are exact, with one exception: if both sides
-     * of the comparison are equal, or arithmetic with 512 bits cannot decide it, the point counts
-     * as outside, and ebpo_model_stats.ties counts it.
+     * where e is the nearest even integer. Decisions are exact, with one exception. If both sides
+     * of the comparison are equal, or arithmetic with 512 bits cannot decide the comparison, the
+     * point counts as outside. ebpo_model_stats.ties counts such points.
      */
     double threshold;
 } ebpo_model_options;
@@ -384,7 +387,7 @@ enum { EBPO_LEVEL_ALL = -1 };
  * choice.
  */
 typedef enum ebpo_envelopes {
-    EBPO_ENVELOPES_AUTO = 0, /* nodes where the test can avoid loading */
+    EBPO_ENVELOPES_AUTO = 0, /* nodes for which the test can avoid loading */
     EBPO_ENVELOPES_USE = 1,  /* every gray node on the path (EBP 2017, 4.2.1) */
     EBPO_ENVELOPES_SKIP = 2  /* none */
 } ebpo_envelopes;
@@ -557,8 +560,8 @@ typedef struct ebpo_distance_options {
 /* Result of ebpo_distance. Lengths are in the model's unit. */
 typedef struct ebpo_distance_result {
     /*
-     * Distance, correctly rounded. It is negative inside a solid (-0.0 if it underflows), unless
-     * unsigned_distance is true. INFINITY, and `face` is EBPO_NO_FACE: no face is within
+     * Distance, correctly rounded. If unsigned_distance is false, it is negative inside a solid
+     * (-0.0 if it underflows). INFINITY, and `face` is EBPO_NO_FACE: no face is within
      * max_distance. INFINITY, and `face` is an index: the distance is larger than every double.
      * NAN: the distance is not determined, but `lo` and `hi` bound it.
      */
@@ -586,8 +589,8 @@ typedef struct ebpo_distance_result {
 
 /*
  * Computes the distance from a point to the model, and the nearest face (EBP 2017, 4.4). With a
- * level or a deadline the result is `lo` and `hi`; `distance` is then NAN unless `lo` and `hi` are
- * equal.
+ * level or a deadline the result is `lo` and `hi`; `distance` is then NAN, except if `lo` and `hi`
+ * are equal.
  *
  * EBPO_E_ABSENT: the file has no mesh, no level is given, and the mode is not
  * EBPO_DISTANCE_ENVELOPE; or a subset lacks the required data.
@@ -776,8 +779,8 @@ typedef struct ebpo_ray {
 /*
  * Finds the first hit of each of rays[count] as ebpo_ray_first does, into out[count]. For a ray
  * without a hit, t is INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or
- * other rays. If not everything is in memory, the rays are processed along a curve of the points
- * where they enter the model, so that each subtree is loaded only a few times.
+ * other rays. If not everything is in memory, the rays are sorted along a space-filling curve by
+ * the points at which they enter the model, so that each subtree is loaded only a few times.
  *
  * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
  * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
@@ -827,14 +830,14 @@ typedef struct ebpo_sampler ebpo_sampler;
 
 /*
  * Reads the named attributes, and the data to find the values of a face. The memory of a sampler is
- * not part of the budgets of models. It contains the values, the source indices of faces if the
- * file has them (4 bytes per face), and for attributes of vertices the mesh (12 bytes per face, 12
- * or 24 bytes per vertex). The file must stay open as long as the sampler exists.
+ * not part of the budgets of models. It contains the values, and the source indices of faces if the
+ * file has them (4 bytes per face). For attributes of vertices, it also contains the mesh (12 bytes
+ * per face, 12 or 24 bytes per vertex). The file must stay open as long as the sampler exists.
  *
  * names   names separated by commas, such as "quality" or "red,green,blue". A name may begin with
- *         the element, as in "face:red". Without an element, attributes of vertices are preferred
- *         to those of faces. Of several attributes with equal names, the first one in the file is
- *         used. Attributes whose values are lists are not supported.
+ *         the element, as in "face:red". If a name without an element exists for vertices and for
+ *         faces, the attribute of vertices is used. Of several attributes with equal names, the
+ *         first one in the file is used. Attributes whose values are lists are not supported.
  *
  * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
  * EBPO_SAMPLER_MAX names. Other errors are those of reading.
@@ -862,13 +865,13 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
 /*
  * Samples attributes at points on faces. Points and faces are results of distance queries (`point`
  * and `face`) or ray queries (origin + t direction, and `face`). The value of an attribute of faces
- * is the face's value. The value of an attribute of vertices is a mean of the values A, B and C at
- * the corners a, b and c, weighted by the position of the point p. Labels are averaged like all
- * other values.
+ * is the face's value. The value of an attribute of vertices is a weighted mean of the values A, B
+ * and C at the face's corners a, b and c. The weights depend on the position of the point p. Labels
+ * are averaged like all other values.
  *
- * The weights are computed in doubles, without fused operations. The vectors e = b - a, f = c - a
- * and d = p - a are multiplied by one power of two, so that the greatest absolute coordinate of e
- * and f is at least 1 and less than 2. Scalar products add x, y, z in this order.
+ * The weights are computed in doubles, without fused operations. Let e = b - a, f = c - a and d = p
+ * - a. These three vectors are multiplied by one power of two, so that the greatest absolute
+ * coordinate of e and f is at least 1 and less than 2. Scalar products add x, y, z in this order.
  *
  *     D   = (e.e)(f.f) - (e.f)(e.f)
  *     w_b = ((f.f)(d.e) - (e.f)(d.f)) / D, or 0 if negative
@@ -876,8 +879,9 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  *     w_a = 1 - w_b - w_c, or 0 if negative
  *
  * Each weight is divided by the sum of the three weights. If D is at most 2^-900, the face counts
- * as a face without area. The weights are then those of the point nearest to p on the longest of
- * the edges ab, ac, bc (the first of several edges with equal length).
+ * as a face without area. The weights are then the weights of a point on the longest of the edges
+ * ab, ac, bc (the first of several edges with equal length): the point of this edge that is nearest
+ * to p.
  *
  * The value is (w_a A + w_b B) + w_c C, without the terms whose weight is 0. It is clamped to the
  * range of the values in the sum. At a corner, the result is the corner's value. If the three

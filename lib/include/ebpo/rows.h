@@ -21,9 +21,9 @@ extern "C" {
  * rows           [*count][most] doubles; freed by free()
  *
  * EBPO_E_IO: the file cannot be read, or another program has it open for writing. EBPO_E_FORMAT:
- * the file is not an HDF5 file; the dataset does not exist, or has another shape or type (for
- * example complex numbers, or the codes in an array of an .ebpo.h5 file); or its values are in
- * another file. EBPO_E_ABSENT: `dataset` is NULL or "", and the file has no suitable dataset.
+ * the file is not an HDF5 file; the dataset does not exist; its values are in another file; or its
+ * shape or type is not suitable (for example complex numbers, or the codes in an array of an
+ * .ebpo.h5 file). EBPO_E_ABSENT: `dataset` is NULL or "", and the file has no suitable dataset.
  * EBPO_E_LIMIT: the rows would take more than 64 MiB, and more than 1,024 times the file size.
  * EBPO_E_UNSUPPORTED: the library was built without libhdf5.
  *

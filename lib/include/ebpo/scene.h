@@ -461,9 +461,8 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
 /*
  * Broad phase: finds the pairs for which ebpo_scene_pair_rule returns true, and whose boxes
  * (ebpo_scene_instance_box) are at most their clearance apart on each axis. Pairs are in ascending
- * order of a, then b. If ebpo_scene_pair_rule returns true for a pair, and this function does not
- * find the pair, then the two instances are farther apart than their clearance at all times in from
- * .. to.
+ * order of a, then b. If this function does not find a pair for which ebpo_scene_pair_rule returns
+ * true, the two instances are farther apart than their clearance at all times in from .. to.
  *
  * EBPO_E_ARGUMENT: a model is not loaded, a time is not finite, or `from` is after `to`.
  * EBPO_E_LIMIT: more than 2^23 pairs.
@@ -492,7 +491,8 @@ typedef enum ebpo_clash_kind {
 } ebpo_clash_kind;
 
 /*
- * Two instances, a < b, whose faces intersect or are too near, or one of which is inside the other.
+ * Two instances, a < b, that clash: their faces intersect or are too near, or one instance is
+ * inside the other.
  */
 typedef struct ebpo_scene_clash {
     uint64_t a, b;
@@ -512,8 +512,8 @@ typedef struct ebpo_scene_clash {
 
     /*
      * clearance: the clearance that the scene requires for the pair. distance: exact distance
-     * between the faces for EBPO_CLASH_NEAR, and if one instance is inside the other and no faces
-     * intersect; in other cases 0. Both are in the world's unit.
+     * between the faces if `kind` is EBPO_CLASH_NEAR, or if one instance is inside the other and no
+     * faces intersect; in other cases 0. Both are in the world's unit.
      */
     double clearance, distance;
 
@@ -548,7 +548,7 @@ typedef struct ebpo_scene_clash {
     /*
      * Depth of a in b, and of b in a (ebpo_collide_depth), with the tolerance
      * ebpo_scene_clash_options.depth. The bounds are 0 and INFINITY if the depth was not requested,
-     * or if the instance that may contain the other one is a surface.
+     * or if the instance that could contain the other instance is a surface.
      */
     ebpo_value_bounds depth[2];
 } ebpo_scene_clash;
@@ -780,7 +780,7 @@ typedef struct ebpo_scene_least {
 
     /*
      * Bounds of the minimum distance between the faces over all times of the interval. They differ
-     * by at most the tolerance, unless options.max_evaluations was reached, a file lacks data, or
+     * by more than the tolerance only if options.max_evaluations was reached, a file lacks data, or
      * the tolerance is finer than the rounding of coordinates.
      */
     double lo, hi;
@@ -954,7 +954,7 @@ typedef struct ebpo_scene_packed {
     uint64_t bytes, source_bytes, bytes_read;
 
     /*
-     * Error bound of the envelopes where the model was reduced because of target_bytes, in the
+     * Error bound of the envelopes of a model that was reduced because of target_bytes, in the
      * model's unit. 0: the model was not reduced.
      */
     double max_error;

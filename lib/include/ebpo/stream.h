@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * Streams the nodes of a file by levels, coarse to fine.
+ * Streams the nodes of a file by levels, coarse to fine. The envelope of a node is a convex
+ * polyhedron that contains the part of the solid in the node's cell. Gray nodes have children,
+ * leaves list faces, white nodes are outside the solid, and black nodes are inside (ebpo_node_type
+ * in file.h).
  *
  *     ebpo_stream_new(file, NULL, &stream, &error);
  *     while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more)

@@ -8,10 +8,10 @@
  *
  * `file` may be opened by a URL. In this case only the data that is kept is fetched.
  *
- * Some gray nodes of a subset are *pruned*: they have envelopes, but no children
- * (format-spec/README.md, section 7). Results from a subset are never wrong. Where data is missing,
- * queries with a level return EBPO_MAYBE or a wider interval, and exact queries return
- * EBPO_E_ABSENT.
+ * Some gray nodes (nodes with children) of a file are *pruned* in a subset: they keep their
+ * envelopes, but have no children (format-spec/README.md, section 7). Results from a subset are
+ * never wrong. If a query needs missing data, a query with a level returns EBPO_MAYBE or a wider
+ * interval, and an exact query returns EBPO_E_ABSENT.
  */
 #ifndef EBPO_SUBSET_H
 #define EBPO_SUBSET_H
@@ -133,11 +133,11 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * that a larger max_error keeps. With max_error or target_bytes, the whole model is loaded into
  * memory (see ebpo_subset_memory).
  *
- * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
- * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
- * the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a
- * subset. EBPO_E_IO: also if `path` is the path of `file`, and another program has replaced the
- * file since opening. Also the errors of reading (base.h).
+ * EBPO_E_ARGUMENT: the level is not valid; the box has no points; the box does not intersect the
+ * model's root cell, or the box with which `file` itself was made; or target_bytes is too small,
+ * and the message gives the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file
+ * has no mesh or is a subset. EBPO_E_IO: also if `path` is the path of `file`, and another program
+ * has replaced the file since opening. Also the errors of reading (base.h).
  *
  * Threads: any.
  */
@@ -147,8 +147,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(const ebpo_file *file, const char
 
 /*
  * Writes a subset of a tree. First the tree is written to a temporary file beside `path`, as by
- * ebpo_tree_write. Then the result is the same as that of ebpo_subset for the temporary file. The
- * tree is freed, also on failure.
+ * ebpo_tree_write. Then ebpo_subset makes the subset of the temporary file. The tree is freed, also
+ * on failure.
  *
  * Threads: one at a time per tree.
  */

@@ -8,7 +8,7 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Besides the data that is returned, little of the file is read; remote files (http.h) take a few
+ * Little more of the file is read than the returned data; a remote file (http.h) takes a few
  * requests. The octcode (locational code) of a node is a leading 1 and three bits for each level
  * (stream.h); ebpo_octcode_at returns the octcode of the cell that contains a point.
  */
@@ -144,8 +144,8 @@ typedef struct ebpo_subtree_nodes {
 
     /*
      * [node_count + 1] index in `planes` of each node's first stored plane. Stored planes are the
-     * planes that a gray node adds to those of its ancestors, and the planes of a leaf if the file
-     * has them. NULL: planes were not requested, or the file has none
+     * planes that a gray node adds to the planes of its ancestors, and the planes of a leaf if the
+     * file has planes of leaves. NULL: planes were not requested, or the file has none
      */
     const uint32_t *plane_first;
 
@@ -183,9 +183,9 @@ typedef struct ebpo_subtree_node {
     size_t struct_size;
 
     /*
-     * The node as a stream returns it (stream.h), with one difference: if no planes of leaves are
-     * stored, and the subtree has faces, leaves have planes derived from their faces (EBP 2017,
-     * 3.3.4).
+     * The node as a stream returns it (stream.h), with one difference. If no planes of leaves are
+     * stored, and the subtree has faces, then leaves have planes derived from their faces (EBP
+     * 2017, 3.3.4).
      */
     ebpo_stream_node node;
 
@@ -203,8 +203,8 @@ typedef struct ebpo_subtree_node {
 
 /*
  * Gets the node with index `number` in ebpo_subtree_nodes: its cell, its half-spaces if planes were
- * read, and its envelope if `polygons` is true. Its pointers are valid until the next call of this
- * function for the same subtree.
+ * read, and its envelope if `polygons` is true. The pointers in *out are valid until the next call
+ * of this function for the same subtree.
  *
  * Threads: one at a time per subtree.
  */

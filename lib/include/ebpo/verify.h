@@ -61,10 +61,10 @@ typedef struct ebpo_verify_report {
     uint64_t checks, violations;
 
     /*
-     * spare_bytes: number of unused bytes of the file, which are outside headers, chunk directories
-     * and chunks. spare_filled: number of unused bytes that are not zero; 0 in files of this
-     * library. Unused bytes change no result and are not violations. For remote files (http.h) both
-     * are 0, because unused bytes are not read.
+     * spare_bytes: number of unused bytes of the file. Unused bytes are outside headers, chunk
+     * directories and chunks. spare_filled: number of unused bytes that are not zero; 0 in files of
+     * this library. Unused bytes change no result and are not violations. For remote files (http.h)
+     * both are 0, because unused bytes are not read.
      */
     uint64_t spare_bytes, spare_filled;
 } ebpo_verify_report;

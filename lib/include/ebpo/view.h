@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * Streams nodes in the order of their importance to an observer, within a budget.
+ * Streams nodes in the order of their importance to an observer, within a budget. The envelope of a
+ * node is a convex polyhedron that contains the part of the solid in the node's cell. Gray nodes
+ * have children, leaves list faces, and black nodes are inside the solid (ebpo_node_type in
+ * file.h).
  *
  *     ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
  *     options.priority = EBPO_PRIORITY_PIXELS;
@@ -33,8 +36,8 @@ extern "C" {
 
 /*
  * Order in which gray nodes of the cut are refined. Nodes of equal priority are refined by level,
- * coarse to fine, and within a level by ascending octcode (path from the root to the node, three
- * bits for each level; stream.h).
+ * coarse to fine, and within a level by ascending octcode. An octcode is the path from the root to
+ * the node, with three bits for each level (stream.h).
  */
 typedef enum ebpo_priority {
     /* Level by level, by octcode: the order of the file. */
@@ -356,8 +359,8 @@ EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
  * `priority` is ignored.
  *
  * Option `pixels`: a visible patch with a greater error in the image is used only if another option
- * prevents its replacement. The error in the image is the size in pixels of ebpo_patch.error, at
- * the distance from the eye to the nearest point of the node's cell and in the middle of the image.
+ * prevents its replacement. The error in the image is the length of ebpo_patch.error in pixels, in
+ * the middle of the image and at the distance from the eye to the nearest point of the node's cell.
  * If `pixels` is 0, the finest patches are used.
  *
  * out     freed by ebpo_surface_mesh_free; cleared on failure. `error` is the greatest error of the
