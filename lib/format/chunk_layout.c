@@ -169,7 +169,7 @@ static void shared_blocks_free(shared_blocks *blocks)
     free(blocks->vertex_block);
 }
 
-/* Lists a block in `blocks`, unless it is already listed in this round. */
+/* Lists a block in `blocks`. Does nothing if the block is already listed in this round. */
 static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
                        uint64_t *count)
 {

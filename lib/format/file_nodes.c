@@ -36,8 +36,8 @@ ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *n
     return EBPO_OK;
 }
 
-/* Returns EBPO_E_ARGUMENT unless the node can exist and is of `type`, which is EBPO_GRAY. `what`:
- * the requested data, in the plural. */
+/* Returns EBPO_OK if the node can exist and is of `type`, which is EBPO_GRAY; otherwise
+ * EBPO_E_ARGUMENT. `what`: the requested data, in the plural. */
 static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_node *node, ebpo_node_type type,
                               const char *what, ebpo_error *error)
 {

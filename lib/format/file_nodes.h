@@ -7,7 +7,8 @@
 #include "format/chunks.h"
 #include "geometry/level_nodes.h"
 
-/* Returns EBPO_E_ARGUMENT unless the node can exist according to the file's header. */
+/* Returns EBPO_OK if the node can exist according to the file's header; otherwise EBPO_E_ARGUMENT.
+ */
 EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
                                                  ebpo_error *error);
 

@@ -654,8 +654,8 @@ static ebpo_status get_limited(ebpo_head *in, ebpo_head_object id, const char *o
     return EBPO_OK;
 }
 
-/* Reads one attribute into its member of `record`. A missing attribute is an error, unless it is a
- * FACT_NOTE or FACT_HINT. */
+/* Reads one attribute into its member of `record`. A missing attribute is an error, except for
+ * FACT_NOTE and FACT_HINT. */
 static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *object, const fact *f,
                             void *record, ebpo_error *error)
 {

@@ -329,7 +329,7 @@ static const char *other_kind(const uint8_t *begin, uint64_t size)
                : NULL;
 }
 
-/* If the file is of another known type, replaces the error by one that names this type. */
+/* If the file is of another known type, replaces the error by an error that names this type. */
 static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
 {
     enum { BEGIN = 4096 };

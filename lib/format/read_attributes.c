@@ -391,7 +391,7 @@ static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attr
 }
 
 /* Reads the values of attribute array n into a->values. For lists of different lengths, reads the
- * ends into a->ends and, unless `ends_only` is true, the items into a->values. */
+ * ends into a->ends and, if `ends_only` is false, the items into a->values. */
 static ebpo_status read_parts(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
                               bool ends_only, ebpo_attribute *a, ebpo_error *error)
 {

@@ -171,8 +171,8 @@ static void join_ranges(ebpo_hints *e, uint64_t gap)
     e->count = kept;
 }
 
-/* Sends hints to the operating system. Joins ranges that are close together, as each range takes a
- * system call. */
+/* Sends hints to the operating system. Joins ranges that are close together, because each range
+ * takes a system call. */
 static void hint_system(ebpo_hints *e)
 {
     enum { BETWEEN = 16 << 10 }; /* bytes between ranges that are joined */
@@ -388,8 +388,8 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
 }
 
 /* Returns the end of a run of chunks that one read fetches: the chunks [begin, result). They are
- * contiguous in the file, end at or before chunk `end`, and take at most RUN_BYTES, unless the run
- * is a single chunk. *bytes: size of the run. */
+ * contiguous in the file, and end at or before chunk `end`. A run of several chunks takes at most
+ * RUN_BYTES. *bytes: size of the run. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
     const ebpo_chunk_location *c = array->chunks;

@@ -35,8 +35,8 @@ void ebpo_hint_attributes(ebpo_hints *hints);
 /* Sends prefetch hints for all arrays of the file. */
 void ebpo_hint_tree(const ebpo_file *file);
 /* Sends prefetch hints for the data with which a reader locates a subtree: levels down to the
- * subtrees' roots, the sums before the subtrees, and the chunk offsets. Does nothing unless the
- * file has subtrees and states the size of these data (top_bytes). */
+ * subtrees' roots, the sums before the subtrees, and the chunk offsets. Does nothing if the file
+ * has no subtrees, or does not state the size of these data (top_bytes). */
 void ebpo_hint_top(const ebpo_file *file);
 /* Returns true if ebpo_hint_chunks collects chunks: if the source uses prefetch hints, or because
  * of `local` or `counts_bytes`. */

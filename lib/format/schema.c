@@ -109,7 +109,7 @@ static const count_spec level_counts[EBPO_COUNTS] = {
 #include "format/array_table.inc"
 
 /* Checks the element sizes in the file. If several sizes are allowed, the type in memory has 32
- * bits. If one size is allowed, it is that of the type in memory, except for leaf_skip, which
+ * bits. If one size is allowed, it is the size of the type in memory. Exception: leaf_skip, which
  * contains differences. */
 #define LEVEL_ARRAY(ID, name, field, type, stored, ...)                               \
     _Static_assert((stored) & ((stored)-1)                                            \
@@ -389,8 +389,8 @@ ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *arra
     return ebpo_fail_at(error, check->as, check->shown, path, -1, "%s; %s", what, next_step(check));
 }
 
-/* Checks the types of a level's groups against the counts in the header. A group with types 0 is
- * that of a pruned node (whose children are not in the file). */
+/* Checks the types of a level's groups against the counts in the header. A group with types 0
+ * belongs to a pruned node (a gray node whose children are not in the file). */
 static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, int level,
                                const ebpo_level *arrays, ebpo_error *error)
 {

@@ -209,7 +209,7 @@ static inline bool ebpo_schema_is_index(int id)
 }
 
 /* Returns true for the two lists of all chunks (offsets and checksums). Each list is a single
- * chunk, which neither list contains. */
+ * chunk. The chunks of the two lists are not in the lists. */
 static inline bool ebpo_schema_is_list(ebpo_array_id id)
 {
     return id == EBPO_A_CHUNK_DIRECTORY || id == EBPO_A_CHUNK_CHECKSUMS;

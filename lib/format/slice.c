@@ -451,8 +451,8 @@ static void hint_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
     ebpo_hint_all(&e);
 }
 
-/* Sends prefetch hints for all levels below the subtrees' roots. Does nothing unless the range is
- * in the level of these roots, because the table only locates the chunks of whole subtrees. */
+/* Sends prefetch hints for all levels below the subtrees' roots. Does nothing if the range is in
+ * another level than these roots, because the table only locates the chunks of whole subtrees. */
 static void hint_subtrees(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
@@ -511,8 +511,8 @@ typedef struct walk {
 } walk;
 
 /* Visits a group and the groups below it. Checks that the new faces of the leaves, in depth-first
- * order, are one range without gaps. These are the owned faces: sets first_face and face_count of
- * the slice. */
+ * order, are one range without gaps. These faces are the owned faces of the slice; sets first_face
+ * and face_count to this range. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];

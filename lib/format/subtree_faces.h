@@ -8,7 +8,7 @@
 
 /* Finds the subtree that contains `node`, a node below the subtrees' roots. Checks that the new
  * faces of this subtree's leaves, in depth-first order, are the faces that the table's row states.
- * The file must have a mesh. Reads the lists of all leaves of the subtree, unless the subtree is
+ * The file must have a mesh. Reads the lists of all leaves of the subtree, except if the subtree is
  * known to be checked (ebpo_subtree_faces_known). Does nothing for counted chunks
  * (ebpo_chunks_make_counted). */
 EBPO_MUST_USE ebpo_status ebpo_subtree_faces_check(ebpo_chunks *chunks, const ebpo_node *node,

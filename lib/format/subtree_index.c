@@ -147,9 +147,9 @@ static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row 
         add_row(c, i, out->before);
     memcpy(out->after, out->before, sizeof out->after);
     add_row(c, subtree, out->after);
-    /* EBPO_S_FACES_BEFORE of this row counts the faces between the previous subtree and this one.
-     * So the first owned face comes after all faces that this column counts up to this row, and
-     * after the owned faces of all previous subtrees. The same is true for vertices. */
+    /* EBPO_S_FACES_BEFORE of this row counts the faces between the previous subtree and this
+     * subtree. So the first owned face comes after all faces that this column counts up to this
+     * row, and after the owned faces of all previous subtrees. The same is true for vertices. */
     out->face = out->after[EBPO_S_FACES_BEFORE] + out->before[EBPO_S_FACES];
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }

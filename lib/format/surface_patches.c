@@ -154,7 +154,8 @@ static void enter_edges(coder *c)
     }
 }
 
-/* Returns the corner where a directed edge begins in a triangle that is not done, or NONE. */
+/* Returns the corner at which a directed edge begins in a triangle that is not yet encoded, or
+ * NONE. */
 static uint32_t find_corner(const coder *c, uint32_t from, uint32_t to)
 {
     const uint32_t *t = c->in->triangle;

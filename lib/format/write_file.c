@@ -311,8 +311,8 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Maximum number of chunks of a window. A window is the chunks that are in memory together. They
- * take at most 8 MiB before compression, and about 8 MiB compressed. */
+/* Maximum number of chunks of a window. A window is the set of chunks that are in memory at a time.
+ * The chunks take at most 8 MiB before compression, and about 8 MiB compressed. */
 enum { WINDOW_CHUNKS = 128 };
 
 /* A chunk of the window: its position, and its bytes before and after compression. */

@@ -676,7 +676,8 @@ static ebpo_pipeline pipeline_of(ebpo_codec codec)
     return (ebpo_pipeline)codec;
 }
 
-/* Adds an array of a level or of the root to the plan, unless it has no rows or may be omitted. */
+/* Adds an array of a level or of the root to the plan. Does nothing if the array has no rows or may
+ * be omitted. */
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
 {
     uint64_t rows = id == EBPO_A_SUBTREE_SHARED ? plan->subtrees.shared_count

@@ -122,9 +122,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_needed(ebpo_async *async, const eb
  *
  * version   version of the file from which the bytes come; NULL: not known
  *
- * EBPO_E_IO: the version differs from that of ebpo_async_new, or the bytes differ from those that
- * are available. The file has changed: all later calls and reads fail. EBPO_E_ARGUMENT: the range
- * is not within the file.
+ * EBPO_E_IO: the version differs from the version given to ebpo_async_new, or the bytes differ from
+ * available bytes. In both cases the file has changed, and all later calls and reads fail.
+ * EBPO_E_ARGUMENT: the range is not within the file.
  *
  * Threads: any.
  */

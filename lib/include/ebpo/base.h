@@ -38,12 +38,13 @@
  * `user`: passed to the callback unchanged. Members `reserved` are 0.
  *
  * "Threads:" in a comment says which threads may call a function at the same time:
- *   any                   any number of threads, also with the same arguments, as long as no thread
- *                         changes the arguments
+ *   any                   any number of threads, also with the same arguments, if no thread changes
+ *                         the arguments meanwhile
  *   one at a time per X   one thread at a time for each object X; any number of threads with
  *                         different objects
  * The caller frees an object after all threads have ended their use of the object. A function may
- * start threads. They end before the function returns, unless its comment says otherwise.
+ * start threads. These threads end before the function returns, except if the comment of the
+ * function says otherwise.
  *
  * Stack: a query (query.h) uses less than 64 KiB of the calling thread's stack, building and
  * verifying use less than 256 KiB, and all other functions less than 1 MiB. The threads that the
@@ -72,8 +73,9 @@
  *
  * From version 1.0 on, a program that uses these macros runs with every later library of the same
  * major version. Members that the program's structs lack have their default values, or are not
- * filled in. The program also runs with an earlier library, unless the program sets a member that
- * the earlier library does not know (EBPO_E_UNSUPPORTED). A wrong struct_size is EBPO_E_ARGUMENT.
+ * filled in. The program also runs with an earlier library. But if the program sets a member that
+ * the earlier library does not know, the call returns EBPO_E_UNSUPPORTED. A wrong struct_size is
+ * EBPO_E_ARGUMENT.
  *
  * All other structs keep their layout within a major version. Their reserved members are 0.
  */
@@ -130,7 +132,7 @@ extern "C" {
 
 /*
  * Returns the version of the library in use, in the form of EBPO_VERSION_NUMBER. If the major
- * version of the library differs from that of the headers, compile the program again.
+ * version of the library differs from the major version of the headers, compile the program again.
  *
  * Threads: any.
  */

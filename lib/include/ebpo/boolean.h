@@ -182,9 +182,9 @@ typedef struct ebpo_boundary_options {
 /* Result of ebpo_boolean_distance. */
 typedef struct ebpo_boundary_distance {
     /*
-     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. Both are
-     * 0: the point is on the boundary. Both are INFINITY: the result is empty. Only hi is INFINITY:
-     * the result may be empty.
+     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. lo and hi
+     * are 0: the point is on the boundary. lo and hi are INFINITY: the result is empty. Only hi is
+     * INFINITY: the result may be empty.
      */
     double lo, hi;
 
@@ -402,13 +402,13 @@ typedef struct ebpo_boolean_mesh_report {
 /*
  * Makes the mesh of the result. Faces of operands are cut exactly along their intersections with
  * all other faces, including coplanar faces and faces of the same operand. The parts that bound the
- * result are kept, and reversed where necessary. Faces that are not cut keep their posed corners.
- * All other vertices are the exact vertices of the result, rounded to the nearest coordinates. The
- * mesh is closed: each edge is used equally often in both directions.
- * Rounding may create small intersections of faces (ebpo_mesh_self_intersections). Vertices of cut
- * faces that become equal by rounding are merged, and faces that lose a corner in this way are
- * omitted. Winding numbers of the mesh are 1 in the result and 0 elsewhere, except near rounded
- * vertices. The mesh is the same for any number of threads.
+ * result are kept, and reversed if necessary. Faces that are not cut keep their posed corners. All
+ * other vertices are the exact vertices of the result, rounded to the nearest coordinates. The mesh
+ * is closed: each edge is used equally often in both directions. Rounding may create small
+ * intersections of faces (ebpo_mesh_self_intersections). Vertices of cut faces that become equal by
+ * rounding are merged, and faces that lose a corner in this way are omitted. Winding numbers of the
+ * mesh are 1 in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for
+ * any number of threads.
  *
  * Memory, which a workspace may limit: about 40 bytes for each face of one operand (operands are
  * processed one after the other), and 25 bytes for each face of the mesh. Memory that no workspace
@@ -506,8 +506,8 @@ typedef struct ebpo_boolean_volume {
 
     /*
      * Bounds of the result's volume, in the cube of the world's unit: lo is the volume of all
-     * in-cells, and hi is the volume of all in-cells and mixed cells. Both hold exactly for posed
-     * coordinates. Both are 0: the result is empty.
+     * in-cells, and hi is the volume of all in-cells and mixed cells. Both bounds hold exactly for
+     * posed coordinates. lo and hi are 0: the result is empty.
      */
     double lo, hi;
 
@@ -555,9 +555,9 @@ typedef enum ebpo_boolean_side {
 /*
  * Makes the surface of the cells that `side` selects. It consists of squares of the finest level,
  * each as two triangles, with coordinates in doubles. The mesh is closed
- * (ebpo_mesh_report.balanced), with winding numbers 0 and 1. Where cells touch only along an edge
- * or at a corner, the mesh is not a 2-manifold. The mesh may be written or converted. If a mesh of
- * EBPO_BOOLEAN_OUTER is converted, the model and the envelopes in the .ebpo.h5 file contain the
+ * (ebpo_mesh_report.balanced), with winding numbers 0 and 1. If cells touch only along an edge or
+ * at a corner, the mesh is not a 2-manifold there. The mesh may be written or converted. If a mesh
+ * of EBPO_BOOLEAN_OUTER is converted, the model and the envelopes in the .ebpo.h5 file contain the
  * result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells

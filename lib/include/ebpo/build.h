@@ -30,10 +30,10 @@ extern "C" {
 typedef enum ebpo_selection {
     /*
      * From the root down. Candidates are the facet normals of the convex hull of the solid in the
-     * cell. A node starts with its parent's envelope. Repeatedly, the plane that removes the
-     * greatest volume is added. This ends when the volume is less than a share of the cell
-     * (`epsilon` of ebpo_build_options). Then planes are added that cut off needles. A needle is a
-     * long, thin portion of the envelope that has little volume.
+     * cell. A node starts with its parent's envelope. Again and again, the candidate that removes
+     * the greatest volume is added. The additions end when this volume is less than a share of the
+     * cell (`epsilon` of ebpo_build_options). Then planes are added that cut off needles. A needle
+     * is a long, thin portion of the envelope that has little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 

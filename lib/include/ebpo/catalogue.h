@@ -98,9 +98,9 @@ typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo
                                               ebpo_error *error);
 
 /*
- * Function that closes a file that ebpo_catalogue_open_fn opened. Any thread may call it. It must
- * not call functions of the ebpo_catalogue_models whose query opened the file, because the library
- * has locked this object.
+ * Function that closes a file that ebpo_catalogue_open_fn opened. Any thread may call it. The
+ * function must not call functions of the ebpo_catalogue_models whose query opened the file,
+ * because the library has locked this object.
  */
 typedef void (*ebpo_catalogue_close_fn)(void *user, ebpo_file *file);
 
@@ -242,8 +242,8 @@ typedef struct ebpo_catalogue_models_options {
     size_t struct_size;
 
     /*
-     * Maximum memory of all open models together, in bytes. Each open model may use one n-th of it;
-     * n is the number of models of its catalogue, but at most 8. 0: no limit.
+     * Maximum memory of all open models together, in bytes. Each open model may use one n-th of
+     * this maximum; n is the number of models of its catalogue, but at most 8. 0: no limit.
      */
     uint64_t memory;
 

@@ -193,9 +193,10 @@ typedef struct ebpo_relation_result {
  * more per face during the call. For a partly loaded model, it takes half a byte per face, and
  * about 60 bytes per face of a subtree.
  *
- * A subtree of a partly loaded model is loaded if some of its faces intersect the other model. It
- * is also loaded if it may show that its model is only partly inside the other model: a face of its
- * model is known to be inside, and the subtree may have a face outside, or the reverse.
+ * A subtree of a partly loaded model is loaded if some of its faces intersect the other model. A
+ * subtree is also loaded if it may show that its model is only partly inside the other model. This
+ * is so if a face of its model is known to be inside and the subtree may have a face outside, or
+ * the reverse.
  *
  * Errors are those of ebpo_collide_first. If the deadline passes, the call succeeds with the
  * relation EBPO_RELATION_UNDECIDED. EBPO_E_ABSENT: as for ebpo_inside.
@@ -415,8 +416,8 @@ typedef struct ebpo_collide_distance_result {
     ebpo_value_bounds distance;
 
     /*
-     * 1: the distance is at least `at_least` of the options. 0: the distance is less. Both are
-     * exact decisions. -1: not requested, or undecided at the deadline.
+     * Exact decision. 1: the distance is at least `at_least` of the options. 0: the distance is
+     * less. -1: not requested, or undecided at the deadline.
      */
     int32_t at_least;
 
@@ -438,10 +439,11 @@ typedef struct ebpo_collide_distance_result {
 
 /*
  * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. If
- * one solid is inside the other, the result is the distance between their surfaces. With `at_least`
- * of the options, the search ends when the comparison with this value is decided. If out->at_least
- * is 1, `distance` is at_least .. INFINITY, without a pair. If out->at_least is 0, the returned
- * pair is nearer than at_least. After the deadline, `distance` has the bounds known so far.
+ * one solid is inside the other solid, the result is the distance between their surfaces. With
+ * `at_least` of the options, the search ends when the comparison with this value is decided. If
+ * out->at_least is 1, `distance` is at_least .. INFINITY, without a pair. If out->at_least is 0,
+ * the returned pair is nearer than at_least. After the deadline, `distance` has the bounds known so
+ * far.
  *
  * For partly loaded models, subtrees whose envelopes are not farther apart than the best distance
  * found so far are loaded, nearest first. Exact distances and their pairs do not depend on the
@@ -462,9 +464,9 @@ ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *optio
  * Computes the depth of A's surface in the solid B: the maximum, over all points of A's faces that
  * are in B, of the distance to the nearest face of B. The depth is 0 if no point of A's faces is in
  * B. Also computes the depth of B's surface in A. The result is an interval, because the deepest
- * point need not be a corner. hi - lo is at most `tolerance` plus the rounding of posed points
- * (2^-40 of the coordinates, more for matrices that are not exact rotations), unless the deadline
- * ends the search. The depth is not the minimum motion that separates the models.
+ * point need not be a corner. If the deadline does not end the search, hi - lo is at most
+ * `tolerance` plus the rounding of posed points (2^-40 of the coordinates, more for matrices that
+ * are not exact rotations). The depth is not the minimum motion that separates the models.
  *
  * tolerance        greater than 0, in the world's unit; a smaller tolerance takes longer
  * a_in_b, b_in_a   depth of A in B, and of B in A; NULL: not requested
@@ -502,7 +504,7 @@ typedef struct ebpo_separation {
  * Computes the separation distance of A from B along a direction. This is the least t >= 0 with
  * this property: if A is moved by t' * direction for any t' > t, A and B have no common point. The
  * points of a solid include its interior. If A is moved by t * direction, the models touch in the
- * returned pair. If there is no pair (t is 0), the models intersect neither at their poses nor
+ * returned pair. If there is no pair (t is 0), the models do not intersect, at their poses and
  * during the motion. Posed coordinates are moved without rounding. If the models separate and touch
  * again during the motion, t belongs to the last contact.
  *

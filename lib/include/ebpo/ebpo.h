@@ -28,7 +28,7 @@
  *   error_bound.h error bound of a level
  *   limit.h       least possible volume of convex envelopes, for comparison
  *
- * Extras: headers of functions that are built on queries. They are installed unless the library was
+ * Extras: headers of functions that are built on queries. They are not installed if the library was
  * configured with -Dextras=disabled.
  *
  *   boolean.h     unions and differences of solids at poses: queries, volume, mesh

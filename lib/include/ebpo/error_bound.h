@@ -60,7 +60,7 @@ typedef struct ebpo_error_bound {
 
     /*
      * Bounds of the one-sided Hausdorff distance from the level's envelopes to the model. If lo is
-     * 0, it is not known whether an envelope extends beyond the model.
+     * 0, it is not known if any envelope extends beyond the model.
      */
     double lo, hi;
 
@@ -104,9 +104,9 @@ typedef struct ebpo_error_bound {
  * node of the level.
  *
  * EBPO_E_ABSENT: the model has no mesh, or is itself a subset. EBPO_E_ARGUMENT: the level is not
- * valid, the tolerance is 0, at_most is below 0, or `file` is neither the model's file nor a subset
- * of it. The files must have equal root cells, and either agree in their digests or have the same
- * source and build options. Also the errors of reading (base.h).
+ * valid, the tolerance is 0, at_most is below 0, or `file` is not the model's file or a subset of
+ * it. `file` and the model's file must have equal root cells. Their digests must agree, or their
+ * sources and build options must be equal. Also the errors of reading (base.h).
  *
  * Threads: any.
  */

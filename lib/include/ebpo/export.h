@@ -176,7 +176,7 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
 
 /*
  * Exports levels, a surface or the mesh to a file, which is replaced atomically. A second file is
- * replaced just before the first one. If replacing the first file then fails (EBPO_E_IO), the
+ * replaced just before the first file. If replacing the first file then fails (EBPO_E_IO), the
  * second file has already been replaced.
  *
  * For XDMF and VTKHDF, one level is in memory at a time; for other formats, all levels are.

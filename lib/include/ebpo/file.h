@@ -331,9 +331,9 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
 
     /*
-     * Byte offset and size of HDF5's chunk indexes, for prefetching. They are stored after the data
-     * of the first levels. Arrays of one chunk have no chunk index. Both are 0 if the file has no
-     * chunk indexes, or does not record their location.
+     * Byte offset and size of HDF5's chunk indexes, for prefetching. The chunk indexes are stored
+     * after the data of the first levels. Arrays of one chunk have no chunk index. Both are 0 if
+     * the file has no chunk indexes, or does not record their location.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
@@ -1098,9 +1098,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
 /*
  * Writes the whole content of a file to a new file with the layout of `write` (codec, subtrees;
  * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before `path`
- * is replaced, the new file is read again. It must have the content_sha256 of `file`, so the
- * content of `file` is checked too. The whole model is loaded into memory; the workspace of `read`
- * limits this memory.
+ * is replaced, the new file is read again. The new file must have the content_sha256 of `file`, so
+ * the content of `file` is checked, too. The whole model is loaded into memory; the workspace of
+ * `read` limits this memory.
  *
  * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the content
  * is correct, but this library would write the arrays in another way (for example, another program

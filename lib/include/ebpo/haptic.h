@@ -76,9 +76,9 @@ typedef struct ebpo_haptic_options {
 
     /*
      * Search distance for the nearest face, in the model's unit, at least 0. Faces within this
-     * distance of the ball contribute to `normal` of the result; nearer faces contribute more. 0: 3
-     * times the diagonal of the root cell, divided by the square root of the number of faces. This
-     * is a few edge lengths if all edges have similar lengths.
+     * distance of the ball contribute to `normal` of the result; nearer faces contribute more. 0:
+     * the distance is 3 times the diagonal of the root cell, divided by the square root of the
+     * number of faces. If all edges have similar lengths, this distance is a few edge lengths.
      */
     double search_radius;
 
@@ -173,7 +173,7 @@ typedef enum ebpo_haptic_flag {
     /* The device position was not finite; the previous position was used. */
     EBPO_HAPTIC_BAD_INPUT = 16,
 
-    /* The step function is not that of the object's kind; nothing was done. */
+    /* The step function is for another kind of object; nothing was done. */
     EBPO_HAPTIC_WRONG_KIND = 32,
 
     /* ebpo_haptic_step_probe: the distance is exact except for rounding. */
@@ -191,7 +191,7 @@ typedef struct ebpo_haptic_ball_result {
     /* Centre of the proxy's ball. */
     double proxy[3];
 
-    /* Force for the device; 0 unless EBPO_HAPTIC_CONTACT. */
+    /* Force for the device; 0 without EBPO_HAPTIC_CONTACT. */
     double force[3];
 
     /*
@@ -231,11 +231,12 @@ typedef struct ebpo_haptic_ball_result {
  * EBPO_HAPTIC_PATH_UNFINISHED. After these flags, the proxy's path depends on the times at which
  * boxes were loaded.
  *
- * The force is that of a spring (stiffness times the vector from device to proxy), minus damping
- * times the device velocity. If the spring pushes the device away from a face, the component of the
- * force towards that face is at most 1e-7 of the length of the force. If needed, the force is
- * reduced to limit the energy. For any motion, the total energy given to the device is at most the
- * energy taken from the device, plus stiffness times the square of the longest step of the device.
+ * The force is the force of a spring (stiffness times the vector from device to proxy), minus
+ * damping times the device velocity. If the spring pushes the device away from a face, the
+ * component of the force towards that face is at most 1e-7 of the length of the force. If needed,
+ * the force is reduced to limit the energy. For any motion, the total energy given to the device is
+ * at most the energy taken from the device, plus stiffness times the square of the longest step of
+ * the device.
  *
  * Threads: one at a time per object.
  */

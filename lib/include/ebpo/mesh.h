@@ -411,7 +411,7 @@ typedef struct ebpo_repair_record {
     /* Number of faces that were removed because an earlier face has the same vertices. */
     uint64_t dropped_faces;
 
-    /* Number of dropped faces whose orientation is opposite to that of the kept face. */
+    /* Number of dropped faces whose orientation is opposite to the orientation of the kept face. */
     uint64_t dropped_opposite;
 
     /*
@@ -496,7 +496,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
  * is 0, the result is equal to repeated_faces of the report.
  *
  * out        number of these faces, and first source indices
- * opposite   number of these faces whose orientation is opposite to that of the kept face
+ * opposite   number of these faces whose orientation is opposite to the orientation of the kept
+ *            face
  *
  * Errors are those of ebpo_mesh_weld. On failure `out` and `opposite` are 0.
  *
@@ -519,20 +520,20 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * has its own faces in the common square, so four faces use each side of the square. The square of
  * a cube is one patch, the other five sides of the cube are another patch, and both patches are
  * open. Patches are joined at edges that are used more than twice. The faces at such an edge are
- * sorted by their angle around the edge, and each face gets the direction opposite to that of the
- * previous face. The angles are compared exactly; faces at the same angle are ordered by source
- * index. Faces that already alternate are unchanged. Joined patches are a shell if they use each
- * edge equally often in both directions.
+ * sorted by their angle around the edge, and each face gets the direction opposite to the direction
+ * of the previous face. The angles are compared exactly; faces at the same angle are ordered by
+ * source index. Faces that already alternate are unchanged. Joined patches are a shell if they use
+ * each edge equally often in both directions.
  *
  * A shell gets a positive volume, or a negative volume if it is inside an odd number of other
  * shells. Shell A is inside shell B if the least and the greatest vertex of A along each axis are
  * inside B. A vertex is inside B if its exact winding number with respect to B is not zero.
  *
  * An open patch is oriented so that most of its faces are unchanged. A patch that cannot be
- * oriented is unchanged. A set of joined patches whose faces cannot alternate around all edges is
- * separated again, and its patches are oriented one by one. `unorientable_components` counts these
- * patches and these sets. Do not orient a mesh in which solids inside other solids are intended,
- * because they become cavities.
+ * oriented is unchanged. If the faces of a set of joined patches cannot alternate around all edges,
+ * the patches are separated again and oriented one by one. `unorientable_components` counts patches
+ * that cannot be oriented, and sets that were separated. Do not orient a mesh in which solids
+ * inside other solids are intended, because they become cavities.
  *
  * Threads: one at a time per mesh.
  */

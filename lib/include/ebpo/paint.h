@@ -26,7 +26,7 @@
  * connected to the point. Later strokes cover earlier strokes. To undo the last stroke, remove it.
  * The model is never changed.
  *
- * An ebpo_paint is entirely in memory. It takes 48 bytes per point, and keeps a descriptor of its
+ * An ebpo_paint is entirely in memory: 48 bytes per point. An ebpo_paint keeps a descriptor of its
  * file open. Queries of the model use the memory of the model's budget, and the memory that each
  * function states. Texts and arrays that functions return are valid until the paint is changed or
  * freed.

@@ -3,8 +3,9 @@
  *
  * A pose transforms each vertex to the world in doubles, with one rounding per operation in a
  * defined order (docs/develop/collision.md, "Posed coordinates"). The results are the *posed
- * coordinates*. Decisions equal those of arithmetic without rounding on posed coordinates, as if
- * the files contained them. Lengths are in the unit of the world: the model's unit times the scale.
+ * coordinates*. Decisions of queries are exact for posed coordinates: they are the same as if the
+ * files contained the posed coordinates, and were computed without rounding. Lengths are in the
+ * unit of the world: the model's unit times the scale.
  */
 #ifndef EBPO_POSE_H
 #define EBPO_POSE_H

@@ -235,8 +235,7 @@ typedef struct ebpo_model_stats {
     uint64_t evicted;
 
     /*
-     * Number of bytes read from the source, and number of reads. Both include the opening of the
-     * file.
+     * Number of bytes read from the source, and number of reads, including the opening of the file.
      */
     uint64_t bytes_read, reads;
 
@@ -581,7 +580,7 @@ typedef struct ebpo_distance_result {
 
     /*
      * Nearest face: its source index if the file has source indices, else its index in the file. Of
-     * several faces at exactly the same distance, the first one in the file. EBPO_NO_FACE: no face
+     * several faces at exactly the same distance, the first face in the file. EBPO_NO_FACE: no face
      * was determined, for example with a level, a deadline or EBPO_DISTANCE_ENVELOPE.
      */
     uint64_t face;
@@ -702,7 +701,7 @@ typedef struct ebpo_ray_hit {
 
 /*
  * Finds the first triangle (including its boundary) that intersects the ray origin + t direction
- * with t from 0 to t_max. Of several triangles at the same t, the first one in the file is the
+ * with t from 0 to t_max. Of several triangles at the same t, the first triangle in the file is the
  * result. *hit is false if no triangle intersects the ray.
  *
  * direction   of any length except 0
@@ -883,9 +882,9 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  * ab, ac, bc (the first of several edges with equal length): the point of this edge that is nearest
  * to p.
  *
- * The value is (w_a A + w_b B) + w_c C, without the terms whose weight is 0. It is clamped to the
- * range of the values in the sum. At a corner, the result is the corner's value. If the three
- * values are equal, the result is this value.
+ * The value is (w_a A + w_b B) + w_c C, without the terms whose weight is 0. The value is clamped
+ * to the range of the values in the sum. At a corner, the result is the corner's value. If the
+ * three values are equal, the result is this value.
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
@@ -970,8 +969,8 @@ typedef struct ebpo_solid_volume {
     double lo, hi;
 
     /*
-     * Integral of the winding number over space. It is equal to the volume if all winding numbers
-     * are 0 or 1. A region with winding number 2 counts twice; a region with winding number -1 is
+     * Integral of the winding number over space. If all winding numbers are 0 or 1, the integral is
+     * the volume. A region with winding number 2 counts twice; a region with winding number -1 is
      * subtracted.
      */
     double integral;

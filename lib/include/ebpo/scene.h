@@ -335,10 +335,10 @@ EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t cam
                                            ebpo_scene_camera *out);
 
 /*
- * Returns true if a pair of instances is to be tested: the scene does not ignore the pair, and the
- * instances are different and not both fixed. In this case *clearance is the largest clearance
- * (minimum distance) that the rules of the scene require for the pair, in the world's unit; 0: no
- * clearance. Returns false if an index is out of range.
+ * Returns true if a pair of instances is to be tested. This is so if the scene does not ignore the
+ * pair, the instances are different, and at most one of the two is fixed. In this case *clearance
+ * is the largest clearance (minimum distance) that the rules of the scene require for the pair, in
+ * the world's unit; 0: no clearance. Returns false if an index is out of range.
  *
  * Threads: any.
  */

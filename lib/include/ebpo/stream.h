@@ -69,9 +69,9 @@ typedef struct ebpo_stream_node {
 
     /*
      * [plane_count] coefficients a, b, c, d of the half-space a x + b y + c z <= d, in the model's
-     * unit, with a unit normal. They are rounded outward: all points of the cell that are in the
-     * exact half-space of the plane code satisfy this inequality, even if its left side is computed
-     * in doubles.
+     * unit, with a unit normal. The coefficients are rounded outward. All points of the cell that
+     * are in the exact half-space of the plane code satisfy this inequality, even if its left side
+     * is computed in doubles.
      */
     const double (*planes)[4];
 
@@ -117,14 +117,14 @@ typedef struct ebpo_stream_level {
     uint64_t cumulative_bytes;
 
     /*
-     * Volume of the model's outer approximation at this level, in cubic units of the model. This is
-     * the volume of the envelopes of this level's gray nodes, and of all leaves and black cells of
-     * levels 0 to `level`. With the option `polygons` it is the sum of the nodes' volumes; without
-     * this option it is computed from the volumes stored in the file.
+     * Volume of the model's outer approximation at this level, in cubic units of the model. The
+     * approximation consists of the envelopes of this level's gray nodes, and of all leaves and
+     * black cells of levels 0 to `level`. With the option `polygons` it is the sum of the nodes'
+     * volumes; without this option it is computed from the volumes stored in the file.
      *
      * The envelopes of leaves are bounded by the planes of the leaves' ancestors, and by the planes
-     * of the leaves if these are stored. With planes derived from the faces (ebpo_lod_level), the
-     * envelopes would be smaller.
+     * of the leaves if these are stored. ebpo_lod_level derives further planes of leaves from the
+     * faces; the envelopes would be smaller with these planes.
      *
      * In a subset, the nodes in the file count. A pruned node counts at its own level, and not at
      * deeper levels.

@@ -57,8 +57,8 @@ typedef struct ebpo_subset_options {
 
     /*
      * True: target_bytes selects the parts, and `parts` is ignored. The profiles full, collision
-     * and lod are tried in this order, without a max_error. The first one with which the new file
-     * fits is used. If none fits, the profile lod is used with a max_error.
+     * and lod are tried in this order, without a max_error. The first profile with which the new
+     * file fits is used. If no profile fits, the profile lod is used with a max_error.
      */
     bool choose_parts;
 

@@ -18,7 +18,10 @@ typedef struct ebpo_verify_count {
     char first[240];
 } ebpo_verify_count;
 
-/* Result of ebpo_verify, by kind of check. Comments say what is checked. */
+/*
+ * Result of ebpo_verify, by kind of check. The comment of a member states the property that is
+ * checked.
+ */
 typedef struct ebpo_verify_report {
     size_t struct_size;
 

@@ -233,8 +233,8 @@ EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
  * Gets the next node; its pointers are valid until the next call with the stream. Unless *end is
  * EBPO_VIEW_NODE, there is no node and *out is unchanged.
  *
- * Reads the chunks of the node and its siblings, unless they are in memory. For a remote file,
- * chunks of the next nodes are also prefetched, within options.bytes.
+ * Reads the chunks of the node and its siblings that are not in memory. For a remote file, chunks
+ * of the next nodes are also prefetched, within options.bytes.
  *
  * The caller may pause at any time, and may repeat the call after EBPO_E_IO and EBPO_E_MEMORY.
  * EBPO_E_FORMAT is permanent, and so is EBPO_E_LIMIT (more than 2^32 groups of siblings).
