@@ -1,5 +1,6 @@
 /* Bounds the distance by which an envelope extends beyond the model. The envelope of a node is a
- * convex polyhedron that contains the part of the solid in the node's cell.
+ * convex polyhedron that contains the part of the solid in the node's cell. Gray nodes have
+ * children, leaves list faces, and black nodes are inside the solid.
  *
  * ebpo_bound_envelope is a branch and bound over fragments (fragments.c), the convex parts into
  * which an envelope is cut. The upper bound of a fragment is computed from the distance of its

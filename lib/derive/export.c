@@ -1,9 +1,9 @@
-/* Exports levels and the mesh in other programs' formats. The table `formats` has one row for each
- * format: its name, the ending of its second file, the colours that it can hold, and the function
- * that writes it. To add a format, add a value of ebpo_export_format, a row of the table, and a
- * file export_NAME.c with the function, which is declared in export_job.h. The simplified surface
- * has separate writers: export_surface.c for GLB, and export_tiles.c. The functions that the
- * writers share are in export_job.c. */
+/* Exports levels (as the envelopes of nodes) and the mesh in other programs' formats. The table
+ * `formats` has one row for each format: its name, the ending of its second file, the colours that
+ * it can hold, and the function that writes it. To add a format, add a value of ebpo_export_format,
+ * a row of the table, and a file export_NAME.c with the function, which is declared in
+ * export_job.h. The simplified surface has separate writers: export_surface.c for GLB, and
+ * export_tiles.c. The functions that the writers share are in export_job.c. */
 #include <ebpo/export.h>
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* Writes XDMF 3: a text file that refers to arrays in an HDF5 file beside it. Each level is a grid
- * of polyhedra, one for each node, and the mesh is a grid of triangles. VTK reads polyhedra with
- * its Xdmf3 readers, but not with the older XDMF reader. Both files are published together. */
+ * of polyhedra, the envelopes of its nodes. The mesh is a grid of triangles. VTK reads polyhedra
+ * with its Xdmf3 readers, but not with the older XDMF reader. Both files are published together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

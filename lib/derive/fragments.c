@@ -1,8 +1,10 @@
 /* Cuts an envelope into fragments, for bounds of the distance by which the envelope extends beyond
- * the model. Fragments are convex polytopes in the cell coordinates of a node; together they cover
- * the envelope. The unit of length is a power of two near the longest side of the node's cell, so
- * that no length overflows or underflows. At every cut, both parts extend slightly beyond the cut,
- * so that no point is lost within the tolerances of ebpo_polytope_clip.
+ * the model. The envelope of a node is a convex polyhedron that contains the part of the solid in
+ * the node's cell. Gray nodes have children, leaves list faces, and black nodes are inside the
+ * solid. Fragments are convex polytopes in the cell coordinates of a node; together they cover the
+ * envelope. The unit of length is a power of two near the longest side of the node's cell, so that
+ * no length overflows or underflows. At every cut, both parts extend slightly beyond the cut, so
+ * that no point is lost within the tolerances of ebpo_polytope_clip.
  *
  * Fragments are first cut along the cells of the model's tree, down to leaves. Within leaves, they
  * are cut along the planes of faces, or halved, until each fragment is inside the solid, outside

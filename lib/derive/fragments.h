@@ -1,8 +1,9 @@
 /* Declares what the searches for error bounds share (error_bound.c, level_error_bound.c). An error
  * bound is an upper bound of the distance by which an envelope extends beyond the model. The
  * envelope of a node is a convex polyhedron that contains the part of the solid in the node's cell.
- * This header declares the frame of a node (its cell with a unit of length), fragments (the convex
- * parts into which an envelope is cut), the trees of files, and the state of a search. */
+ * Gray nodes have children, and leaves list faces. This header declares the frame of a node (its
+ * cell with a unit of length), fragments (the convex parts into which an envelope is cut), the
+ * trees of files, and the state of a search. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 

@@ -1,7 +1,8 @@
 /* Measures the error of a level: bounds of the largest distance by which its envelopes extend
  * beyond the model, and the mean distance, from samples. The envelope of a node is a convex
- * polyhedron that contains the part of the solid in the node's cell. The level may be a level of a
- * subset. Distances are always measured to the whole model.
+ * polyhedron that contains the part of the solid in the node's cell. Gray nodes have children,
+ * leaves list faces, and black nodes are inside the solid. The level may be a level of a subset.
+ * Distances are always measured to the whole model.
  *
  * A level's bounds are the largest bounds of its nodes. A short search for each node
  * (error_bound.h) shows for most nodes that they do not have the largest distance. The other nodes

@@ -1,10 +1,11 @@
 /* Computes the "limit" of a level: the least volume that its convex envelopes can have. The
- * envelope of a node contains the part of the solid in the node's cell. The limit is the sum, over
- * the cells of the level, of the volume of the convex hull of the solid in the cell. The extreme
- * points of a hull are corners of the mesh's faces after clipping to the cell, or corners of the
- * cell that are inside the solid. The library qhull computes the volumes. In a build without qhull,
- * ebpo_limit_level returns EBPO_E_ABSENT. Volumes are stored for each node and added in the order
- * of the nodes, so that the number of threads does not change the sum. */
+ * envelope of a node contains the part of the solid in the node's cell. Gray nodes have children,
+ * leaves list faces, white nodes are outside the solid, and black nodes are inside. The limit is
+ * the sum, over the cells of the level, of the volume of the convex hull of the solid in the cell.
+ * The extreme points of a hull are corners of the mesh's faces after clipping to the cell, or
+ * corners of the cell that are inside the solid. The library qhull computes the volumes. In a build
+ * without qhull, ebpo_limit_level returns EBPO_E_ABSENT. Volumes are stored for each node and added
+ * in the order of the nodes, so that the number of threads does not change the sum. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>

@@ -1,5 +1,6 @@
-/* Makes the levels of a subset: the nodes that remain, and their volumes. The "source" here is the
- * file from which the subset is made, and the "result" is the subset.
+/* Makes the levels of a subset: the nodes that remain, and their volumes. Here the "source" is the
+ * file from which the subset is made, and the "result" is the subset. Gray nodes have children, and
+ * leaves list faces.
  *
  * Levels are made from the root downwards. Each level determines the groups (the eight children of
  * a gray node) of the next level that are needed, so only these groups are read. A gray node whose

@@ -1,6 +1,6 @@
 /* Declares what the source files subset*.c share, which make subsets. A subset is a smaller file
- * that is made from another file: some gray nodes lose their children (and become pruned nodes), or
- * parts are omitted. */
+ * that is made from another file: some gray nodes (nodes with children) lose their children and
+ * become pruned nodes, or parts are omitted. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
@@ -41,7 +41,7 @@ void ebpo_cut_volumes(ebpo_cutting *c);
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 
-/* --- counting the bytes that a subset needs of its file, from headers and tables alone --- */
+/* --- counting the bytes of a file that a subset needs, from headers and tables alone --- */
 
 typedef struct ebpo_subset_reads {
     uint64_t subtrees;       /* subtrees that intersect the box; 0 if the file has none */

@@ -93,7 +93,7 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
  * position or from another version of the file. Source: format-spec/checksums.md. */
 
 /* Returns the list entry of a chunk: the last four bytes of the chunk. They are its checksum in
- * every pipeline that has a checksum. `bytes`: stored size, at least four. */
+ * every pipeline (set of HDF5 filters) that has a checksum. `bytes`: stored size, at least four. */
 static inline uint32_t ebpo_chunk_checksum(const uint8_t *stored, size_t bytes)
 {
     return ebpo_load32(stored + bytes - 4);

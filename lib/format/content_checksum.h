@@ -1,7 +1,7 @@
 /* Computes the content checksum of a file: the SHA-256 of one entry per array, sorted by path. An
  * entry is the path, a zero byte, and the SHA-256 of the array as stored before shuffle and
- * compression. The checksum does not depend on the codec, the chunks or HDF5, so that other
- * programs can compute it. */
+ * compression. The checksum does not depend on the codec, the chunks or HDF5, so other programs can
+ * compute it from the arrays. */
 #ifndef EBPO_FORMAT_CONTENT_CHECKSUM_H
 #define EBPO_FORMAT_CONTENT_CHECKSUM_H
 
@@ -17,8 +17,8 @@ typedef struct ebpo_content_entry {
     uint8_t digest[32];
 } ebpo_content_entry;
 
-/* Returns true if one of the four checksums below includes the array. They exclude the tables of
- * subtrees, because checksums do not depend on the layout of the file. */
+/* Returns true if one of the four checksums below includes the array. The checksums exclude the
+ * tables of subtrees, because checksums must not depend on the layout of the file. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
 /* The four checksums. Colours, the border of a surface with its winding numbers, and the simplified
@@ -44,8 +44,8 @@ static inline int ebpo_content_of(ebpo_array_id id, bool solid)
 }
 
 /* Digest of one array, computed chunk by chunk. Files with subtrees have chunks with fewer rows
- * than other files. So that the digest is the same, these chunks are combined into chunks as large
- * as those of other files, and codes that restart with each chunk are recoded. */
+ * than other files. To give the same digest, these chunks are combined into chunks as large as in
+ * other files, and codes that restart with each chunk are recoded. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
     uint64_t last[3]; /* running sums of the components at the end of the previous chunk */

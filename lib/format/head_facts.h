@@ -33,8 +33,8 @@ EBPO_MUST_USE ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, 
 EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
                                                const ebpo_level_summary *level, ebpo_error *error);
 
-/* Reads the root's attributes. Reads the version and the required parts first, so that the error
- * for a file of a newer version names this version. */
+/* Reads the root's attributes. Reads the version and the required parts first. So, for a file of a
+ * newer version, the error names this version, and not an unknown attribute. */
 EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group,

@@ -40,7 +40,7 @@ static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gat
 
 /* Returns true if the array's type and columns are those of the schema. a->shape: shape in the
  * file, which is replaced by the shape of the decoded values. Sets a->gates (true: faces stored as
- * gates, face_gates.h). */
+ * gates, that is, coded relative to edges of preceding faces; face_gates.h). */
 static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];

@@ -8,8 +8,8 @@
 #include "format/chunks.h"
 #include "format/surface_patches.h"
 
-/* All patches of a file, in ascending order of their nodes' octcodes. The patches of the children
- * of patch i's node are [child[i], child_end[i]). */
+/* All patches of a file, in ascending order of the octcodes (locational codes) of their nodes. The
+ * patches of the children of patch i's node are [child[i], child_end[i]). */
 typedef struct ebpo_patch_table {
     uint64_t count;
     uint64_t *row;       /* [count][EBPO_PATCH_COLUMNS]; NULL: not read yet */

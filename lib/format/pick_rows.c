@@ -1,8 +1,9 @@
-/* Reads selected rows of a file's arrays. A run is a range of sibling groups of one level. For
- * runs, all arrays of the level are read for the nodes in these groups, including lists of planes
- * and references. Their values are checked as schema.c checks levels. Rows of the mesh's arrays and
- * of attributes are read in any order, chunk by chunk. Prefetch hints for all chunks are sent
- * first, and each chunk is fetched once. Source: format-spec/README.md, sections 6 and 7. */
+/* Reads selected rows of a file's arrays. A run is a range of groups (eight siblings) of one level.
+ * The rank of a node is its position among the nodes of its type in its level. For runs, all arrays
+ * of the level are read for the nodes in these groups, including lists of planes and references.
+ * Their values are checked as schema.c checks levels. Rows of the mesh's arrays and of attributes
+ * are read in any order, chunk by chunk. Prefetch hints for all chunks are sent first, and each
+ * chunk is fetched once. Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -50,7 +51,8 @@ static bool is_wanted_array(const reading *r, int id)
 
 /* --- prefetch hints --- */
 
-/* Returns the index array with sums of this array, or -1. */
+/* Returns the index array with sums of this array, or -1. An index array has a row of sums for
+ * every EBPO_INDEX_ROWS-th node. */
 static int index_of(int id)
 {
     switch (id) {

@@ -9,7 +9,8 @@
 #include "mesh/attributes.h"
 
 /* A run: groups [group, group + groups) of a level, each with eight siblings; level 0 has only
- * group 0. The run's nodes of type k have the ranks [rank[k], rank[k] + count[k]). */
+ * group 0. The rank of a node is its position among the nodes of its type in its level. The run's
+ * nodes of type k have the ranks [rank[k], rank[k] + count[k]). */
 typedef struct ebpo_run {
     uint64_t group, groups;
     uint64_t rank[4], count[4];

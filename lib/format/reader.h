@@ -62,8 +62,9 @@ EBPO_MUST_USE ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_ar
                                             uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
 
-/* Fetches a chunk of faces that are stored as gates (face_gates.h), without converting the gates to
- * corners. Writes EBPO_GATES_COLS bytes for each row. */
+/* Fetches a chunk of faces that are stored as gates (relative to edges of preceding faces,
+ * face_gates.h), without converting the gates to corners. Writes EBPO_GATES_COLS bytes for each
+ * row. */
 EBPO_MUST_USE ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk,
                                             ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);

@@ -1,10 +1,11 @@
-/* Reads slices: a complete subtree or the whole tree. A subtree is a contiguous range of nodes in
- * every level. A slice contains these ranges, the faces that its leaves list, and the vertices of
- * these faces. Faces have local indices: first the shared faces, then the owned faces, both in
- * ascending order of their file indices. A leaf before the subtree also lists the shared faces. No
- * leaf before the subtree lists the owned faces. A hash table (ebpo_compact) maps scattered indices
- * to dense indices. A caller may limit the memory (ebpo_quota); the bytes of each array are
- * reserved before it is allocated. Source: format-spec/README.md, sections 6 and 7. */
+/* Reads slices: a complete subtree or the whole tree. A subtree is a node with all nodes below it,
+ * and a contiguous range of nodes in every level. Gray nodes have children, and leaves list faces.
+ * A slice contains these ranges, the faces that its leaves list, and the vertices of these faces.
+ * Faces have local indices: first the shared faces, then the owned faces, both in ascending order
+ * of their file indices. A leaf before the subtree also lists the shared faces. No leaf before the
+ * subtree lists the owned faces. A hash table (ebpo_compact) maps scattered indices to dense
+ * indices. A caller may limit the memory (ebpo_quota); the bytes of each array are reserved before
+ * it is allocated. Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,8 @@
-/* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees,
- * /subtrees/counts, which has a row of counts for each subtree. It computes the sums of all counts
- * before a subtree. /subtrees/index has a row of sums for each chunk of the table; the rows of the
- * chunk before the subtree are added to this row. It caches recently used rows.
+/* Locates subtrees and nodes in every array. The root of a subtree is a gray node (a node with
+ * children) of a fixed level. The first part reads the file's table of subtrees, /subtrees/counts,
+ * which has a row of counts for each subtree. It computes the sums of all counts before a subtree.
+ * /subtrees/index has a row of sums for each chunk of the table; the rows of the chunk before the
+ * subtree are added to this row. It caches recently used rows.
  *
  * The second part computes ranks: the numbers of planes, faces and nodes of each type before a
  * node. In levels below the subtrees' roots, counting begins at the row of the node's subtree. In

@@ -394,8 +394,8 @@ static void digest_window(writer *w)
     }
 }
 
-/* Compresses a chunk of faces that are stored as gates (face_gates.h). Pads the last chunk with
- * zeros after the rows of gates. */
+/* Compresses a chunk of faces that are stored as gates: relative to edges of preceding faces
+ * (face_gates.h). Pads the last chunk with zeros after the rows of gates. */
 static ebpo_status compress_gates(window_chunk *s, ebpo_chunk_coder *coder, int level)
 {
     ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);

@@ -1,8 +1,8 @@
 /* Plans a file to write: lists its arrays with shapes and codings, and encodes rows of an array to
  * bytes. The plan refers to the caller's checked tree. The plan owns only derived arrays: index
- * arrays, counts and sums of subtrees, and codings of attributes. In an index array, the sums that
- * belong to an absent part are 0. Encoding a chunk depends only on the plan and the chunk's rows,
- * so threads encode chunks independently. */
+ * arrays, counts and sums of subtrees, and codings of attributes. An index array has a row of sums
+ * for every EBPO_INDEX_ROWS-th item; sums that belong to an absent part are 0. Encoding a chunk
+ * depends only on the plan and the chunk's rows, so threads encode chunks independently. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -467,10 +467,10 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
-/* Returns true if faces are to be stored as gates (hdf5_read/face_gates.h). By default, faces are
- * stored as gates if the tree was read from a file with gates (`tree_has_gates`) and the new file
- * is compressed. Without compression, gates take more space, because they contain many zero bytes.
- */
+/* Returns true if faces are to be stored as gates: relative to edges of preceding faces
+ * (hdf5_read/face_gates.h). By default, faces are stored as gates if the tree was read from a file
+ * with gates (`tree_has_gates`) and the new file is compressed. Without compression, gates take
+ * more space, because they contain many zero bytes. */
 static bool gates_wanted(const ebpo_info *info, bool tree_has_gates, ebpo_face_coding coding)
 {
     bool by_default = tree_has_gates && info->codec != EBPO_CODEC_NONE;
