@@ -93,9 +93,10 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id
 void ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *hints, ebpo_array_id id, int level,
                       uint64_t row, uint64_t rows);
 
-/* Set of chunk keys. A key identifies a chunk in the cache. Keys that do not fit are omitted; their
- * chunks are later read without a prefetch hint. Initialise a set with ebpo_chunk_keys_begin, which
- * clears only the members that are used first (the struct is large). */
+/* Set of chunk keys. A key identifies a chunk in the cache. Keys beyond EBPO_CHUNK_KEYS are
+ * omitted, and their chunks are later read without a prefetch hint. Initialise a set with
+ * ebpo_chunk_keys_begin, which clears only the members that are used first (the struct is large).
+ */
 enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
     unsigned count, mask; /* mask + 1 slots */

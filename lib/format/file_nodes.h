@@ -78,8 +78,8 @@ bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *group, unsi
 
 /* Fetches the missing chunks of the first group from a remote file. Prefetches the missing chunks
  * of the other groups at the same time, if memory already has the data that locate these chunks.
- * For EBPO_GROUP_BLOCK adjacent groups, one group in `groups` is sufficient. Returns EBPO_E_LIMIT
- * like ebpo_group_read. */
+ * The chunks of EBPO_GROUP_BLOCK adjacent groups are fetched together, so one of these groups in
+ * `groups` is sufficient. Returns EBPO_E_LIMIT like ebpo_group_read. */
 EBPO_MUST_USE ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups,
                                            unsigned count, unsigned wanted, ebpo_error *error);
 

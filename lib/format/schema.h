@@ -105,8 +105,8 @@ enum {
     EBPO_S_PLANES,
     EBPO_S_LEAF_PLANES,
     EBPO_S_REFS,
-    /* The end of the new faces is one past the last new face of the level's leaves so far. The
-     * column has the end after the subtree's leaves, minus the end before these leaves. */
+    /* The *end* of a leaf is one past its last new face. The column has the end of the last leaf of
+     * the subtree in the level, minus the end of the last leaf of the level before the subtree. */
     EBPO_S_ENDS,
     EBPO_SUBTREE_LEVEL_COLS
 };
@@ -131,7 +131,7 @@ typedef struct ebpo_array_spec {
     const char *name; /* within /levels/NN, or the full path */
     ebpo_per per;
     uint32_t needs; /* conditions, EBPO_NEEDS_...; one of them suffices */
-    uint8_t cols;   /* 0: one dimension */
+    uint8_t cols;   /* 0: the array has one dimension */
     uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
     bool if_needed; /* true: the file may omit the array if all values are default_value */
@@ -163,7 +163,7 @@ const char *ebpo_schema_former(ebpo_array_id id);
 /* Writes the attribute `columns`: a name for each column; "" for arrays of one dimension. */
 void ebpo_schema_columns(const ebpo_info *info, ebpo_array_id id, char names[EBPO_COLUMNS_BYTES]);
 
-/* Returns the columns of an array; 0: one dimension. */
+/* Returns the number of columns of an array; 0: the array has one dimension. */
 uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
 
 /* Returns the number of rows that the header's counts and parts require, or EBPO_ROWS_STATED.

@@ -43,8 +43,8 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *ch
                                                 ebpo_error *error);
 
 /* Same as ebpo_slice_read_parts, with a limit of memory. Reserves the bytes of each array in
- * `space` before allocating it, and keeps them reserved. Releases the bytes of temporary arrays.
- * Returns EBPO_E_LIMIT beyond the limit. */
+ * `space` before the array is allocated. The bytes of the slice stay reserved. The bytes of
+ * temporary arrays are released. Returns EBPO_E_LIMIT beyond the limit. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks,
                                                  const ebpo_node *root, uint32_t needs,
                                                  ebpo_quota *space, ebpo_error *error);

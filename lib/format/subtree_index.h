@@ -39,15 +39,15 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
 bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
 void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 
-/* Returns the number of groups of a level before the row's subtree; if `after` is true, before the
- * next subtree. */
+/* Returns the number of groups of a level before the row's subtree. If `after` is true, returns the
+ * number of groups before the next subtree. */
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after);
 
 /* Adds to `keys` the chunks of the table that are not in memory and are needed to find an item of a
  * level. `per` is the kind of item: EBPO_PER_GROUP, EBPO_PER_GRAY or EBPO_PER_LEAF. Returns true if
- * there are such chunks, and on errors, which the later read reports. If the function returns
- * false, *first is the first item of this kind in the subtree of `item`. */
+ * there are such chunks. Also returns true on errors, which the later read reports. If the function
+ * returns false, *first is the first item of this kind in the subtree of `item`. */
 bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
                                 ebpo_chunk_keys *keys, uint64_t *first);
 
@@ -56,8 +56,8 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
 void ebpo_subtree_table_hint(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count);
 void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t count);
 
-/* --- ranks: sums from the preceding row of an index array or of the table, plus a count of the
- * items since this row --- */
+/* --- ranks: a rank is the number of items before an item. It is a sum in the preceding row of an
+ * index array or of the table, plus the number of items since this row --- */
 
 /* Sums rows of an unsigned array. Returns EBPO_E_FORMAT when the sum is 2^62 or more. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level,

@@ -15,7 +15,7 @@ EBPO_MUST_USE ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
 void ebpo_plan_free(ebpo_plan *plan);
 
 /* Encodes rows [row, row + rows) of an array, as stored before compression. `row` is a multiple of
- * the rows of a chunk; `rows` is at most that number. */
+ * the array's chunk_rows; `rows` is at most chunk_rows. */
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
                       uint64_t rows, uint8_t *encoded);
 

@@ -465,10 +465,10 @@ typedef struct ebpo_cells_options {
     }
 
 /*
- * Cells of an octree in the world. The root cell is a cube around the result's box. A cell is *in*
- * if the closed cell is certainly in the interior of the result. A cell is *out* if certainly no
- * point of the cell belongs to the result. All other cells are *mixed*, and are subdivided down to
- * the level of the options.
+ * Cells of an octree in the world coordinates of the poses. The root cell is a cube around the
+ * result's box. A cell is *in* if the closed cell is certainly in the interior of the result. A
+ * cell is *out* if certainly no point of the cell belongs to the result. All other cells are
+ * *mixed*, and are subdivided down to the level of the options.
  */
 typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 

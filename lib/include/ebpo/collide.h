@@ -18,8 +18,8 @@
  * budgets either, with two exceptions: the pair of intersecting faces that ebpo_collide_first and
  * ebpo_collide_distance return, and distances within a tolerance. Every query supports partly
  * loaded models, of which only some subtrees are in memory, because of a budget or a cut level
- * (query.h).
- * docs/develop/collision.md explains the kinds of pairs.
+ * (query.h). The envelope of a node is a convex polyhedron that contains the part of the solid in
+ * the node's cell. docs/develop/collision.md explains the kinds of pairs.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H

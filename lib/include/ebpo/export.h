@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Exports levels, simplified surfaces and the mesh to formats of other programs.
- * ebpo_mesh_write_ply (mesh.h) writes PLY.
+ * Exports levels, simplified surfaces and the mesh to formats of other programs. A level is
+ * exported as the envelopes of its nodes, which are convex polyhedra that contain the parts of the
+ * solid in the nodes' cells. ebpo_mesh_write_ply (mesh.h) writes PLY.
  */
 #ifndef EBPO_EXPORT_H
 #define EBPO_EXPORT_H
@@ -116,7 +117,7 @@ typedef struct ebpo_export_options {
 typedef struct ebpo_export_block {
     int level;                    /* -1: the mesh */
     uint64_t nodes;               /* number of polyhedra; 0 for the mesh */
-    uint64_t polygons;            /* number of polygons; for the mesh, of its triangles */
+    uint64_t polygons;            /* number of polygons; for the mesh, number of triangles */
     uint64_t triangles, vertices; /* numbers of triangles and vertices in the exported file */
     double volume;                /* volume of the envelopes; 0 for the mesh */
 } ebpo_export_block;

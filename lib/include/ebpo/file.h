@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Reads and writes .ebpo.h5 files. format-spec/ describes the format byte by byte.
+ * Reads and writes .ebpo.h5 files. A file contains a mesh and an octree. The envelope of a node of
+ * the octree is a convex polyhedron that contains the part of the solid in the node's cell.
+ * format-spec/ describes the format byte by byte.
  *
  *   Contents   ebpo_tree (a whole model in memory), ebpo_level, ebpo_info, ebpo_plane_decode
  *   Writing    ebpo_tree_write
@@ -109,7 +111,10 @@ typedef struct ebpo_level {
     /* Number of nodes of each type. */
     uint64_t gray_count, leaf_count, white_count, black_count;
 
-    /* [group_count] type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
+    /*
+     * [group_count] types of the eight nodes of a group: bits 2i and 2i + 1 have the type of octant
+     * i. In i, bit 0 is set for the upper half in x, bit 1 in y, bit 2 in z
+     */
     uint16_t *types;
 
     /*
@@ -212,10 +217,10 @@ typedef struct ebpo_level {
 EBPO_API void ebpo_level_free(ebpo_level *level);
 
 /*
- * Decodes the half-space of a plane code. Coordinates are those of the node's cell: xi = (p -
- * corner) / cell size on each axis, 0 to 1. The half-space contains the points with 4096 * (n . xi)
- * <= d. n and d are integers, and |n0| + |n1| + |n2| = 511. The half-space is exact: readers use
- * these integers without rounding. Returns false for invalid codes.
+ * Decodes the half-space of a plane code. Coordinates are relative to the node's cell: xi = (p -
+ * lowest corner) / cell size on each axis, 0 to 1. The half-space contains the points with 4096 *
+ * (n . xi) <= d. n and d are integers, and |n0| + |n1| + |n2| = 511. The half-space is exact:
+ * readers use these integers without rounding. Returns false for invalid codes.
  *
  * Threads: any.
  */

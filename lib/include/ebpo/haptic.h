@@ -304,12 +304,12 @@ typedef struct ebpo_haptic_probe_result {
 /*
  * Computes one haptic step of a probe, which has no collisions. The result has bounds of the
  * distance from `position` to the model. The bounds combine three sources in memory:
- *   - The near faces, and the sides of these faces on which the probe is. Exact arithmetic tracks
+ * - The near faces, and the sides of these faces on which the probe is. Exact arithmetic tracks
  *   these sides. Within `search_radius` of a face, the result is exact except for rounding.
- *   - The first levels of the octree, at most 2^17 nodes. Leaves and gray nodes bound the distance;
- *   white and black nodes give the side.
- *   - The exact result for an earlier position of the probe, which the loading thread computes. The
- *   distance has changed since by at most the length of the probe's path.
+ * - The first levels of the octree, at most 2^17 nodes. Leaves and gray nodes (nodes with children)
+ *   bound the distance. White nodes (outside the solid) and black nodes (inside) give the side.
+ * - The exact result for an earlier position of the probe, which the loading thread computes. Since
+ *   then, the distance has changed by at most the length of the probe's path.
  *
  * Time, locks, memory and reading are as in ebpo_haptic_step_ball.
  *

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * Extracts a smaller file: selected levels, a box, selected parts, or a target size.
+ * Extracts a smaller file: selected levels, a box, selected parts, or a target size. The envelope
+ * of a node is a convex polyhedron that contains the part of the solid in the node's cell.
  *
  *     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
  *     options.last_level = 5;

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * Reads a part of a model as plain arrays: the nodes, envelopes and faces below a node.
+ * Reads a part of a model as plain arrays: the nodes, envelopes and faces below a node. The
+ * envelope of a node is a convex polyhedron that contains the part of the solid in the node's cell.
+ * Gray nodes have children, leaves list faces, white nodes are outside the solid, and black nodes
+ * are inside.
  *
  *     ebpo_subtree *subtree = NULL;
  *     ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;

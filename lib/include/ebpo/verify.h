@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * Verifies the guarantees of a file.
+ * Verifies the guarantees of a file. The envelope of a node is a convex polyhedron that contains
+ * the part of the solid in the node's cell.
  */
 #ifndef EBPO_VERIFY_H
 #define EBPO_VERIFY_H
