@@ -41,7 +41,7 @@ static const char TILESET[] = "tileset.json";
 typedef struct tile {
     /* bounds of the content; include_children extends them to the tiles below */
     double min[3], max[3];
-    double error;    /* geometricError */
+    double error;    /* geometricError of the tile */
     uint64_t number; /* number of the tile's file */
 } tile;
 
@@ -50,10 +50,10 @@ typedef struct tiler {
     const ebpo_info *info;
     ebpo_chunks *chunks;
     ebpo_patch_table table;
-    tile *patch; /* [table.count] */
+    tile *patch; /* [table.count] tiles of the patches */
     tile *faces; /* [table.count] tiles of the faces of patches without patches below */
     double origin[3];
-    char *folder;   /* temporary name */
+    char *folder;   /* path of the temporary folder */
     uint64_t files; /* number of tile files that may exist */
 } tiler;
 

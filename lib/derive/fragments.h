@@ -101,7 +101,7 @@ typedef struct ebpo_fragment ebpo_fragment;
 
 typedef struct ebpo_bounder {
     const ebpo_lod_model *model_tree; /* tree of the whole model, which determines the solid */
-    ebpo_context *context;            /* for distance queries of the same model */
+    ebpo_context *context;            /* context for distance queries of the same model */
     ebpo_leaf_scratch scratch;
     ebpo_half_spaces half_spaces; /* half-spaces of the envelope, in cell coordinates */
     ebpo_fragment *fragments;     /* a stack: fragments that are still to be examined */

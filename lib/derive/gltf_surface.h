@@ -10,8 +10,8 @@
 /* A surface to write. */
 typedef struct ebpo_gltf_surface {
     uint64_t vertex_count, triangle_count;
-    const uint32_t *triangles; /* [triangle_count][3] */
-    const double *xyz;         /* [vertex_count][3] */
+    const uint32_t *triangles; /* [triangle_count][3] vertex indices */
+    const double *xyz;         /* [vertex_count][3] positions, in the model's unit */
     const float *normals;      /* [vertex_count][3], of length 1 */
     const uint8_t *colours;    /* [vertex_count][colour_bytes] sRGB; NULL: none */
     unsigned colour_bytes;     /* 3, or 4 with opacity */

@@ -68,7 +68,7 @@ static void hull_free(hull *h)
 static double volume_by(hull *h, double *points, int count, char *command, bool *failed)
 {
     qhT *qh = &h->qhull;
-    volatile double volume = 0; /* set between setjmp and a jump */
+    volatile double volume = 0; /* volatile, because it is set between setjmp and a jump */
     volatile bool has_failed = true;
     qh_zero(qh, h->null_file);
     if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->null_file) == 0) {
@@ -128,7 +128,7 @@ static double hull_volume(hull *h, double *points, uint64_t count)
 typedef struct scratch {
     hull *hull;
     uint32_t *list;       /* [list_count] indices of the node's faces */
-    ebpo_triangle *faces; /* [list_count] */
+    ebpo_triangle *faces; /* [list_count] corners of these faces */
     double *points;       /* [point_count][3] points of the hull, in cell coordinates */
     uint64_t list_count, list_capacity, faces_capacity, point_count, points_capacity;
 } scratch;

@@ -16,7 +16,7 @@ typedef struct ebpo_subtree_sums {
     uint64_t subtrees; /* number of subtrees */
     uint32_t cols;     /* number of columns */
     uint64_t *before;  /* [subtrees + 1][cols] sums of the columns before each subtree */
-    uint32_t *counts;  /* [subtrees][cols] /subtrees/counts */
+    uint32_t *counts;  /* [subtrees][cols] rows of /subtrees/counts */
     uint64_t *index;   /* [chunks][cols] sums before each chunk of /subtrees/counts */
     uint32_t *shared;  /* [shared_count] rows of /subtrees/shared_chunks */
     uint64_t shared_count, shared_capacity;
@@ -38,7 +38,7 @@ typedef struct ebpo_array_out {
     ebpo_array_id id;
     int level;
     char path[EBPO_PATH_BYTES];
-    ebpo_shape shape; /* of the values; ebpo_stored_shape gives the shape in the file */
+    ebpo_shape shape; /* shape of the values; ebpo_stored_shape returns the shape in the file */
     /* true: the array has faces that are stored as gates (EBPO_GATES_CODING of schema.h) */
     bool gates;
     /* native integers, row by row; NULL for arrays with a special coding */
@@ -62,14 +62,14 @@ typedef struct ebpo_attribute_plan {
 /* A file to write (write_plan.h). */
 typedef struct ebpo_plan {
     const ebpo_tree *tree;
-    ebpo_info info;        /* as stated in the file */
+    ebpo_info info;        /* the values that the file states */
     ebpo_array_out *array; /* [count] the arrays of the file */
     unsigned count;
     uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES]; /* the index arrays of each level */
     uint64_t *faces_index;             /* number of vertices that the faces before each chunk use */
     ebpo_subtree_sums subtrees;        /* empty if info.subtree_level is 0 */
     const ebpo_attributes *attributes; /* NULL: no attributes */
-    ebpo_attribute_plan *attribute;    /* [attributes->count] */
+    ebpo_attribute_plan *attribute;    /* [attributes->count] plan of each attribute array */
     uint8_t attributes_sha256[32];
 } ebpo_plan;
 

@@ -41,7 +41,7 @@ typedef struct fact {
     const char *name;
     fact_kind kind;
     size_t offset, size;      /* offset and size of the member, in bytes */
-    const char *const *words; /* for FACT_WORD: words by value, then NULL */
+    const char *const *words; /* for FACT_WORD: the word of each value, then NULL */
 } fact;
 
 #define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL

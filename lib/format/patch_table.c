@@ -131,7 +131,9 @@ ebpo_status ebpo_patches_take(const ebpo_patch_table *table, ebpo_chunks *chunks
                               const uint64_t *patches, uint64_t count, ebpo_surface *out,
                               ebpo_error *error)
 {
-    uint8_t *to[ARRAY_COUNT] = { NULL }; /* where the next rows of each array are written */
+    uint8_t *to[ARRAY_COUNT] = {
+        NULL
+    }; /* position at which the next rows of each array are written */
     ebpo_status status = EBPO_OK;
     memset(out, 0, sizeof *out);
     for (uint64_t i = 0; i < count; i++) {

@@ -73,7 +73,8 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
 {
     refs_job *j = context;
     (void)worker;
-    uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1]; /* next reference */
+    uint64_t leaf = begin * EBPO_INDEX_ROWS,
+             at = j->index[begin * 3 + 1]; /* at: index of the next reference */
     uint64_t leaf_end =
         end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
     for (; leaf < leaf_end; at += j->level->leaf_ref_count[leaf++])

@@ -91,7 +91,7 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
 /* A count of a level: a row LEVEL_COUNT of array_table.inc. */
 typedef struct count_spec {
     const char *name;              /* HDF5 attribute of the level's group */
-    uint32_t needs;                /* EBPO_NEEDS_... */
+    uint32_t needs;                /* condition for a count above 0: EBPO_NEEDS_... */
     uint16_t in_level, in_summary; /* offset in ebpo_level and in ebpo_level_summary */
 } count_spec;
 

@@ -393,7 +393,7 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
 
 /* Selected levels of a subtree, and the data to read. */
 typedef struct extent {
-    uint32_t needs;    /* EBPO_NEEDS_... (schema.h) */
+    uint32_t needs;    /* EBPO_NEEDS_... (schema.h): arrays to read */
     int end;           /* one past the deepest selected level, as a level of the file */
     bool faces;        /* the faces that the leaves list will also be read */
     ebpo_quota *space; /* NULL: no limit */

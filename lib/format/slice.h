@@ -27,7 +27,7 @@ typedef struct ebpo_slice {
     uint32_t shared_count;
     uint32_t *shared; /* [shared_count] file indices, ascending */
     uint64_t first_face;
-    uint64_t face_count; /* owned faces */
+    uint64_t face_count; /* number of owned faces */
     ebpo_mesh mesh;      /* shared_count + face_count faces, vertices in any order */
     /* [shared_count + face_count] source indices, or NULL if the file lacks the part `maps` */
     uint32_t *face_source;
@@ -69,7 +69,7 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *
 typedef struct ebpo_slice_size {
     uint64_t groups, leaves;
     uint64_t refs;      /* references of leaves to faces that an earlier leaf already lists */
-    uint64_t new_faces; /* owned faces */
+    uint64_t new_faces; /* number of owned faces */
     uint64_t shared;    /* maximum number of shared faces */
     uint64_t planes;    /* planes of gray nodes and of leaves, if these planes are requested */
 } ebpo_slice_size;

@@ -602,7 +602,8 @@ static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t gro
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_subtree_row row;
-    bool roots = level == info->subtree_level + 1; /* one group for each subtree */
+    bool roots =
+        level == info->subtree_level + 1; /* true: the level has one group for each subtree */
     uint64_t last = info->level[info->subtree_level].gray_count - 1;
     ebpo_status status =
         roots ? ebpo_subtree_table_row(chunks, group < last ? group : last, &row, error)

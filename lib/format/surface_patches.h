@@ -16,7 +16,7 @@ enum { EBPO_PATCH_GRID = 10, EBPO_PATCH_CELLS = 5, EBPO_PATCH_LEVEL = 14 };
 /* A patch to encode. */
 typedef struct ebpo_patch_source {
     uint64_t vertex_count, triangle_count;
-    const uint32_t *triangle;  /* [triangle_count][3] */
+    const uint32_t *triangle;  /* [triangle_count][3] vertex indices */
     const int16_t *point;      /* [vertex_count][3] steps of the grid from the lowest corner of the
                                   node's cell */
     const double (*normal)[3]; /* [vertex_count] of any length */

@@ -331,7 +331,7 @@ typedef struct writer {
     file_headers head;
     window_chunk window[WINDOW_CHUNKS];
     unsigned used;            /* number of chunks in the window */
-    ebpo_chunk_coder *coders; /* [threads] */
+    ebpo_chunk_coder *coders; /* [threads] compression state of each thread */
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];

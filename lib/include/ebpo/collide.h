@@ -211,8 +211,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_relation(ebpo_collider *collider
 /* ---- all pairs of faces ---- */
 
 /*
- * Callback that gets pairs, which are valid until the callback returns. It returns false to stop
- * the call. It is never called by two threads at the same time.
+ * Callback that gets pairs, which are valid until the callback returns. The callback returns false
+ * to stop the call. It is never called by two threads at the same time.
  */
 typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t count);
 
@@ -273,7 +273,10 @@ typedef struct ebpo_contact_segment {
     uint8_t reserved[4];
 } ebpo_contact_segment;
 
-/* Callback that gets segments, which are valid until it returns. Returns false to stop the call. */
+/*
+ * Callback that gets segments, which are valid until it returns. The callback returns false to stop
+ * the call.
+ */
 typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segments, uint64_t count);
 
 /*
@@ -301,7 +304,7 @@ typedef struct ebpo_polyline {
     uint8_t reserved[7];
 } ebpo_polyline;
 
-/* Callback that gets a line. It returns false to stop the call. */
+/* Callback that gets a line. The callback returns false to stop the call. */
 typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
 
 /*
@@ -587,8 +590,8 @@ typedef struct ebpo_self_intersection {
 } ebpo_self_intersection;
 
 /*
- * Callback that gets intersections, which are valid until it returns. It returns false to stop the
- * call.
+ * Callback that gets intersections, which are valid until it returns. The callback returns false to
+ * stop the call.
  */
 typedef bool (*ebpo_self_intersections_fn)(void *user, const ebpo_self_intersection *crossings,
                                            uint64_t count);

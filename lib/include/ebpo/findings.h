@@ -85,7 +85,7 @@ typedef struct ebpo_mesh_finding {
     double point[3];
 } ebpo_mesh_finding;
 
-/* Callback that gets a finding. It returns false to stop the call. */
+/* Callback that gets a finding. The callback returns false to stop the call. */
 typedef bool (*ebpo_findings_fn)(void *user, const ebpo_mesh_finding *finding);
 
 /* Options of ebpo_mesh_findings. */

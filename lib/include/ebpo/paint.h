@@ -595,7 +595,7 @@ typedef struct ebpo_paint_face {
     uint8_t reserved[5];
 } ebpo_paint_face;
 
-/* Callback that gets a face. It returns false to stop the call. */
+/* Callback that gets a face. The callback returns false to stop the call. */
 typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*

@@ -648,7 +648,7 @@ typedef struct ebpo_near_face {
     uint64_t reserved[3];
 } ebpo_near_face;
 
-/* Callback that gets a face. It returns false to stop the call. */
+/* Callback that gets a face. The callback returns false to stop the call. */
 typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
 
 /*
@@ -928,7 +928,7 @@ typedef struct ebpo_triangles {
     uint64_t reserved[4];
 } ebpo_triangles;
 
-/* Callback that gets a batch. It returns false to stop the call. */
+/* Callback that gets a batch. The callback returns false to stop the call. */
 typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 
 /*

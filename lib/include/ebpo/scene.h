@@ -455,7 +455,10 @@ typedef struct ebpo_scene_pair {
     double clearance;
 } ebpo_scene_pair;
 
-/* Callback that gets pairs, which are valid until it returns. Returns false to stop the call. */
+/*
+ * Callback that gets pairs, which are valid until it returns. The callback returns false to stop
+ * the call.
+ */
 typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, uint64_t count);
 
 /*
@@ -553,7 +556,10 @@ typedef struct ebpo_scene_clash {
     ebpo_value_bounds depth[2];
 } ebpo_scene_clash;
 
-/* Callback that gets clashes, which are valid until it returns. Returns false to stop the call. */
+/*
+ * Callback that gets clashes, which are valid until it returns. The callback returns false to stop
+ * the call.
+ */
 typedef bool (*ebpo_scene_clashes_fn)(void *user, const ebpo_scene_clash *clashes, uint64_t count);
 
 /* Options of ebpo_scene_find_clashes. */
@@ -727,7 +733,10 @@ typedef struct ebpo_scene_approach_result {
     int32_t reserved;
 } ebpo_scene_approach_result;
 
-/* Callback that gets results, which are valid until it returns. Returns false to stop the call. */
+/*
+ * Callback that gets results, which are valid until it returns. The callback returns false to stop
+ * the call.
+ */
 typedef bool (*ebpo_scene_approaches_fn)(void *user, const ebpo_scene_approach_result *results,
                                          uint64_t count);
 

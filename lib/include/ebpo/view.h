@@ -299,8 +299,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_change(ebpo_view_stream *str
                                                            ebpo_error *error);
 
 /*
- * Callback that gets a node, which is valid until the callback returns. It returns false to stop
- * the call.
+ * Callback that gets a node, which is valid until the callback returns. The callback returns false
+ * to stop the call.
  */
 typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 
