@@ -56,9 +56,9 @@ static int last_whole_level(const ebpo_info *info)
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
 }
 
-/* Returns the first deep level. The chunks of all deep levels are sorted by subtree together. The
- * chunks of the levels between the last whole level and the first deep level are sorted by subtree
- * level by level. */
+/* Returns the first deep level. The chunks of all deep levels are sorted together, by subtree. The
+ * chunks of the levels between the last whole level and the first deep level are sorted by level,
+ * and within a level by subtree. */
 static int first_deep_level(const ebpo_info *info)
 {
     int level = last_whole_level(info) + 1;
@@ -68,10 +68,10 @@ static int first_deep_level(const ebpo_info *info)
     return level;
 }
 
-/* Returns the power of two that is nearest, in ratio, to the average number x of rows for
- * CHUNK_FACES faces: the least power of two that is at least x / sqrt(2). Compares squares of
- * integers instead of roots, because the bytes of a file depend on the result. There are at most
- * 2^40 rows, so both sides are below 2^64 before squaring. */
+/* Let x be the average number of rows for CHUNK_FACES faces. Returns the power of two that is
+ * nearest to x in ratio, which is the least power of two that is at least x / sqrt(2). Compares
+ * squares of integers instead of roots, because the bytes of a file depend on the result. There are
+ * at most 2^40 rows, so both sides are below 2^64 before squaring. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
     uint64_t wanted = rows * CHUNK_FACES, power = 1;
@@ -190,8 +190,8 @@ static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const owned_range 
     }
 }
 
-/* Lists the blocks of the shared faces among these references (faces that an earlier leaf lists),
- * and the blocks of the shared vertices of these faces. */
+/* References are faces that an earlier leaf lists. Lists the blocks of the shared faces among
+ * `refs`, and the blocks of the shared vertices of these faces. */
 static void shared_blocks_refer(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own,
                                 const uint32_t *refs, uint64_t count)
 {
@@ -230,10 +230,9 @@ static uint64_t sort_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
     return written;
 }
 
-/* Writes the listed blocks to `out`, blocks of faces first. A block is written as the number of
- * blocks from it to the block of the subtree's first owned face or vertex. Sets the sums `after`
- * the subtree: the sums `before` the subtree plus the numbers of written blocks. Clears the lists.
- */
+/* Writes the listed blocks to `out`, blocks of faces first. A block is written as its distance, in
+ * blocks, from the block of the subtree's first owned face or vertex. Sets the sums `after` the
+ * subtree: the sums `before` the subtree plus the numbers of written blocks. Clears the lists. */
 static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_t *out,
                                const uint64_t *before, uint64_t *after)
 {
@@ -360,7 +359,8 @@ static void owned_faces(const counting *c, uint64_t subtree, uint64_t *first, ui
     }
 }
 
-/* Counts the owned faces of each subtree, and the faces before them that no subtree owns. */
+/* Counts the owned faces of each subtree, and the faces between the previous subtree's owned faces
+ * and these faces, which no subtree owns. */
 static void count_faces(const counting *c)
 {
     uint64_t at = 0, first, end;

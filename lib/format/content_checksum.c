@@ -76,7 +76,7 @@ static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool
     }
 }
 
-/* Adds only the rows of /mesh/faces_index that a file without subtrees has. */
+/* Adds only the rows of /mesh/faces_index that the same model has in a file without subtrees. */
 static void add_faces_index(ebpo_array_digest *digest, uint64_t row, uint64_t rows,
                             size_t row_bytes, const uint8_t *bytes)
 {

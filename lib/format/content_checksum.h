@@ -43,9 +43,9 @@ static inline int ebpo_content_of(ebpo_array_id id, bool solid)
                                        : EBPO_DIGEST_CONTENT;
 }
 
-/* Digest of one array, computed chunk by chunk. Files with subtrees have chunks with fewer rows
- * than other files. To give the same digest, these chunks are combined into chunks as large as in
- * other files, and codes that restart with each chunk are recoded. */
+/* Digest of one array, computed chunk by chunk. Files with a table of subtrees have chunks with
+ * fewer rows than other files. To give the same digest, these chunks are combined into chunks as
+ * large as in other files, and codes that restart with each chunk are recoded. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
     uint64_t last[3]; /* running sums of the components at the end of the previous chunk */

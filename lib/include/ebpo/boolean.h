@@ -448,8 +448,8 @@ typedef struct ebpo_cells_options {
     uint32_t reserved;
 
     /*
-     * Maximum number of mixed cells of a level; if there are more, EBPO_E_LIMIT is returned. A
-     * mixed cell takes 32 bytes while the next level is made. 0: 2^25.
+     * Maximum number of mixed cells of a level; if there are more, EBPO_E_LIMIT is returned. While
+     * the next level is made, each mixed cell takes 32 bytes. 0: 2^25.
      */
     uint64_t most;
 

@@ -43,7 +43,7 @@ typedef struct ebpo_catalogue ebpo_catalogue;
 typedef struct ebpo_catalogue_entry {
     /*
      * Path or URL of the model. If `surface` is not NULL: path or URL of the part with caps, which
-     * is used for winding numbers. Not NULL, not empty.
+     * is used for winding numbers. Must not be NULL or empty.
      */
     const char *path;
 
@@ -55,7 +55,7 @@ typedef struct ebpo_catalogue_entry {
 
     /*
      * For a part: path of an .npy file of face indices. For each face of the part that is used for
-     * distances and rays, the file has the face's index in the whole model. Not an empty string.
+     * distances and rays, the file has the face's index in the whole model. Must not be empty.
      * NULL: results give the indices of faces in the part.
      */
     const char *numbers;
@@ -315,9 +315,9 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
 /*
  * Rules for the queries of a catalogue. query.h gives the valid values of points and rays. For
  * other values, queries return EBPO_E_ARGUMENT, and the message gives the index of the point or
- * ray. Points are processed along a curve, so that each model and subtree is loaded only a few
- * times. On failure the results are unspecified. Errors are those of opening and querying models.
- * EBPO_E_LIMIT: a model does not fit in its share of the budget.
+ * ray. Points are sorted along a space-filling curve, so that each model and subtree is loaded only
+ * a few times. On failure the results are unspecified. Errors are those of opening and querying
+ * models. EBPO_E_LIMIT: a model does not fit in its share of the budget.
  *
  * A query waits while other queries use the budget. Therefore a callback of a query, such as
  * ebpo_catalogue_open_fn, must not query the same ebpo_catalogue_models.

@@ -19,8 +19,8 @@ typedef struct ebpo_colours {
     uint8_t *face;
 
     /*
-     * 1: prefer the colours of faces, because vertices have no colours or all have the same colour;
-     * 0: prefer the colours of vertices
+     * Colours that a viewer should prefer. 1: colours of faces, because vertices have no colours or
+     * all have the same colour; 0: colours of vertices
      */
     uint64_t by_face;
 } ebpo_colours;

@@ -86,8 +86,8 @@ typedef struct ebpo_error_bound {
  * Computes the maximum distance of a point of a level's envelopes from the model.
  *
  * The envelopes are those of ebpo_lod_level including their interior, so a cavity covered by an
- * envelope counts. The model is the closed solid with all its faces, so the distance is 0 inside;
- * for a surface, its faces.
+ * envelope counts. The model is the closed solid with all its faces, so the distance is 0 inside
+ * the solid. For a surface, the model is its faces.
  *
  * `hi` is a bound for the decoded half-spaces and includes all rounding errors. Therefore `hi`
  * exceeds the true value by at least about 1e-6 of a node's cell, or a few ulp of the coordinates.

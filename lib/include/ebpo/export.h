@@ -74,8 +74,9 @@ typedef struct ebpo_export_options {
      * material is opaque. OBJ: red, green and blue after the coordinates of a vertex, 0 to 1. STL
      * has no colours; glTF and OBJ have no colours of faces.
      *
-     * Colours of levels are exported in the same way if the file has EBPO_PART_COLOURS; each vertex
-     * has the colour of its node. In VTKHDF, vertices and faces without colours are white.
+     * Levels have colours if the file has EBPO_PART_COLOURS: each vertex has the colour of its
+     * node. These colours are exported in the same way. In VTKHDF, vertices and faces without
+     * colours are white.
      */
     bool mesh;
 

@@ -117,7 +117,7 @@ typedef struct ebpo_findings_options {
  * the mesh's workspace provides about 80 bytes per finding during sorting and 16 bytes per finding
  * afterwards; with `ply`, it also provides at most 13 bytes per face and vertex.
  *
- * take     may be NULL. Even if it returns false, the file `ply` is complete
+ * take     may be NULL. Even if `take` returns false, the file `ply` is complete
  * report   receives the result of ebpo_mesh_check; may be NULL
  *
  * Errors are those of ebpo_mesh_check. EBPO_E_IO: also if `ply` cannot be written.

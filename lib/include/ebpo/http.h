@@ -42,8 +42,8 @@ typedef struct ebpo_http_options {
     double stall_timeout;
 
     /*
-     * Maximum time of one request with all its retries and pauses, in seconds; above 0. No read
-     * takes longer than this.
+     * Maximum time of one request with all its retries and pauses, in seconds; above 0. A read
+     * takes at most this time.
      */
     double time_limit;
 
@@ -79,7 +79,7 @@ typedef struct ebpo_http_options {
      */
     bool unversioned;
 
-    /* True: reads user names and passwords from ~/.netrc. */
+    /* True: the library reads user names and passwords from ~/.netrc. */
     bool netrc;
 
     /* "name:password" for basic authentication. NULL: no basic authentication. */

@@ -53,8 +53,8 @@ typedef struct ebpo_map_options {
 /*
  * Computes the distances of points[count][3], each finite, into distances[count]. As in
  * ebpo_distance, the distances are correctly rounded, and negative inside a solid. If not
- * everything is in memory, points are processed along a curve, so that each subtree is loaded only
- * a few times; this takes 24 bytes per point.
+ * everything is in memory, points are sorted along a space-filling curve, so that each subtree is
+ * loaded only a few times. Sorting takes 24 bytes per point.
  *
  * EBPO_E_ARGUMENT: an option or a point is not valid; the message has the index of the point.
  * EBPO_E_ABSENT: the file has no mesh. EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also

@@ -52,7 +52,7 @@ typedef struct ebpo_scene_options {
 
     /*
      * max_bytes: maximum size of the scene file in bytes; 0: 64 MiB. max_pose_bytes: maximum total
-     * size of the pose files that it names, in bytes; 0: 256 MiB.
+     * size, in bytes, of the pose files that the scene file names; 0: 256 MiB.
      */
     uint64_t max_bytes, max_pose_bytes;
 
@@ -69,7 +69,7 @@ typedef struct ebpo_scene_options {
      */
     bool allow_outside;
 
-    /* True: models on web servers are allowed. The scene must state their digests. */
+    /* True: models on web servers are allowed. The scene must state the digests of these models. */
     bool remote;
 
     uint8_t reserved[6];
@@ -146,7 +146,10 @@ typedef struct ebpo_scene_instance {
     /* Index of the model. */
     uint64_t model;
 
-    /* Pose in the world. With a route: pose in the coordinates that the route moves. */
+    /*
+     * Pose in the world. With a route: pose relative to the coordinate system that moves along the
+     * route.
+     */
     ebpo_pose pose;
 
     /* Index of the route, and of the layer (ebpo_scene_get_layer), or EBPO_SCENE_NONE. */
@@ -310,7 +313,8 @@ typedef struct ebpo_scene_camera {
 
     /*
      * Position of the eye, position of the point that the eye looks at, and upward direction. They
-     * are in the world or, with a route, in the coordinates that the route moves.
+     * are in world coordinates. With a route, they are relative to the coordinate system that moves
+     * along the route.
      */
     double eye[3], target[3], up[3];
 
