@@ -511,9 +511,9 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
  * inside the solid. The planes of the fragment's faces must cut off only thin outermost parts of
  * the fragment. A segment from the centre to a point of the fragment can leave the solid only
  * behind the plane of a face. The part of the segment behind the plane is at most as long as the
- * returned bound. If the fragment extends beyond a cell face of the leaf by more than
- * EBPO_CUT_SLACK, the cell face counts as a plane, too, because the leaf does not list the faces
- * behind it. Returns INFINITY if the planes are too uncertain for a bound. */
+ * returned bound. The leaf does not list the faces behind its cell faces. So a cell face of the
+ * leaf counts as a plane, too, if the fragment extends beyond it by more than EBPO_CUT_SLACK.
+ * Returns INFINITY if the planes are too uncertain for a bound. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                            const ebpo_fragment_measure *measure)
 {

@@ -41,8 +41,8 @@ double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
 double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
 
 /* Returns an upper bound of the distance between any point of a cell and a face that touches the
- * cell, perhaps up to a rounding error (format-spec, section 7). The cell is `levels` levels below
- * the frame's cell. */
+ * cell. The face may miss the cell by a rounding error (format-spec, section 7). The cell is
+ * `levels` levels below the frame's cell. */
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 
 /* Returns an upper bound of the distance of a point (in cell coordinates) to a triangle of the

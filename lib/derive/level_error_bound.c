@@ -419,8 +419,8 @@ static uint64_t count_queries(const survey *s)
     return sum;
 }
 
-/* Searches the nodes block by block. All nodes of a block have the same goal, which depends only on
- * the results of earlier blocks, so results do not depend on the number of threads. */
+/* Searches the nodes block by block. All nodes of a block have the same goal. This goal depends
+ * only on the results of earlier blocks, so results do not depend on the number of threads. */
 static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
 {
     uint64_t done = 0, block = 4, queries_done = count_queries(s);

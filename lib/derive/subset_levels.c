@@ -324,9 +324,9 @@ static ebpo_status pick_level(descent *d)
     }
     /* The index of the children's group is the gray node's rank in the source, which the runs give.
      * The index for gray node r of d->from is stored in entry leaf_count + r of d->child. The front
-     * of the array is filled later, with gray nodes and with leaves that become pruned nodes.
-     * Before entry leaf_count + r is read, at most r gray nodes and leaf_count leaves have each
-     * filled one entry at the front, so the entry is not overwritten. */
+     * of the array is filled later, with gray nodes and with leaves that become pruned nodes. Each
+     * gray node or leaf fills one entry at the front. Before entry leaf_count + r is read, at most
+     * r gray nodes and leaf_count leaves have done this, so the entry is not overwritten. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;

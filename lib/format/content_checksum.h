@@ -21,9 +21,9 @@ typedef struct ebpo_content_entry {
  * tables of subtrees, because checksums must not depend on the layout of the file. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
-/* The four checksums. Colours, the border of a surface with its winding numbers, and the simplified
- * surface have separate checksums, so the content checksum is the same with and without these
- * parts. */
+/* The four checksums. These parts have separate checksums: colours, the border of a surface with
+ * its winding numbers, and the simplified surface. So the content checksum is the same with and
+ * without these parts. */
 enum {
     EBPO_DIGEST_CONTENT,
     EBPO_DIGEST_COLOURS,

@@ -1,9 +1,9 @@
 /* Reads single nodes of a file through a cache of chunks: the children of a gray node, and the
  * planes and the winding number of a node. Also reads groups (the eight children of a gray node)
  * with their planes and winding numbers, for streams that do not follow the file's order. Each
- * function reads only the chunks with the node's data, including the sums that locate these data,
- * and checks the values against the header and the index arrays. For remote files, several groups
- * are fetched together. */
+ * function reads only the chunks with the node's data, and the chunks with the sums that locate
+ * these data. It checks the values against the header and the index arrays. For remote files,
+ * several groups are fetched together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

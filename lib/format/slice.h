@@ -19,8 +19,8 @@
  * - 1. leaf_first and leaf_refs of the levels contain local indices. */
 typedef struct ebpo_slice {
     ebpo_node root;
-    /* true: the file is a subset. A gray node is then pruned (its children are not in the file) if
-     * the types of its children are 0, or if it is on the last level */
+    /* true: the file is a subset. In a subset, a gray node whose children are not in the file is
+     * pruned. The types of its children are 0, or the node is on the last level */
     bool pruned;
     int level_count;
     ebpo_level level[EBPO_LEVELS_MAX];

@@ -551,12 +551,13 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
                : row_contradicts(chunks, error);
 }
 
-/* Checks column EBPO_S_ENDS of a row. The *end of the new faces* is one past the last new face of
- * the leaves of the level so far. The column has the end after the subtree's leaves, minus the end
- * before these leaves. The column must be the sum of leaf_new and leaf_skip over these leaves.
- * leaf_new is the number of new faces of a leaf. leaf_skip of a leaf is the number of new faces
- * that leaves of other levels have between the previous leaf of the level and this leaf. Also
- * checks that the new faces of these leaves are owned faces of the subtree. */
+/* Checks column EBPO_S_ENDS of a row. The *end* of a leaf is one past its last new face. The column
+ * has the end of the subtree's last leaf in the level, minus the end of the last leaf of the level
+ * before the subtree. The column must be the sum of leaf_new and leaf_skip over the subtree's
+ * leaves in the level. leaf_new is the number of new faces of a leaf. leaf_skip of a leaf is the
+ * number of new faces that leaves of other levels have between the previous leaf of the level and
+ * this leaf. Also checks that the new faces of the subtree's leaves are owned faces of the subtree.
+ */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {

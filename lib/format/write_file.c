@@ -616,8 +616,9 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
     return status;
 }
 
-/* Writes the whole file. If another version of libhdf5 places its metadata elsewhere in the file,
- * this function does not fail and readers accept the file, but tests that compare bytes fail. */
+/* Writes the whole file. Another version of libhdf5 may place its metadata elsewhere in the file.
+ * Then this function does not fail, and readers accept the file, but tests that compare bytes fail.
+ */
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
     uint8_t first[256]; /* the first chunk is small: the root's type, two bytes before encoding */

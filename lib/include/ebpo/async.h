@@ -39,8 +39,8 @@
  * - Haptic rendering does not support such files, because its thread loads data in the background.
  *
  * The number of repetitions is finite for any memory budget. Bytes that were supplied or read since
- * the operation began stay available until it ends, so each repetition either completes, or needs
- * bytes that no earlier repetition needed.
+ * the operation began stay available until the operation ends. So each repetition either completes,
+ * or needs bytes that no earlier repetition needed.
  */
 #ifndef EBPO_ASYNC_H
 #define EBPO_ASYNC_H

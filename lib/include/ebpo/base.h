@@ -46,9 +46,9 @@
  * start threads. These threads end before the function returns, except if the comment of the
  * function says otherwise.
  *
- * Stack: a query (query.h) uses less than 64 KiB of the calling thread's stack, building and
- * verifying use less than 256 KiB, and all other functions less than 1 MiB. The threads that the
- * library starts have stacks of 4 MiB, independent of the process limit.
+ * Stack: functions use the calling thread's stack: a query (query.h) less than 64 KiB, building and
+ * verifying less than 256 KiB, all other functions less than 1 MiB. The threads that the library
+ * starts have stacks of 4 MiB, independent of the process limit.
  *
  * Floating-point environment: a function saves the caller's rounding mode, traps and treatment of
  * denormals, computes in the default environment, and restores what it saved. Callbacks run in the

@@ -125,7 +125,7 @@ typedef struct ebpo_build_options {
      * remove. It applies to gray nodes and to leaves (EBPO_PART_LEAF_PLANES). A plane that removes
      * less is also kept if it cuts off a portion of the envelope that extends beyond the plane by a
      * tenth of the cell. For gray nodes of levels 0 to 4, the share is epsilon / 10 times the
-     * square root of the part of the cell that the parent's envelope fills.
+     * square root of p. Here p is the fraction of the cell that the parent's envelope fills.
      */
     double epsilon;
 

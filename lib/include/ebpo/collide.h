@@ -81,9 +81,9 @@ EBPO_API void ebpo_collider_free(ebpo_collider *collider);
  * Checks that a model can be queried at a pose.
  *
  * EBPO_E_ARGUMENT: the matrix is not a rotation, a value is not finite, or the scale or the posed
- * model is out of range. If the matrix is not a rotation, the message reports a mirror image, or
- * gives the difference of the matrix's columns from length 1 or from right angles. A difference of
- * 2^-20 is allowed.
+ * model is out of range. If the matrix is not a rotation, the message reports a mirror image or a
+ * difference: of the length of a column from 1, or of the angle of two columns from a right angle.
+ * A difference of 2^-20 is allowed.
  *
  * Threads: any.
  */
@@ -219,7 +219,7 @@ typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t 
 /*
  * Finds every pair of intersecting faces once. Pairs are sorted by the index of the face in the
  * file of the first model, then by the index in the file of the other model. The first model is the
- * model with the lower content_sha256, or, if the models have the same content_sha256, the model
+ * model with the lower content_sha256. If the models have the same content_sha256, it is the model
  * with the lower pose, compared bit by bit.
  *
  * Partly loaded models give the same pairs in the same order. Subtrees whose envelopes may
@@ -468,8 +468,9 @@ ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *optio
  * are in B, of the distance to the nearest face of B. The depth is 0 if no point of A's faces is in
  * B. Also computes the depth of B's surface in A. The result is an interval, because the deepest
  * point need not be a corner. If the deadline does not end the search, hi - lo is at most
- * `tolerance` plus the rounding of posed points (2^-40 of the coordinates, more for matrices that
- * are not exact rotations). The depth is not the minimum motion that separates the models.
+ * `tolerance` plus the rounding of posed points. This rounding is 2^-40 of the coordinates, and
+ * more for matrices that are not exact rotations. The depth is not the minimum motion that
+ * separates the models.
  *
  * tolerance        greater than 0, in the world's unit; a smaller tolerance takes longer
  * a_in_b, b_in_a   depth of A in B, and of B in A; NULL: not requested

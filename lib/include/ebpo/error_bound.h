@@ -17,9 +17,9 @@ typedef struct ebpo_error_bound_options {
     size_t struct_size;
 
     /*
-     * Bounds are refined until hi <= (1 + tolerance) lo, until `queries` distances have been
-     * computed, or until 65,536 distances have been computed for each node that determines the
-     * bounds. The tolerance is above 0.
+     * Bounds are refined until hi <= (1 + tolerance) lo. Refining ends earlier if `queries`
+     * distances have been computed, or 65,536 distances for each node that determines the bounds.
+     * The tolerance is above 0.
      */
     double tolerance;
 
@@ -42,9 +42,9 @@ typedef struct ebpo_error_bound_options {
 
     /*
      * `hi` of a coarser level of the same file. Envelopes are nested, so this value also bounds
-     * this level. 0: unknown. If this value is unknown, and the search reaches `queries` or the
-     * maximum for one node before the tolerance, coarser levels are also computed, each with as
-     * many distances as this level.
+     * this level. 0: unknown. If this value is unknown, coarser levels may also be computed, each
+     * with as many distances as this level. This happens if the search reaches `queries`, or the
+     * maximum for one node, before it reaches the tolerance.
      */
     double at_most;
 } ebpo_error_bound_options;

@@ -154,8 +154,8 @@ typedef struct ebpo_export_report {
 
     /*
      * Simplified surface: in its `block`, `level` is the level of the deepest patch, and `nodes` is
-     * the number of patches. Each point of the surface is at most `error` away from the model, and
-     * each point of the model is at most `error` away from the surface, including rounding. Tiles:
+     * the number of patches. `error`: each point of the surface is at most this far from the model,
+     * and each point of the model is at most this far from the surface, including rounding. Tiles:
      * the error of the coarsest tile.
      */
     double error;

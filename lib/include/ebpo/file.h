@@ -1144,7 +1144,7 @@ typedef struct ebpo_patch {
     uint64_t first_face, face_count;
 
     /*
-     * Upper bound, in the model's unit, of the distance of each point of the patch from the
+     * Upper bound of two distances, in the model's unit: of each point of the patch from the
      * replaced faces, and of each point of the replaced faces from the patch.
      */
     double error;

@@ -520,10 +520,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * has its own faces in the common square, so four faces use each side of the square. The square of
  * a cube is one patch, the other five sides of the cube are another patch, and both patches are
  * open. Patches are joined at edges that are used more than twice. The faces at such an edge are
- * sorted by their angle around the edge, and each face gets the direction opposite to the direction
- * of the previous face. The angles are compared exactly; faces at the same angle are ordered by
- * source index. Faces that already alternate are unchanged. Joined patches are a shell if they use
- * each edge equally often in both directions.
+ * sorted by their angle around the edge. Then each face gets the direction opposite to the
+ * direction of the previous face. The angles are compared exactly; faces at the same angle are
+ * ordered by source index. Faces that already alternate are unchanged. Joined patches are a shell
+ * if they use each edge equally often in both directions.
  *
  * A shell gets a positive volume, or a negative volume if it is inside an odd number of other
  * shells. Shell A is inside shell B if the least and the greatest vertex of A along each axis are

@@ -105,9 +105,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
  *
  * If two programs each open two files in this way, they can block each other until `wait` has
  * passed. While a program has the lock, an empty file ".NAME.lock" is in the same folder. There is
- * no lock if the file system has no locks (NFS without its lock service), the folder is not
- * writable, or ".NAME.lock" is not an empty file. Even without a lock, ebpo_paint_save detects
- * changes by other programs.
+ * no lock in three cases: the file system has no locks (NFS without its lock service), the folder
+ * is not writable, or ".NAME.lock" is not an empty file. Even without a lock, ebpo_paint_save
+ * detects changes by other programs.
  *
  * EBPO_E_IO: also if the lock is not free within `wait`. EBPO_E_CANCELLED. Also the errors of
  * ebpo_paint_open and ebpo_paint_new.
@@ -511,8 +511,8 @@ typedef struct ebpo_paint_drawn {
     uint64_t strokes, points, steps, lifted;
 
     /*
-     * Number of points that were discarded, because they were not within `spread` of the foot, or
-     * not on the part of the surface that is connected to the foot.
+     * Number of points that were discarded: points that were farther than `spread` from the foot,
+     * or on a part of the surface that is not connected to the foot.
      */
     uint64_t strayed;
 } ebpo_paint_drawn;

@@ -778,8 +778,8 @@ typedef struct ebpo_ray {
 /*
  * Finds the first hit of each of rays[count] as ebpo_ray_first does, into out[count]. For a ray
  * without a hit, t is INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or
- * other rays. If not everything is in memory, the rays are sorted along a space-filling curve by
- * the points at which they enter the model, so that each subtree is loaded only a few times.
+ * other rays. If not everything is in memory, the rays are sorted by the points at which they enter
+ * the model, along a space-filling curve. So each subtree is loaded only a few times.
  *
  * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
  * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
@@ -1007,9 +1007,9 @@ typedef struct ebpo_mass {
      * EBPO_PART_BORDER. If the volume is 0, `centroid` and `inertia` are 0.
      *
      * A surface with EBPO_PART_BORDER is measured with its caps, which are triangles that close its
-     * border (format-spec/border.md). The volume of this surface is known if the surface has one
-     * component, every edge has at most two faces, and the two faces of an edge have the same
-     * orientation. Intersections are not tested.
+     * border (format-spec/border.md). The volume of this surface is known under three conditions:
+     * the surface has one component, every edge has at most two faces, and the two faces of an edge
+     * have the same orientation. Intersections are not tested.
      */
     double volume;
 

@@ -178,8 +178,8 @@ typedef struct ebpo_scene_instance {
  *
  * number   receives the index of the instance; may be NULL
  *
- * EBPO_E_ARGUMENT: the name, model, route, layer or pose is not valid (if the model is loaded, the
- * pose must pass ebpo_pose_check), or the instance is fixed and has a route.
+ * EBPO_E_ARGUMENT: the name, model, route, layer or pose is not valid, or the instance is fixed and
+ * has a route. If the model is loaded, the pose must pass ebpo_pose_check.
  *
  * Threads: one at a time per scene.
  */
@@ -991,8 +991,9 @@ typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models,
 
 /*
  * Writes the data that ebpo_scene_plan finds to a new folder, which appears atomically. The folder
- * contains subsets of the models' files, pose files, and packed.scene.json, which is the scene with
- * these files, their digests and the digests of the source files. `take` may be NULL.
+ * contains subsets of the models' files, pose files, and packed.scene.json. This scene file refers
+ * to the new files, and has the digests of the new files and of the source files. `take` may be
+ * NULL.
  *
  * Queries of options.purpose at times in from .. to have the same results in the new scene, with
  * two exceptions. ebpo_scene_approach may evaluate other times, and intervals of distances beyond

@@ -192,9 +192,9 @@ typedef struct ebpo_view_node {
     double distance;
 
     /*
-     * Size of the cell in the image: length of the cell's diagonal in pixels, as if the diagonal
-     * were in the middle of the image, parallel to the image, and `distance` away from the eye.
-     * INFINITY: the eye is in the cell. NAN without an observer.
+     * Size of the cell in the image: the length in pixels of a segment in the middle of the image
+     * that is as long as the cell's diagonal, parallel to the image, and `distance` away from the
+     * eye. INFINITY: the eye is in the cell. NAN without an observer.
      */
     double pixels;
 } ebpo_view_node;
@@ -359,9 +359,9 @@ EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
  * `priority` is ignored.
  *
  * Option `pixels`: a visible patch with a greater error in the image is used only if another option
- * prevents its replacement. The error in the image is the length of ebpo_patch.error in pixels, in
- * the middle of the image and at the distance from the eye to the nearest point of the node's cell.
- * If `pixels` is 0, the finest patches are used.
+ * prevents its replacement. The error in the image is the length in pixels of a segment in the
+ * middle of the image. The segment is as long as ebpo_patch.error, and as far from the eye as the
+ * nearest point of the node's cell. If `pixels` is 0, the finest patches are used.
  *
  * out     freed by ebpo_surface_mesh_free; cleared on failure. `error` is the greatest error of the
  *         patches that were used, and `pixels` is the greatest error in the image of the visible
