@@ -18,8 +18,9 @@
  * longest side. In this unit, lengths neither overflow nor underflow. */
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;
-    int exponent;     /* the unit is 2^exponent in the model's unit */
-    double factor[2]; /* their product is 2^-exponent, which may overflow as one double */
+    int exponent; /* the unit is 2^exponent in the model's unit */
+    /* two factors with the product 2^-exponent, because the product may overflow */
+    double factor[2];
     double low[3], high[3], size[3]; /* box of the cell, in the model's unit */
     double side[3];                  /* sides of the cell, in the frame's unit */
     /* bound of the rounding error of points and distances, in the frame's unit */
@@ -83,9 +84,9 @@ EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_f
 /* Finds the node of `cell`; returns false if there is none. */
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
 
-/* Finds the node as ebpo_tree_find does. Also returns the half-spaces of the node's ancestors and,
- * with `include_node`, those that the file stores for the node, all in the coordinates of `cell`.
- */
+/* Finds the node as ebpo_tree_find does. Also returns half-spaces in the coordinates of `cell`: the
+ * half-spaces of the node's ancestors and, with `include_node`, the half-spaces that the file
+ * stores for the node. */
 bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool include_node, ebpo_node *out,
                       ebpo_half_spaces *half_spaces);
 

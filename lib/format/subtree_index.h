@@ -27,8 +27,8 @@ static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 /* Reads a subtree's row; the index must be less than the number of subtrees. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree,
                                                  ebpo_subtree_row *out, ebpo_error *error);
-/* Finds the subtree that contains item number `item` of the items that column `column` counts: the
- * last subtree with at most `item` of these items before it. */
+/* Finds the subtree that contains item number `item` of the items that column `column` counts. This
+ * is the last subtree before which there are at most `item` of these items. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);

@@ -10,8 +10,8 @@
  *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
  * The *result* is the solid that an expression of solids describes. Queries of the result are
- * evaluated by queries of the models, without a mesh of the result. Decisions equal those of
- * arithmetic without rounding on posed coordinates (pose.h).
+ * evaluated by queries of the models, without a mesh of the result. Decisions are exact for posed
+ * coordinates (pose.h), as if they were computed without rounding.
  *
  * The result is *regularised*: an operand is the closure of the points that are inside by its rule,
  * and the result is the closure of its interior. So the union of two boxes with a common side is
@@ -339,10 +339,10 @@ typedef struct ebpo_boolean_mesh_options {
 
     /*
      * True: the mesh has the attributes of vertices and faces of the operands. Values at new
-     * vertices are interpolated. Normals (nx ny nz) are rotated with their operand, and reversed if
-     * their face is reversed. If an operand does not have an attribute, its faces or vertices get
-     * the value 0, or white for colours. ebpo_mesh_attributes_lost names the attributes that cannot
-     * be carried over.
+     * vertices are interpolated. Normals (nx ny nz) are rotated with their operand. They are
+     * reversed if the face to which they belong is reversed. If an operand does not have an
+     * attribute, its faces or vertices get the value 0, or white for colours.
+     * ebpo_mesh_attributes_lost names the attributes that cannot be carried over.
      */
     bool attributes;
 

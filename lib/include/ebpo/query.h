@@ -18,9 +18,9 @@
  *     ebpo_context_new(model, &context, &error);
  *     ebpo_inside(context, point, NULL, &result, &error);
  *
- * Results are exact: decisions are the same as with arithmetic without rounding on the file's
- * coordinates, for all finite doubles. Results do not depend on the compiler, the floating-point
- * environment, the number of threads, the memory budget or the loading mode.
+ * Results are exact: for all finite doubles, decisions are the same as if they were computed from
+ * the file's coordinates without rounding. Results do not depend on the compiler, the
+ * floating-point environment, the number of threads, the memory budget or the loading mode.
  *
  * A model is an octree of cells. Gray nodes have children, leaves list faces, white nodes are
  * outside the solid, and black nodes are inside. The envelope of a node is a convex polyhedron that
