@@ -14,7 +14,7 @@ static const arg_option help_option = {
     "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL
 };
 
-/* Prints a usage error. The value of this macro's expression is ARGS_WRONG. */
+/* Prints a usage error. The macro's value is ARGS_WRONG. */
 #define refuse_args(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
 
 /* --- values --- */
@@ -243,8 +243,8 @@ static bool is_among(const char *words, const char *word)
     return false;
 }
 
-/* Refuses an output name with the ending of another format, which would mislead users of the file.
- */
+/* Refuses an output name with the ending of another format, because such a name would mislead users
+ * of the file. */
 static arg_result check_ending(const arg_spec *spec, const char *path)
 {
     static const char known[] = "ply obj stl off glb gltf vtk vtkhdf xdmf png jpg jpeg gif svg pdf "

@@ -10,13 +10,13 @@
 #include <stdint.h>
 
 typedef enum arg_kind {
-    ARG_FLAG,   /* bool; the option has no value */
-    ARG_INT,    /* int64_t in [low, high] */
-    ARG_REAL,   /* double in [low, high] */
-    ARG_TEXT,   /* const char *, not empty */
-    ARG_LIST,   /* arg_list; may be repeated */
-    ARG_WORD,   /* int: index into `words` */
-    ARG_SET,    /* uint32_t: bits by index into `words`; comma list, may be repeated */
+    ARG_FLAG, /* bool; the option has no value */
+    ARG_INT,  /* int64_t in [low, high] */
+    ARG_REAL, /* double in [low, high] */
+    ARG_TEXT, /* const char *, not empty */
+    ARG_LIST, /* arg_list; the option may be repeated */
+    ARG_WORD, /* int: index into `words` */
+    ARG_SET,  /* uint32_t: bit i is set for words[i]; words separated by commas; may be repeated */
     ARG_OPERAND /* the operand OUT, given as the option --output; `offset` is the operand's index */
 } arg_kind;
 
@@ -49,11 +49,11 @@ typedef struct arg_spec {
     const char *summary;  /* description of the command in one line */
     const char *text;     /* further text for --help, or NULL */
     const arg_option *options;
-    /* Meaning of the operand "-", one letter for each operand:
-     *   i  a temporary file with the bytes of standard input (standard_files.h)
-     *   o  a temporary file that is copied to standard output
-     *   p  the command interprets "-"
-     * A blank, the end of the text or NULL: "-" is refused. */
+    /* Meaning of "-" as an operand. The text has a letter for each operand:
+     *   i  "-" is replaced by a temporary file with the bytes of standard input (standard_files.h)
+     *   o  "-" is replaced by a temporary file, which is copied to standard output at the end
+     *   p  the command itself interprets "-"
+     * "-" is refused if the letter is a blank or missing, or if the text is NULL. */
     const char *dash;
     /* Endings of the second operand's file name, such as "h5 hdf5"; known endings of other formats
      * are refused. NULL: any ending. */

@@ -7,8 +7,8 @@
 
 enum { DEPTH_MAX = 64 }; /* maximum number of nested parentheses and complements */
 
-/* A recursive-descent parser. Each function read_... parses a part of the expression at `at`, sets
- * *number to the index of its node, and returns false after an error. */
+/* A recursive-descent parser. Each function read_... parses the part of the expression that begins
+ * at p->at, and sets *number to the index of the part's node. It returns false after an error. */
 typedef struct parser {
     const char *name; /* name of the command */
     const char *text, *at;
@@ -85,7 +85,8 @@ static bool read_product(parser *p, uint32_t *number)
 
 enum { NO_OPERATOR = EBPO_BOOLEAN_OPERAND };
 
-/* Returns the operation of an operator of a sum; NO_OPERATOR for any other character. */
+/* Returns the operation of the operator c (| + - ^) in a sum; NO_OPERATOR for any other character.
+ */
 static int32_t operation_of(char c)
 {
     return c == '|' || c == '+' ? EBPO_BOOLEAN_UNION

@@ -1,4 +1,4 @@
-/* Parses Boolean expressions, poses, and the box and planes to which a result is cut. */
+/* Parses Boolean expressions, poses of operands, and planes at which a result is cut. */
 #ifndef EBPO_TOOLS_BOOLEAN_ARGS_H
 #define EBPO_TOOLS_BOOLEAN_ARGS_H
 
@@ -22,8 +22,9 @@ typedef struct boolean_nodes {
  * is reported on stderr for the command `name`; the caller exits with EXIT_USAGE. */
 bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out);
 
-/* Reads each text as a model and a pose (see pose_read) into pose[operands], which the caller has
- * initialized. Returns false after an error, as boolean_read does. */
+/* Reads texts such as 'B 1 0 0', the letter of an operand and its pose (see pose_read), into
+ * pose[operands], which the caller has initialized. Returns false after an error, as boolean_read
+ * does. */
 bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operands,
                         ebpo_pose *pose);
 

@@ -12,7 +12,7 @@ typedef struct boolean_output {
     const char *unit; /* unit of lengths to record in an .ebpo.h5 file; NULL: none */
     unsigned threads;
     bool doubles;              /* write double coordinates */
-    bool changed_only;         /* write only the changes of the first operand */
+    bool changed_only;         /* write only faces that are not faces of the first operand */
     bool colours;              /* colour faces by their operand */
     bool volume;               /* compute the volume of the exact result */
     bool crossings;            /* count the intersecting faces of the written mesh */

@@ -131,7 +131,7 @@ bool command_requires_hdf5(const char *name, const char *path)
     ebpo_error error = EBPO_ERROR_INIT;
     if (is_hdf5 != 0)
         return is_hdf5 > 0;
-    /* opening a file that is not HDF5 fails, and the library's message names the kind of file */
+    /* ebpo_open fails; its message names the kind of a file that is not HDF5 */
     bool success = ebpo_open(path, &file, &error) == EBPO_OK;
     if (!success)
         fprintf(stderr, "ebpo %s: %s\n", name, error.message);

@@ -56,8 +56,8 @@ bool command_has_level(const char *name, const ebpo_info *info, int64_t level);
  * error is reported on stderr. The caller then exits with EXIT_FAILED. `name` may be NULL. */
 bool command_flush(const char *name);
 
-/* Reports from errno why standard output could not be written, unless an error of standard output
- * was reported before. Returns false. */
+/* Reports why standard output could not be written, according to errno. Reports nothing if an error
+ * of standard output was reported before. Returns false. */
 bool command_not_written(const char *name);
 
 /* Writes bytes to standard output, bypassing the buffer of stdio. Returns false after an error, as

@@ -13,7 +13,7 @@
 
 enum { DEFAULT_COUNT = 100000 };
 
-/* Words for generated input. */
+/* Words that select a generator of query rows. */
 typedef enum generator { UNIFORM, PATH, CAMERA, SEGMENTS, DEGENERATE, NO_GENERATOR } generator;
 static const char *const generators[] = { "uniform", "path", "camera", "segments", "degenerate" };
 

@@ -19,7 +19,9 @@ typedef struct bench_points {
  *   what   "uniform" (in the bounding box of the mesh), "path" (along the surface; points only),
  *          "camera", "segments" or "degenerate" (rays: bench_rays.h), or the name of a file
  *   count  number of generated rows (0: 100,000), or maximum number of rows of the file (0: all)
- *   tmax   end of rays of a file whose rows do not state an end; maximum end of generated rays */
+ *   raw    the file contains doubles, not text
+ *   tmax   greatest parameter t of rays of a file whose rows do not state it; for generated rays
+ *          an upper bound */
 int bench_points_make(bench_points *out, points_kind kind, const char *model,
                       const remote_values *remote, const char *what, bool raw, uint64_t count,
                       uint64_t seed, double tmax);
@@ -27,9 +29,9 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
 bool bench_points_generated(const char *what);
 void bench_points_free(bench_points *p);
 
-/* Closes a stream of open_memstream, writes its data to the file `path`, which is replaced
- * atomically, and frees the data. Returns an exit code. stream: NULL if there was not enough memory
- * for it. */
+/* Closes a stream of open_memstream, writes the stream's data to the file `path`, and frees the
+ * data. The file is replaced atomically. Returns an exit code. `stream`: NULL if open_memstream
+ * failed. `data`, `size`: the arguments of open_memstream. */
 int bench_save(FILE *stream, char *const *data, const size_t *size, const char *path);
 
 /* Writes the rows as little-endian doubles, 3 or 6 for each row. Returns an exit code. */

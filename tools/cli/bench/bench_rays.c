@@ -21,8 +21,8 @@ static void random_point(const bench_scene *s, uint64_t *random, double out[3])
         out[k] = s->low[k] + bench_random_unit(random) * (s->high[k] - s->low[k]);
 }
 
-/* Generates a direction uniform over the sphere by rejection, which uses no functions that differ
- * between systems. */
+/* Generates a direction that is uniform over the sphere, by rejection sampling. This method uses no
+ * functions, such as sin, whose results differ between systems. */
 static void random_direction(uint64_t *random, double out[3])
 {
     double square;

@@ -1,4 +1,4 @@
-/* Generates query rays, each seven doubles as in ebpo_ray. */
+/* Generates query rays: rows[count][7], where a row is an ebpo_ray. */
 #ifndef EBPO_TOOLS_BENCH_RAYS_H
 #define EBPO_TOOLS_BENCH_RAYS_H
 
@@ -11,7 +11,8 @@ typedef struct bench_scene {
 
 /* Generates rays from points in the box, with directions uniform over the sphere. */
 void bench_rays_uniform(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
-/* Generates the same rays, but each ends after a twentieth of the box's diagonal, at t = 1. */
+/* Generates the rays of bench_rays_uniform, but each ray ends after a twentieth of the box's
+ * diagonal, at t = 1. */
 void bench_rays_segments(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
 /* Generates rays through the pixels of a square picture, row by row. The box fills the picture, and
  * the eye is one and a half diagonals away. */

@@ -47,8 +47,8 @@ uint64_t bench_clock_cost(void)
 
 static const ebpo_ray_hit no_hit = { .t = INFINITY, .face = EBPO_NO_FACE };
 
-/* any_result and all_result represent the results of other ray queries as a hit: see bench_result.
- */
+/* any_result and all_result write the result of a query for any hit, or for all hits, as one
+ * ebpo_ray_hit: see bench_result. */
 static ebpo_ray_hit any_result(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : no_hit; }
 
 static ebpo_ray_hit all_result(const ebpo_ray_hit *hits, uint64_t count)
@@ -211,12 +211,12 @@ double bench_drop_file(const char *path)
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0)
         return -1;
-    fsync(fd); /* only data on the disk can be dropped */
+    fsync(fd); /* the system drops only pages that have been written to the disk */
 #ifdef POSIX_FADV_DONTNEED
     if (posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED) == 0 && fstat(fd, &st) == 0)
         share = share_in_memory(fd, (size_t)st.st_size);
 #else
-    (void)st, (void)share_in_memory; /* macOS drops nothing */
+    (void)st, (void)share_in_memory; /* macOS cannot drop pages */
 #endif
     close(fd);
     return share;
@@ -242,7 +242,7 @@ void bench_reset_peak(void)
 #endif
     FILE *f = fopen("/proc/self/clear_refs", "w");
     if (f) {
-        fputs("5\n", f); /* 5 resets VmHWM, the peak */
+        fputs("5\n", f); /* writing 5 resets VmHWM, the peak memory */
         fclose(f);
     }
 }

@@ -15,8 +15,9 @@ typedef enum bench_query {
     BENCH_RAY_ALL
 } bench_query;
 
-/* Result of a query. A ray without a hit has the face EBPO_NO_FACE. For BENCH_RAY_ANY, t and face
- * are 0; for BENCH_RAY_ALL, t is the number of hits, and face is the first face. */
+/* Result of a query. A ray without a hit has the face EBPO_NO_FACE. For a ray with hits,
+ * BENCH_RAY_ANY sets t and face to 0. BENCH_RAY_ALL sets t to the number of hits, and face to the
+ * face of the first hit. */
 typedef union bench_result {
     ebpo_inside_result inside;
     ebpo_distance_result distance;
@@ -28,12 +29,12 @@ typedef struct bench_job {
     bench_query query;
     ebpo_inside_options inside;
     ebpo_distance_options distance;
-    const double *rows; /* rows of rays: as ebpo_ray */
+    const double *rows; /* [count][width]; a row of a ray query is an ebpo_ray */
     int width;          /* number of doubles in a row */
     uint64_t count;
     double rate;         /* single queries per second; 0: no limit */
     uint64_t *ns;        /* [count] nanoseconds of each query */
-    void *result_values; /* [count] results, each of the member of bench_result for `query` */
+    void *result_values; /* [count] results, each a member of bench_result */
 } bench_job;
 
 /* Returns the size of a result in result_values. */
@@ -45,7 +46,8 @@ typedef struct bench_metrics {
     double batch;                 /* nanoseconds per query in a batch */
 } bench_metrics;
 
-/* Returns the time that reading the clock adds to a measurement: the median of 10,001 readings. */
+/* Returns the nanoseconds that reading the clock adds to a measurement: the median of 10,001
+ * readings. */
 uint64_t bench_clock_cost(void);
 
 /* Runs query `number`, and writes its result to job->result_values. */
@@ -62,8 +64,8 @@ EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *contex
 /* Requests that the system drops a file from the page cache. Returns the share of pages that are
  * still in memory; -1: not known. */
 double bench_drop_file(const char *path);
-/* Returns the peak memory of this process (Linux), since the last bench_reset_peak if the system
- * allows a reset; 0: not known. */
+/* Returns the peak memory of this process in bytes (Linux); 0: not known. If the system allows
+ * resets, this is the peak since the last call of bench_reset_peak. */
 uint64_t bench_peak_memory(void);
 /* Resets the peak memory, if the system allows this. */
 void bench_reset_peak(void);

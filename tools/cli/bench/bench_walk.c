@@ -17,7 +17,7 @@ typedef struct walker {
     double corner[3][3], n[3]; /* corners of the face; unit normal */
     double p[3], d[3];         /* position; direction, a unit vector in the plane of the face */
     double turn;               /* radians per step, to the left */
-    double side[3];            /* smoothed normals along the path */
+    double side[3];            /* unit vector: mean of the normals along the path, smoothed */
 } walker;
 
 uint64_t bench_random(uint64_t *state)
@@ -97,8 +97,8 @@ static void read_vertex(const ebpo_mesh *m, uint32_t number, double out[3])
                           : m->xyz64[3 * (uint64_t)number + (unsigned)k];
 }
 
-/* Returns the corner of `face` at which its edge from a to b (or, with `any`, from b to a) starts;
- * -1: the face has no such edge. */
+/* Returns the corner of `face` (0 to 2) at which the edge from vertex a to vertex b starts; -1: the
+ * face has no such edge. If `any`, an edge from b to a counts, too. */
 static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b, bool any)
 {
     const uint32_t *f = m->faces + 3 * face;
@@ -108,8 +108,9 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
     return -1;
 }
 
-/* Returns the face beyond the edge from a to b, if possible a face with the edge from b to a;
- * UINT64_MAX: there is none. *third: the other corner of the face. */
+/* Returns another face at the edge of the walk's face from vertex a to vertex b; UINT64_MAX: there
+ * is none. Prefers a face whose edge leads from b to a. *third: the vertex of the returned face
+ * that is neither a nor b. */
 static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
@@ -139,7 +140,7 @@ static bool enter_face(walker *w, uint64_t face)
     return normalise_vector(w->n);
 }
 
-/* Moves to the middle of the face, along its first edge. */
+/* Moves the walk to the middle of its face. The first edge of the face becomes the direction. */
 static void place_on_face(walker *w)
 {
     for (int k = 0; k < 3; k++)
@@ -238,14 +239,14 @@ static void turn_walker(walker *w)
         place_on_face(w);
     subtract_vectors(w->p, w->corner[0], off);
     add_scaled(w->p, -dot_product(off, w->n),
-               w->n); /* corrects the sum of rounding errors, which leads off the face */
+               w->n); /* without this, the sum of rounding errors would lead off the face */
     for (int k = 0; k < 3; k++)
         w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
     if (!normalise_vector(w->side))
         memcpy(w->side, w->n, sizeof w->side);
 }
 
-/* Returns a value between -1 and 1, like a sine, with a period of 1. */
+/* Returns a value from -1 to 1, like a sine, but with a period of 1. */
 static double wave_height(double phase)
 {
     double x = 2 * phase - 1;

@@ -7,8 +7,8 @@
 enum { PAIRS_SHOWN = 10 };
 
 typedef struct crossing_list {
-    json *j;                                   /* where to print pairs at once; NULL: keep them */
-    progress_line *line;                       /* wiped before printing */
+    json *j;             /* pairs are printed here when they are found; NULL: not printed yet */
+    progress_line *line; /* wiped before printing */
     ebpo_self_intersection first[PAIRS_SHOWN]; /* if `j` is NULL: the first pairs */
     int count;                                 /* number of pairs in `first` */
 } crossing_list;
@@ -73,7 +73,7 @@ static void print_words(const crossing_list *p, const ebpo_self_intersections_su
 }
 
 /* Ends the list of pairs and the object "crossings"; the outermost object stays open. found: false
- * after a failure; "count" is then null. */
+ * after a failure; then "count" is null. */
 static void end_json(json *j, const ebpo_self_intersections_summary *s, bool found)
 {
     json_end(j);

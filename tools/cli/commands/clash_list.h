@@ -20,8 +20,8 @@ typedef struct clash_list {
     uint64_t count, capacity;
 } clash_list;
 
-/* Adds the clashes at a time; they are in the order of instances (a, then b). `time` must be
- * greater than in the call before. */
+/* Adds the clashes at a time. found_clashes[count] must be sorted by the indices of the instances
+ * (a, then b). `time` must be greater than in the call before. */
 EBPO_MUST_USE ebpo_status clash_add(clash_list *list, double time,
                                     const ebpo_scene_clash *found_clashes, uint64_t count,
                                     ebpo_error *error);

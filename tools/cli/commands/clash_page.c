@@ -29,7 +29,8 @@ const char *clash_kind_word(int32_t kind)
     return words[kind];
 }
 
-/* Returns the severity: the worse the kind, the greater. */
+/* Returns the severity of the clash. It depends on the kind only; a worse kind has a greater
+ * severity. */
 static int rank_of(const ebpo_scene_clash *m)
 {
     static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* by ebpo_clash_kind */
@@ -92,7 +93,7 @@ static void add_frame(clash *c, double time, const ebpo_scene_clash *m)
     }
 }
 
-/* Merges clashes into the list; both are in the order of pairs. */
+/* Merges clashes into the list. The list and found_clashes are sorted by pairs of instances. */
 ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_clash *found_clashes,
                       uint64_t count, ebpo_error *error)
 {
@@ -158,7 +159,7 @@ static bool is_first_group(const clash *c, const ebpo_scene *scene, uint64_t nth
     return true;
 }
 
-/* Adds the number of clashes of each group to `sums`. */
+/* Adds the number of clashes of group i to sums[i]. */
 static void count_clashes(const clash_list *list, const ebpo_scene *scene, uint64_t *sums)
 {
     for (uint64_t i = 0; i < list->count; i++)
@@ -191,8 +192,8 @@ static void put_buttons(FILE *f, const uint64_t *sums, uint64_t groups, const cl
             put_button(f, i, sums[i], ebpo_scene_get_group(scene, i));
 }
 
-/* Writes a button for each group with clashes, if there are any; a table of class `c` must follow
- * directly. Returns false if there is not enough memory. */
+/* Writes a button for each group that has clashes. The caller must then write a table of class `c`,
+ * in which the buttons hide rows. Returns false if there is not enough memory. */
 static bool put_filter(FILE *f, const clash_list *list, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;

@@ -4,7 +4,7 @@
 
 #include "cli/commands/clash_list.h"
 
-/* Writes the page of a list in the order of clash_sort; replaces the file `path` atomically.
+/* Writes the page of a list that clash_sort has sorted. Replaces the file `path` atomically.
  *
  *   title   name of the scene's file
  *   frames  number of evaluated times, from `from` to `to` */

@@ -66,8 +66,8 @@ static double longest_side(const double min[3], const double max[3])
     return fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
 }
 
-/* Chooses the region to draw, a cube: the smaller instance and the contact. If the contact is small
- * compared with the smaller instance, the region is the contact and its surroundings. */
+/* Chooses the region to draw, a cube around the smaller instance. If the contact is small compared
+ * with this instance, the region is only the surroundings of the contact. */
 static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double middle[3],
                                double *half_side, ebpo_error *error)
 {
@@ -146,7 +146,7 @@ ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error
     if (status == EBPO_OK)
         status = paint_pair(scene, c, threads, &p, error);
     if (status == EBPO_OK) {
-        /* without faces between the eye and the region */
+        /* removes faces that would hide the region */
         painted_crop(&p, middle, 1.5 * half_side);
         for (int k = 0; k < 3; k++) {
             min[k] = middle[k] - half_side;

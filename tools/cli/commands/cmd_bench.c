@@ -18,7 +18,7 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    query_values q; /* must be the first member, because shared options of queries set it */
+    query_values q; /* must be the first member: shared options have offsets within it */
     int query;
     const char *points, *mode, *save_points, *save_results;
     int64_t count, seed, repeat;
@@ -50,11 +50,12 @@ typedef struct results {
     bench_metrics metrics;
     ebpo_model_stats model, model_end; /* after the first pass, and at the end */
     traffic traffic;                   /* traffic of the warm session */
-    /* numbers of results; of `inside` by ebpo_where, otherwise by RESULT_NONE to RESULT_INTERVAL */
+    /* number of results of each kind. The index is an ebpo_where if the query is `inside`,
+     * otherwise RESULT_NONE to RESULT_INTERVAL */
     uint64_t counts[4];
 } results;
 
-/* The words of --mode depend on the query. */
+/* Sets the mode of the query from --mode. The valid words depend on the query. */
 static bool set_mode(values *v)
 {
     const char *const *words = v->query == BENCH_INSIDE ? inside_modes : distance_modes;
@@ -97,7 +98,7 @@ static int cold_start(const bench_job *job, const char *path,
     return code;
 }
 
-/* Returns the metrics with the median of the means. */
+/* Returns the element of f[count] whose mean is the median of all means. */
 static bench_metrics median_by_mean(const bench_metrics *f, int count)
 {
     for (int i = 0; i < count; i++) {
@@ -176,8 +177,8 @@ static bool same_result(bench_query query, const void *one, const void *other, u
     return same_reals(&a->t, &b->t, 1) && a->face == b->face && a->side == b->side;
 }
 
-/* Checks that the batch has the results of single queries, unless they depend on time. Returns an
- * exit code. */
+/* Checks that the results of the batch equal those of single queries. With a deadline, results
+ * depend on time, and nothing is checked. Returns an exit code. */
 static int compare_results(const bench_job *job, const void *batch)
 {
     if (job->inside.deadline_ns)
@@ -248,7 +249,7 @@ static int save_results(const bench_job *job, const char *path)
     return bench_save(f, &data, &size, path);
 }
 
-/* Checks outputs before measuring. */
+/* Checks that the output files can be written. Call before the measurement. */
 static int check_outputs(const values *v)
 {
     ebpo_error error = EBPO_ERROR_INIT;

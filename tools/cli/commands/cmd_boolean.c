@@ -21,7 +21,7 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    query_values query; /* must be the first member, because shared options of queries set it */
+    query_values query; /* must be the first member: shared options have offsets within it */
     const char *inside, *distance; /* names of files of points; NULL: not given */
     const char *out, *temp_dir, *box;
     arg_list poses, sections;
@@ -73,7 +73,7 @@ typedef struct cell_result {
     boolean_output output;
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
-    /* the volume is exact, but no cells can be made; `why_no_cells` is the reason */
+    /* no cells can be made, although the volume is exact; `why_no_cells` is the reason */
     bool no_cells;
     char why_no_cells[1024];
     bool volume;            /* the volume is requested */

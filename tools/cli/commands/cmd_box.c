@@ -32,7 +32,7 @@ static const char *box_dtype(const query_job *job, unsigned *bytes)
 {
     (void)job;
     *bytes = 0;
-    return NULL; /* lists of faces */
+    return NULL; /* a result is a list of faces, which has no fixed size */
 }
 
 static const query_values standard = QUERY_VALUES_INIT;
@@ -43,7 +43,7 @@ static int run_box(void *given, const char **operand)
     query_job job = { .command = "box",
                       .values = v,
                       .kind = POINTS_BOXES,
-                      .subtree_overhead = 0.25, /* docs/measured/queries.md */
+                      .subtree_overhead = 0.25, /* measured, see docs/measured/queries.md */
                       .result = compute_boxes,
                       .columns = box_columns,
                       .dtype = box_dtype };

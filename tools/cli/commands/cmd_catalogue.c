@@ -31,8 +31,8 @@ static const values standard = { .out = NULL };
 /* A file below the folder. */
 typedef struct entry {
     bool listed;                   /* the catalogue lists the file */
-    char *reason;                  /* if not: why */
-    char *path;                    /* as in the catalogue */
+    char *reason;                  /* if not `listed`: why */
+    char *path;                    /* path to write to the catalogue */
     char *shown_path;              /* relative to the folder, for messages */
     ebpo_catalogue_entry reported; /* if `listed`: facts from the file's header */
 } entry;
@@ -201,7 +201,7 @@ static char *relative_path(const char *a, const char *b)
     size_t ups = 0;
     for (const char *s = a + common; *s; s++)
         ups += *s == '/' && s[1];
-    const char *below = b + common + (b[common] == '/'); /* path of `b` in the common folder */
+    const char *below = b + common + (b[common] == '/'); /* `b` relative to the common folder */
     char *path = malloc(3 * ups + strlen(below) + 2), *end = path;
     for (size_t i = 0; path && i < ups; i++)
         end = stpcpy(end, "../");
@@ -228,7 +228,8 @@ static int find_relative_path(catalogue *c)
 
 /* --- the file --- */
 
-/* Writes the catalogue. Paths of entries are relative to its folder. Returns the exit code. */
+/* Writes the catalogue. Paths of entries are relative to the catalogue's folder. Returns the exit
+ * code. */
 static int write_all(const catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;

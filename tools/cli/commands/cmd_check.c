@@ -206,7 +206,7 @@ static ebpo_status report_findings(const values *v, mesh_input *p, const char *p
     command_flush("check");
     mesh_input_warn("check", path, p);
     advice_warn(stderr, "check", path, p);
-    if (v->findings) /* before crossings, which consume the mesh */
+    if (v->findings) /* must precede search_crossings, which empties the mesh */
         status = check_findings(&p->mesh, v->findings, (unsigned)v->threads, progress,
                                 v->json ? &j : NULL, v->quiet, line, error);
     else if (v->json)

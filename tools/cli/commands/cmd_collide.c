@@ -55,7 +55,7 @@ static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *c
         *relation = collide_relations[r.relation];
     if (status != EBPO_E_ABSENT && status != EBPO_E_LIMIT)
         return status;
-    *error = (ebpo_error)EBPO_ERROR_INIT; /* the required data is not in the subset */
+    *error = (ebpo_error)EBPO_ERROR_INIT; /* not an error: the data is not in the subset */
     *relation = collide_relations[EBPO_RELATION_UNDECIDED];
     return EBPO_OK;
 }
@@ -92,8 +92,8 @@ static bool measures_requested(const measure_values *f)
     return f->distance || f->depth || f->separation;
 }
 
-/* Returns false, with a message on standard error, for options that cannot be combined.
- * all_or_self: --all or --self was given. */
+/* Checks the options for measures, and sets f->direction. Returns false, with a message on standard
+ * error, if options cannot be combined or are invalid. all_or_self: --all or --self was given. */
 static bool measures_fit(measure_values *f, bool all_or_self)
 {
     const char *message = NULL;
@@ -135,7 +135,7 @@ static void pair_to_json(const ebpo_collide_distance_result *c)
     putchar(']');
 }
 
-/* Prints the faces, if known. */
+/* Prints the two nearest faces, if they are known. */
 static void print_nearest_pair(bool as_json, const ebpo_collide_distance_result *c)
 {
     if (c->pair.face_a == EBPO_NO_FACE)
@@ -183,7 +183,7 @@ static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_co
         ebpo_collide_distance(c, collide_options, &distance_options, &result, error);
     if (status != EBPO_OK)
         return status;
-    /* otherwise the line already shows that faces intersect, or that this is not known */
+    /* If this is false, the printed line shows that faces intersect, or that this is not known. */
     bool apart = result.distance.lo > 0 || (result.at_least >= 0 && result.distance.hi > 0);
     const char *relation = NULL;
     if (apart)
@@ -504,8 +504,8 @@ static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
     return command_flush("collide") ? EXIT_OK : EXIT_FAILED;
 }
 
-/* Makes the budget that both models share, for --memory. Makes none if both models fit completely.
- */
+/* Makes the budget that both models share, of the size --memory. If both models fit completely into
+ * this size, makes no budget. */
 static ebpo_status share_memory(const query_session *a, const query_session *b,
                                 ebpo_model_options *model_options, ebpo_error *error)
 {
@@ -534,7 +534,7 @@ static void default_memory(const query_session *a, const query_session *b,
     ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
     if (ebpo_model_memory(a->file, model_options, &plan[0], NULL) != EBPO_OK ||
         (b && ebpo_model_memory(b->file, model_options, &plan[1], NULL) != EBPO_OK))
-        return; /* errors are reported when the models are made */
+        return; /* the error is reported when the models are made */
     uint64_t half = ebpo_free_memory() / 2;
     uint64_t least = plan[0].least + plan[1].least;
     if (plan[0].whole + plan[1].whole <= half)
@@ -549,7 +549,7 @@ static int open_models(query_session *a, query_session *b, const collide_values 
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const char *path[2] = { operand[0], operand[1] };
-    bool same_model = v->self || strcmp(path[0], path[1]) == 0; /* then it is loaded once */
+    bool same_model = v->self || strcmp(path[0], path[1]) == 0; /* the model is loaded only once */
     int level = (int)v->query.level;
     int code = query_open_file(a, "collide", path[0], model_options, level, &v->query.remote);
     if (code == EXIT_OK && !same_model)

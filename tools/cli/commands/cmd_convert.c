@@ -28,7 +28,7 @@
 
 /* --- reports of the mesh and of the file --- */
 
-/* Properties of a conversion that its reports use, and the form of the reports. */
+/* Facts about a conversion that the reports need, and the form of the reports. */
 typedef struct convert_reported {
     const char *in;  /* the name of the mesh file in messages */
     const char *out; /* the path of the written file */
@@ -118,7 +118,8 @@ static void print_name(const char *name)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
                                 "._-/+,:@%";
-    /* so that the name is not read as an option; "-" alone is standard input */
+    /* "./" prevents that a name with a leading '-' is read as an option; "-" alone is standard
+     * input */
     const char *folder = name[0] == '-' && name[1] ? "./" : "";
     if (strspn(name, plain) == strlen(name)) {
         printf(" %s%s", folder, name);
@@ -227,9 +228,9 @@ typedef struct values {
 
 #include "cli/options/convert.inc"
 
-/* Returns the parts of --parts. A list with minus signs also omits the parts that need an omitted
- * part. A list without minus signs must contain the parts that its parts need; otherwise returns 0.
- */
+/* Returns the parts that the text of --parts selects, as bits. Some parts need another part. If a
+ * list with minus signs omits this other part, the function omits the parts that need it, too. For
+ * a list without minus signs, the function then returns 0. */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
@@ -308,8 +309,9 @@ static int check_target(const values *v, ebpo_subset_options *target)
 /* Returns true if the command chooses the parts, to reach --target-size. */
 static bool chooses_parts(const values *v) { return v->target_size && v->profile < 0 && !v->parts; }
 
-/* Returns the parts to build. With --profile or chosen parts, all parts are built and some of them
- * written, so that the file equals a subset of the full file. */
+/* Returns the parts to build. With --profile or chosen parts, the command builds all parts and then
+ * writes some of them. So the file equals the one that `ebpo subset` makes from a file with all
+ * parts. */
 static uint32_t parts_of(const values *v)
 {
     if (v->profile >= 0 || chooses_parts(v))
@@ -422,7 +424,7 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     return status;
 }
 
-/* What the functions for one piece of a split mesh need. */
+/* Data for the functions that build one piece of a split mesh. */
 typedef struct piece_build {
     const values *v;
     const ebpo_subset_options *target; /* as in build_and_write */
@@ -466,8 +468,8 @@ static ebpo_status build_pieces(piece_build *build, mesh_input *p, const char *f
     return pieces_write(&run, p, begun, error);
 }
 
-/* Returns the facts that follow from the options, to plan the stages; `faces` and `times` are set
- * after the build. */
+/* Returns the facts from which the stages are planned. These facts follow from the options; the
+ * members `faces` and `times` are set after the build. */
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
@@ -492,7 +494,7 @@ static const values standard = { .max_level = -1,
                                  .normals = -1,
                                  .seed = -1 };
 
-/* Fails if the mesh must not be built. */
+/* Fails if --require-solid forbids the build, or if there is not enough memory. */
 static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char *in,
                                const ebpo_workspace *workspace, ebpo_error *error)
 {

@@ -47,8 +47,8 @@ static ebpo_status compute_lists(const query_job *job, query_worker *w, const do
     return status;
 }
 
-/* Returns where the index of the nearest model is stored for each of `count` points of a query in a
- * catalogue: in w->results, after the distances. */
+/* Returns the array with the index of the nearest model for each of `count` points, for a query in
+ * a catalogue. The array is in w->results, after the distances. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
@@ -118,7 +118,7 @@ static int run_distance(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_distance_result),
-                      .subtree_overhead = 0.65, /* docs/measured/queries.md */
+                      .subtree_overhead = 0.65, /* measured, see docs/measured/queries.md */
                       .result = compute_distances,
                       .print = print_distances,
                       .columns = distance_columns,

@@ -26,7 +26,7 @@ typedef struct values {
 
 static const char *const format_words[] = {
     "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL
-}; /* in the order of ebpo_export_format; EBPO_EXPORT_TILES has an option instead */
+}; /* in the order of ebpo_export_format; EBPO_EXPORT_TILES has the option --tiles, and no word */
 
 #include "cli/options/export.inc"
 
@@ -97,8 +97,8 @@ static int choose_levels(values *v, ebpo_export_options *o)
     return EXIT_OK;
 }
 
-/* Checks that outputs do not overwrite the input. second: the second file of the format; "": none.
- */
+/* Checks that no output overwrites the input. second: path of the second output, which some formats
+ * have; "": none. */
 static int check_names(const char *in, const char *out, const char *second)
 {
     const char *names[] = { out, second };
@@ -122,7 +122,7 @@ static void print_colours(const ebpo_export_report *r)
                          "them");
 }
 
-/* Prints what was written of the simplified surface. */
+/* Prints the statistics of the simplified surface that was written. */
 static void print_surface(const values *v, const ebpo_export_report *r)
 {
     char count[3][40], bytes[40];
@@ -238,7 +238,7 @@ static int write_out(const values *v, const char *in, const char *out, const cha
     ebpo_status status = remote_open(&file, in, &v->remote, &error);
     if (status == EBPO_OK && v->to_deepest && o->first_level < ebpo_file_info(file)->level_count)
         o->last_level = ebpo_file_info(file)->level_count - 1;
-    if (status == EBPO_OK && v->tiles) /* without faces, the finest tiles are patches */
+    if (status == EBPO_OK && v->tiles) /* without faces, the finest tiles contain patches */
         o->mesh = ebpo_file_info(file)->parts & EBPO_PART_MESH;
     if (status == EBPO_OK)
         status = ebpo_export(file, out, (ebpo_export_format)v->format, o, &report, &error);

@@ -30,8 +30,8 @@ typedef struct values {
     remote_values remote;
 } values;
 
-/* The limit of --subtree: all octcodes are smaller. The limits of options are doubles, which
- * represent this value exactly. */
+/* Limit of --subtree; all octcodes are smaller. The limits of options are doubles, and a double
+ * represents this value exactly. */
 #define OCTCODE_MAX (INT64_C(1) << 61)
 
 #include "cli/options/extract.inc"
@@ -77,7 +77,8 @@ static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
                 remote_shown(path), nodes_text);
 }
 
-/* Sets out->mesh to the faces of the subtree --subtree, which remains the owner of the arrays. */
+/* Sets out->mesh to the faces of the subtree that --subtree names. The subtree still owns the
+ * arrays. */
 static ebpo_status take_subtree(const ebpo_file *file, const values *v, const char *path,
                                 const ebpo_workspace *workspace, extracted *out, ebpo_error *error)
 {
@@ -101,8 +102,9 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v, const ch
     return status;
 }
 
-/* Warns if elements of the source other than vertices and faces are omitted. They are written only
- * if vertices have the order of the source, because they may refer to vertex indices. */
+/* Warns if elements of the source other than vertices and faces are omitted. Such elements may
+ * refer to vertex indices, so they are written only if the vertices have the order of the source.
+ */
 static void warn_of_elements(const ebpo_file *file, bool source_order, const char *path)
 {
     ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;

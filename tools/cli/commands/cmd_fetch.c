@@ -152,7 +152,8 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
                         "in transit; run the same command to start again\n");
         return code;
     }
-    /* After an error in an option, data of earlier runs is kept. */
+    /* After an error in an option, removes only data that this run has fetched; data of earlier
+     * runs is kept. */
     if (part && (status == EBPO_OK || (has_wrong_option && !has_fetched_data)))
         remove_part(part);
     /* rmdir removes an empty folder, and fails if the folder contains data. */

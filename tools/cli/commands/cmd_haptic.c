@@ -42,7 +42,7 @@ typedef struct haptic_times {
     double width_mean, width_max; /* widths hi - lo of the bounds of a probe's distance */
 } haptic_times;
 
-/* What haptic_play_run plays. */
+/* Arguments of haptic_play_run. */
 typedef struct haptic_play {
     double rate;                 /* steps per second */
     double seconds;              /* duration; used if the device's step_count is 0 */
@@ -50,7 +50,7 @@ typedef struct haptic_play {
     const haptic_device *device; /* source of positions */
     ebpo_haptic_kind kind;
     double range;        /* for probes: the distance that has the last colour of the scale */
-    haptic_pose *record; /* [maximum number of steps], set to the device's positions; or NULL */
+    haptic_pose *record; /* [maximum number of steps] receives the positions; or NULL */
 } haptic_play;
 
 /* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
@@ -188,7 +188,7 @@ static void step_probe(const haptic_play *p, const haptic_pose *pose, haptic_res
     ebpo_map_colour(EBPO_MAP_THESIS, r.distance, p->range, a->rgb);
 }
 
-/* Returns false if the device has ended. */
+/* Plays step i. Returns false if the device has ended. */
 static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
 {
     haptic_result result = { .depth = 0 };
@@ -249,7 +249,7 @@ static bool haptic_play_run(const haptic_play *p, haptic_times *out)
     *out = (haptic_times){ .step_count = 0 };
     if (!all)
         return false;
-    memset(all, 0, 3 * count * sizeof *all); /* now, so that no step has a page fault for it */
+    memset(all, 0, 3 * count * sizeof *all); /* now, so that later writes cause no page faults */
     const step_times s = { all, all + count, all + 2 * count };
     out->step_count = play_all(p, count, &s, out);
     out->width_mean /= fmax(1, (double)out->step_count);
@@ -515,8 +515,8 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
     return EBPO_E_MEMORY;
 }
 
-/* Plays steps that do nothing for a tenth of the time, to measure the delays that the machine
- * itself causes. Call before the device starts. */
+/* Plays steps that do nothing, to measure the delays that the machine itself causes. Takes a tenth
+ * of the time of the actual steps. Call before the device starts. */
 static ebpo_status play_empty(job *j, ebpo_error *error)
 {
     const values *v = j->v;

@@ -48,7 +48,7 @@ static int run_inside(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_inside_result),
-                      .subtree_overhead = 0.05, /* docs/measured/queries.md */
+                      .subtree_overhead = 0.05, /* measured, see docs/measured/queries.md */
                       .result = compute_inside,
                       .print = print_inside,
                       .columns = inside_columns,

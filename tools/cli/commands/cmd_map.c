@@ -350,7 +350,8 @@ static ebpo_status no_memory(ebpo_error *error)
 
 /* --- planes and grids --- */
 
-/* Copies the values of a plane. user: pointers to the job's pointer and to the copy. */
+/* Copies the values of a plane. user: an array of two pointers, to the variable that points to the
+ * job, and to the copy. */
 static ebpo_status keep_layer(void *user, const double *values, uint64_t first, uint64_t layers,
                               ebpo_error *error)
 {
@@ -363,7 +364,7 @@ static ebpo_status keep_layer(void *user, const double *values, uint64_t first, 
     return EBPO_OK;
 }
 
-/* Computes the values of a plane, for the output and its picture. */
+/* Computes the values of a plane, and draws its pictures. */
 static ebpo_status map_plane(map_job *j, ebpo_error *error)
 {
     uint64_t count = j->lattice.count[0] * j->lattice.count[1];

@@ -29,11 +29,11 @@ typedef struct values {
 
 /* Requested measurements. Arrays have an entry for each level; NULL: not requested. */
 typedef struct measures {
-    ebpo_solid_volume solid;             /* volume of the model */
-    const double *derived;               /* envelopes' volumes with derived planes of leaves; not
-                                          * NULL if `limit` is not NULL */
+    ebpo_solid_volume solid; /* volume of the model */
+    const double *derived;   /* volumes of envelopes with leaf planes that follow from the faces;
+                              * not NULL if `limit` is not NULL */
     const ebpo_error_bound *error_bound; /* largest distances of envelopes from the model */
-    const ebpo_limit *limit;             /* volumes of convex hulls, the limit of envelopes */
+    const ebpo_limit *limit; /* volumes of the convex hulls, which no envelopes can undercut */
 } measures;
 
 static void print_limit(const ebpo_info *info, const ebpo_solid_volume *solid, double volume,
@@ -130,8 +130,8 @@ static bool has_inside(const ebpo_info *info)
     return info->solid || info->parts & EBPO_PART_BORDER;
 }
 
-/* Prints how much the integral and the centroid depend on the caps: faces that close the holes of a
- * surface, whose shape is a choice. */
+/* Prints how much the integral and the centroid depend on the caps. Caps are faces that close the
+ * holes of a surface; a hole can be closed by different caps. */
 static void print_caps(const ebpo_info *info, const ebpo_mass *mass)
 {
     char unit[TABLE_CELL], share[TABLE_CELL];
@@ -266,7 +266,8 @@ static ebpo_status bound_levels(ebpo_file *file, const values *v, ebpo_progress 
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
         out[i] = (ebpo_error_bound)EBPO_ERROR_BOUND_INIT;
         status = ebpo_level_error_bound(model, file, i, &bound_options, &out[i], error);
-        bound_options.at_most = out[i].hi; /* envelopes of the next level lie within these */
+        /* the envelopes of the next level are inside the envelopes of level i */
+        bound_options.at_most = out[i].hi;
     }
     ebpo_model_free(model);
     return status;

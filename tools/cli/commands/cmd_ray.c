@@ -9,7 +9,7 @@
 
 #include "cli/options/ray.inc"
 
-/* The functions below read the rows of numbers from points_parse as structs. */
+/* The functions below read each row of numbers from points_parse as an ebpo_ray. */
 _Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "a row is an ebpo_ray");
 
 static ebpo_status compute_all_hits(const query_job *job, query_worker *w, const ebpo_ray *rays,
@@ -26,8 +26,8 @@ static ebpo_status compute_all_hits(const query_job *job, query_worker *w, const
     return status;
 }
 
-/* Returns where the index of the hit model is stored for each of `count` rays of a query in a
- * catalogue: in w->results, after the hits. */
+/* Returns the array with the index of the hit model for each of `count` rays, for a query in a
+ * catalogue. The array is in w->results, after the hits. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_ray_hit *)w->results + count);
@@ -95,7 +95,7 @@ static int run_ray(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS_RAYS,
                       .result_bytes = sizeof(ebpo_ray_hit),
-                      .subtree_overhead = 0.6, /* docs/measured/queries.md */
+                      .subtree_overhead = 0.6, /* measured, see docs/measured/queries.md */
                       .result = compute_rays,
                       .print = print_rays,
                       .columns = ray_columns,

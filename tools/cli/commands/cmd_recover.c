@@ -94,7 +94,7 @@ static ebpo_status inspect_mesh(recovery *p, ebpo_error *error)
     return record_result(p, MAPS, status, &reported, error);
 }
 
-/* Checks that the mesh can be read with its attributes, which also reads the header of all
+/* Checks that the mesh can be read with its attributes. This check also reads the header of all
  * attributes. */
 static ebpo_status inspect_header(recovery *p, ebpo_error *error)
 {
@@ -161,8 +161,8 @@ static ebpo_status inspect_all(recovery *p, ebpo_error *error)
     return status == EBPO_OK ? inspect_levels(p, error) : status;
 }
 
-/* Opens the file without its lists of chunks, see unlisted.h. Fails if its content does not match
- * the checksum in the header. */
+/* Opens the file without its lists of chunks, see unlisted.h. Fails if the content of the file does
+ * not match the checksum in the header. */
 static ebpo_status open_unlisted(const recovery *p, ebpo_file **out, ebpo_error *error)
 {
     ebpo_read_options read = part_options(p);
@@ -170,9 +170,9 @@ static ebpo_status open_unlisted(const recovery *p, ebpo_file **out, ebpo_error 
     return status == EBPO_OK ? ebpo_file_check_content(*out, &read, error) : status;
 }
 
-/* Finds the readable parts. If the list of chunk checksums is damaged, nothing can be read with the
- * list. Then reads the file without the list; if its content matches the checksum in the header,
- * all content is intact, and is kept. */
+/* Finds the readable parts. If the list of chunk checksums is damaged, no part can be read with
+ * this list. Then the function reads the file without the list. If the content matches the checksum
+ * in the header, all content is intact, and is kept. */
 static ebpo_status inspect_file(recovery *p, ebpo_error *error)
 {
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
@@ -476,7 +476,7 @@ static void print_json(const recovery *p, const char *in)
 }
 
 /* Returns the exit code. If the maps (source indices) of the file are lost, the content always
- * differs, which is no error. */
+ * differs; this is no error. */
 static int exit_code_of(const recovery *p)
 {
     return p->content_equal || p->part_state[MAPS] == LOST ? EXIT_OK : EXIT_DIFFERS;

@@ -47,7 +47,7 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 typedef struct tile {
     int level;           /* level of the file, or MESH */
     bool optional;       /* omit the tile if the file does not have the level */
-    uint64_t face_count; /* set when the mesh is freed */
+    uint64_t face_count; /* number of drawn faces; also valid when the mesh has been freed */
     ebpo_mesh mesh;
     ebpo_colours colours;  /* colours of the model, if it has colours */
     float *normals;        /* of the triangles of a level, for lighting; or NULL */
@@ -260,7 +260,7 @@ static const tile *coarsest_tile(const job *j)
 {
     const tile *coarsest = &j->tiles[0];
     for (int i = 1; i < j->tile_count; i++)
-        if ((unsigned)j->tiles[i].level < (unsigned)coarsest->level) /* MESH is the last */
+        if ((unsigned)j->tiles[i].level < (unsigned)coarsest->level) /* MESH: the greatest */
             coarsest = &j->tiles[i];
     return coarsest;
 }

@@ -67,7 +67,7 @@ static int read_settings(comparison *c, const report_values *v)
     char word[sizeof c->setting->k_root];
     int code = EXIT_OK;
     selection_options all = { v->select, v->percent ? 1 : -1, v->epsilon, NULL, v->normals, -1 };
-    if (!list) { /* also checks --seed, which selects the points of queries */
+    if (!list) { /* --seed needs no check: it always selects the points of queries */
         c->setting[c->settings++].percent = 40;
         return selection_check("report", &all);
     }
@@ -81,7 +81,7 @@ static int read_settings(comparison *c, const report_values *v)
     }
     if (c->settings == 0)
         return refuse_value(v->percent ? "--percent" : "--k-root", list, "a number");
-    if (c->settings == 1) /* names of methods do not need the only number */
+    if (c->settings == 1) /* with one setting only, the names of methods omit its number */
         c->setting[0].word[0] = 0;
     return code;
 }

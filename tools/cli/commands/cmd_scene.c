@@ -17,7 +17,7 @@
 
 /* Totals of a scene. */
 typedef struct scene_sums {
-    uint64_t bytes, faces; /* of the files; a file that several models use counts once */
+    uint64_t bytes, faces; /* of all model files; a file that several models use counts once */
     uint64_t posed_faces;  /* of all instances */
 } scene_sums;
 
@@ -293,8 +293,8 @@ static bool print_approaches(void *user, const ebpo_scene_approach_result *appro
     return true;
 }
 
-/* Returns true if the interval is wider than requested, because of the limit of evaluations or of
- * missing data of files. */
+/* Returns true if the interval is wider than requested. The reason is the limit of evaluations, or
+ * data that files lack. */
 static bool is_undecided(const pair_list *l, const ebpo_scene_least *result)
 {
     return result->hi - result->lo > l->v->tolerance;
@@ -436,8 +436,8 @@ static bool needs_span(int subcommand)
            subcommands[subcommand].run == scene_plan || subcommands[subcommand].run == scene_pack;
 }
 
-/* Sets the purpose of a plan: with --solids or --depth, which are options of a report, --for
- * solids. Returns NULL, or a text that says what is wrong. */
+/* Sets the purpose of a plan. --solids and --depth, which are options of a report, have the effect
+ * of --for solids. Returns NULL, or a text that says what is wrong. */
 static const char *set_purpose(scene_values *v)
 {
     if (!v->solids && !(v->depth > 0))

@@ -195,7 +195,7 @@ static int add_viewer_file(site *s, const char *folder, const char *name, const 
     return code;
 }
 
-/* Adds the files of the viewer. Folders in its folder are not searched. */
+/* Adds the files of the viewer. Subfolders of the viewer's folder are not searched. */
 static int add_viewer(site *s)
 {
     char folder[PATH_MAX];
@@ -366,8 +366,8 @@ static void print_models(const site *s, json *j, bool for_viewer)
     json_end(j);
 }
 
-/* Makes the address of the first page: of the only model, or of the list of models. A path in the
- * query is decoded once more than a path, so its % becomes %25. */
+/* Makes the address of the first page: of the only model, or of the list of models. The address of
+ * a model in the query string is decoded twice, so its % becomes %25. */
 static bool make_start(site *s)
 {
     const char *only = s->models == 1 ? s->model[0]->address : "";

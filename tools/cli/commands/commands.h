@@ -1,6 +1,6 @@
-/* Lists the commands. Each command is in a file cmd_NAME.c. The file includes
- * cli/options/NAME.inc, which make_options.py generates from NAME.options; it defines `spec`. The
- * table of commands is in options/meson.build. */
+/* Lists the commands. Each command is in a file cmd_NAME.c. The file includes cli/options/NAME.inc,
+ * which defines `spec`. make_options.py generates NAME.inc from NAME.options. The table of commands
+ * is in options/meson.build. */
 #ifndef EBPO_TOOLS_COMMANDS_H
 #define EBPO_TOOLS_COMMANDS_H
 

@@ -25,8 +25,8 @@
 /* Sizes of names in bytes, with the final 0. NAME_SIZE: in file names; SHOWN_SIZE: in the scene. */
 enum { NAME_SIZE = 96, SHOWN_SIZE = 256 };
 
-/* Lengths of the part of a name that comes from the group. OWN_NAME_MAX: in file names; SPELT_MAX:
- * in derived names in the scene, which end in a number. */
+/* Maximum lengths of the group's own name within a longer name. OWN_NAME_MAX: within a file name.
+ * SPELT_MAX: within a name in the scene that ends in a number. */
 enum { OWN_NAME_MAX = 40, SPELT_MAX = 220 };
 
 static bool is_safe(char c)
@@ -104,9 +104,9 @@ static size_t spell_name(char *out, const char *own_name)
     return size;
 }
 
-/* Writes the name of a group in the scene: the group's own name if a scene can have it, otherwise a
- * derived name with a number that equals no name in `taken`, the sorted names of groups that are
- * used unchanged. */
+/* Writes the name of a group in the scene. This is the group's own name if a scene can have it.
+ * Otherwise it is derived from the group's name and a number, and differs from all names in
+ * `taken`. `taken`: the sorted names of groups that are used unchanged. */
 static void write_shown_name(char out[SHOWN_SIZE], const char *own_name, uint64_t number,
                              const char *const *taken, uint64_t taken_count)
 {
@@ -335,7 +335,7 @@ static ebpo_status inspect_piece(piece *p, const char *path, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Sets *out to the mesh of a piece, and checks it. No repair is needed, as the whole mesh was
+/* Sets *out to the mesh of a piece, and checks it. No repair is needed, because the whole mesh was
  * repaired. */
 static ebpo_status take_mesh(const piece_writer *w, uint64_t number, mesh_input *out,
                              ebpo_error *error)
@@ -362,7 +362,7 @@ static ebpo_status write_piece(piece_writer *w, uint64_t number, ebpo_error *err
     if (!path)
         return no_memory(error);
     ebpo_status status = take_mesh(w, number, &piece_mesh, error);
-    if (status == EBPO_OK && w->run->groups) { /* there was no warning on the whole mesh */
+    if (status == EBPO_OK && w->run->groups) { /* warnings are printed for each group */
         progress_wipe(w->run->line);
         advice_warn(stderr, "convert", shown_name(&w->pieces[number]), &piece_mesh);
     }
@@ -483,7 +483,8 @@ static void print_json(const piece_writer *w, double seconds)
 
 /* ---- all of it ---- */
 
-/* Reports groups without faces, for which no model is written. They follow all other groups. */
+/* Reports groups without faces, for which no model is written. In the list of groups, these follow
+ * all other groups. */
 static ebpo_status report_empty(const piece_writer *w, ebpo_error *error)
 {
     uint64_t count = ebpo_mesh_groups_count(w->run->groups);

@@ -52,8 +52,8 @@ bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
 /* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
- * out of it. rate: steps per second. clearance: radius of the tool, which remains outside where the
- * device's position is outside. */
+ * out of it. rate: steps per second. clearance: radius of the tool. The path keeps this additional
+ * distance from the surface, so that the tool is not always in contact. */
 ebpo_status haptic_builtin_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
                                 double rate, double clearance, ebpo_error *error);
 

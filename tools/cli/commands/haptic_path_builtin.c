@@ -33,7 +33,7 @@ static void box_point(const builtin_path *p, double angle, double height, double
     out[p->up] = p->origin[p->up] + p->size[p->up] * (0.5 + height);
 }
 
-/* Sets p->hit: rays from outside the box to its axis find the surface. */
+/* Sets p->hit, by rays from outside the box to the middle axis of the box. */
 static ebpo_status measure_radii(builtin_path *p, ebpo_context *context, ebpo_error *error)
 {
     for (int h = 0; h < HEIGHTS; h++)
@@ -70,12 +70,12 @@ static bool pose_at(void *self, uint64_t step, haptic_pose *out)
     const builtin_path *p = self;
     double seconds = (double)step / p->rate, angle = 2 * pi * seconds / 8;
     double height = 0.4 * sin(0.31 * angle), nod = 0.06 * cos(3.7 * angle);
-    double approach = fmax(0, 1 - seconds); /* in the first second, from outside the model */
+    double approach = fmax(0, 1 - seconds); /* in the first second, the device approaches */
     double radius = surface_distance(p, angle, height) + p->clearance + nod - 0.01;
     box_point(p, angle, height, radius + approach * (0.9 + p->clearance - radius), out->position);
     for (int k = 0; k < 4; k++)
         out->rotation[k] = 0;
-    out->rotation[p->up] = sin(0.3 * sin(angle)); /* back and forth */
+    out->rotation[p->up] = sin(0.3 * sin(angle)); /* the device turns back and forth */
     out->rotation[3] = cos(0.3 * sin(angle));
     return true;
 }

@@ -1,6 +1,6 @@
-/* Drives a haptic device that sends its positions in UDP packets, and receives the feedback:
- * docs/guide/haptic.md has their layout. The sender of the first valid packet is the device; other
- * packets are ignored. */
+/* Drives a haptic device that sends its positions in UDP packets, and receives feedback in such
+ * packets. docs/guide/haptic.md describes their layout. The sender of the first valid packet is the
+ * device; other packets are ignored. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -124,7 +124,7 @@ static void take_all(udp *u)
         socklen_t length = sizeof from;
         ssize_t size = recvfrom(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_TRUNC,
                                 (struct sockaddr *)&from, &length);
-        /* ECONNREFUSED: an earlier feedback did not reach the device, which may return */
+        /* ECONNREFUSED: an earlier feedback did not reach the device, but the device may return */
         if (size < 0 && errno != ECONNREFUSED)
             return;
         if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))

@@ -74,7 +74,7 @@ static void add_vertex(ebpo_mesh *m, const ebpo_pose *pose, const double x[3])
     }
 }
 
-/* first: index of the vertex that corner index 0 stands for */
+/* Adds the face with the vertices first + corner[k]. */
 static void add_face(painted_mesh *p, uint32_t first, const uint32_t corner[3], uint8_t paint)
 {
     ebpo_mesh *m = &p->mesh;

@@ -18,9 +18,9 @@ enum { LOADS_MIN = 8, SAFETY_FACTOR = 4 };
 
 /* --- opening --- */
 
-/* Sets the options for loading in parts. A file with a subtree level (whose data is stored subtree
- * by subtree) is cut there, so that each part is one read. Any other file is cut at the level that
- * the library would choose if the whole model did not fit in memory. */
+/* Sets the options for loading in parts. A file that is stored subtree by subtree is cut at its
+ * subtree level, so that each part is one read. Any other file is cut at the level that the library
+ * would choose if the whole model did not fit in memory. */
 static void cut_at_subtrees(query_holding *h)
 {
     ebpo_model_options *o = &h->options;
@@ -38,14 +38,14 @@ static void cut_at_subtrees(query_holding *h)
         h->subtrees = parts.subtrees;
 }
 
-/* Sets the memory limit: half of the free memory, or what the model needs at least if that is more.
- * Decides whether to load the model in parts at first. */
+/* Sets the memory limit to half of the free memory. If the least memory that the model needs is
+ * greater, the limit is this memory. Decides whether to load the model in parts at first. */
 static void decide_memory(query_holding *h)
 {
     uint64_t half = (h->free_memory = ebpo_free_memory()) / 2;
     h->plan = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
     if (ebpo_model_memory(h->session.file, &h->options, &h->plan, NULL) != EBPO_OK)
-        return; /* reported when the model is made */
+        return; /* the error is reported when the model is made */
     h->options.memory = half > h->plan.least ? half : h->plan.least;
     if (ebpo_model_memory(h->session.file, &h->options, &h->plan, NULL) != EBPO_OK ||
         (h->plan.resident && h->plan.whole <= SMALL_MODEL))
@@ -54,7 +54,7 @@ static void decide_memory(query_holding *h)
     h->may_load_all = h->plan.resident && h->subtrees;
 }
 
-/* Returns true if no option limits or fixes what is loaded. */
+/* Returns true if no option limits or determines which parts of the model are loaded. */
 static bool is_unlimited(const query_values *v, const ebpo_model_options *o)
 {
     return !v->memory && o->cut_level < 0 && o->loading == EBPO_LOAD_CACHE && !v->prefetch;
