@@ -125,8 +125,8 @@ static void warn_of_nested(FILE *out, const char *command, const char *path, con
             s->nested == 1 ? "is" : "are");
 }
 
-/* Warns of faces whose vertices have the same positions, in the same orientation, as those of an
- * earlier face, but are other vertices. */
+/* Warns of faces that have the positions and the orientation of an earlier face, but not its
+ * vertices. */
 static void warn_of_repeated_positions(FILE *out, const char *command, const char *path,
                                        const mesh_input *p)
 {

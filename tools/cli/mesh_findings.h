@@ -25,8 +25,8 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
 /* Writes members volume (null: not known), volume_lo, volume_hi and winding_integral. */
 void findings_volume_json(json *j, const ebpo_solid_volume *solid);
 /* Prints the kind of the mesh, each kind of finding (defect) with its first faces or vertices, and
- * a note about the check that was omitted. `crossings_follow`: the caller makes this check, that of
- * intersecting faces, later; then the note is not printed. */
+ * a note that intersecting faces were not searched. `crossings_follow`: the caller searches them
+ * later, so the note is not printed. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, const ebpo_solid_volume *solid,
                     bool crossings_follow);

@@ -121,7 +121,7 @@ char *number_write_uint(char *out, uint64_t v)
 {
     char digits[20];
     int count = 0;
-    if (v < 10) { /* most winding numbers */
+    if (v < 10) { /* fast path for winding numbers, which are small */
         *out = (char)('0' + v);
         return out + 1;
     }

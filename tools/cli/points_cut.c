@@ -44,10 +44,11 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
     uint64_t first = points_share(rows, number, part_count),
              end = points_share(rows, number + 1, part_count);
     p->row = first;
-    p->rows_stated = false; /* already checked, so take_numbers need not check it */
+    p->rows_stated = false; /* rows_total was checked above, so take_numbers need not check it */
     p->rows_known = true;
     p->rows_total = end - first;
-    /* the last part also reads the bytes after the last whole row, so that they are reported */
+    /* The last part also reads the bytes after the last complete row, so that an incomplete row is
+     * reported. */
     return limit_bytes(p, begin + first * row_bytes,
                        number + 1 < part_count ? begin + end * row_bytes : size);
 }

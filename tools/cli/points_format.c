@@ -235,8 +235,8 @@ static bool begins_with(const points *p, const char *with, size_t count)
     return p->unread_count >= count && memcmp(p->unread, with, count) == 0;
 }
 
-/* Returns true if the input is a PLY. Raw doubles may begin with the bytes "ply\n", but hardly with
- * letters after these bytes, because the first double would be about 1e219 or 1e243. */
+/* Returns true if the input is a PLY. Raw doubles may begin with the bytes "ply\n", too. But then
+ * letters are unlikely to follow, because they would make the first double about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
     if (!begins_with(p, "ply\n", 4) && !begins_with(p, "ply\r", 4) &&

@@ -9,8 +9,8 @@
  * block. */
 bool points_take_header(points *p, points_block *b);
 /* Splits a line into fields. Removes blanks and quotes around each field, and writes a zero byte
- * after it. `separator`: 0: blanks. `end`: end of the line, where a zero byte is. Returns the
- * number of fields. */
+ * after it. `separator`: 0 means blanks. `end`: end of the line; *end must be 0. Returns the number
+ * of fields. */
 int points_split(char separator, char *line, char *end, char *field[POINTS_FIELDS]);
 
 #endif

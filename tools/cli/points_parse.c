@@ -220,8 +220,8 @@ static void parse_text(const points *p, points_block *b)
     }
 }
 
-/* An error that points_take has recorded is after the last row of the block. If parsing finds an
- * error in an earlier row, this error replaces it. */
+/* points_take may have recorded an error, which is after the last row of the block. If parsing
+ * finds an error in a row, the error of this row replaces the recorded error. */
 void points_parse(const points *p, points_block *b)
 {
     if (p->all_rows)

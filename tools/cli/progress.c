@@ -10,9 +10,9 @@
 
 double progress_now(void) { return 1e-9 * (double)tool_clock(); }
 
-/* Draws the rate of the work. If line->faces is set: in bytes per second while the mesh is read,
- * then in faces per second. Otherwise: in units of the progress reports. `speed`: units of the
- * reports per second. */
+/* Draws the rate of the work. If line->faces is set, the unit is bytes per second while the mesh is
+ * read, and then faces per second. Otherwise it is the unit of the progress reports per second.
+ * `speed`: units of the reports per second. */
 static void draw_rate(const progress_line *line, double speed, uint64_t total)
 {
     char rate[32];

@@ -49,7 +49,7 @@ static uint32_t selections_with(trait_fn has, char *names, size_t size)
         const ebpo_selection_traits *t = ebpo_selection_describe((ebpo_selection)i);
         if (!has(t))
             continue;
-        char later[200]; /* names of the following selections */
+        char later[200]; /* names of the selections after i */
         snprintf(later, sizeof later, "%s", names);
         const char *between = !bits ? "" : bits & (bits - 1) ? ", " : " or ";
         snprintf(names, size, "%s%s%.150s", t->name, between, later);

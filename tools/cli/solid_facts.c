@@ -13,12 +13,13 @@ static double cell_volume(const ebpo_info *info, int level)
 
 double facts_volume(const ebpo_info *info, int level)
 {
-    /* Such volumes are beyond the range of doubles, so those in the file are not valid. */
+    /* Volumes of cells are beyond the range of doubles, so the volumes in the file are not valid.
+     */
     if (!isnormal(cell_volume(info, level)))
         return NAN;
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
-        /* a cell's volume may be infinite */
+        /* a cell's volume may be infinite; then 0 times this volume would be NAN */
         sum +=
             info->level[i].leaf_volume +
             (info->level[i].black_count ? (double)info->level[i].black_count * cell_volume(info, i)

@@ -1,5 +1,5 @@
-/* Computes volumes of envelopes and of the solid, and percentages of a base: the volume of the
- * solid, the integral of its winding number, or the volume of the root box. */
+/* Computes volumes of envelopes and of the solid, in units or in percent of a base. The base is the
+ * volume of the solid, the integral of its winding number, or the volume of the root box. */
 #ifndef EBPO_TOOLS_SOLID_FACTS_H
 #define EBPO_TOOLS_SOLID_FACTS_H
 

@@ -108,7 +108,8 @@ static uint64_t byte_count(const textures *t, uint64_t row)
 }
 
 /* Returns true if the file has the bytes of the image. A row with a digest but without bytes is an
- * image that was not embedded, or an empty image file, whose digest is that of no bytes. */
+ * image that was not embedded, or an empty image file. The digest of an empty file is
+ * digest_of_nothing. */
 static bool is_kept(const textures *t, uint64_t row)
 {
     static const char digest_of_nothing[] =
@@ -349,8 +350,8 @@ static bool spans_equal(span a, span b)
     return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0);
 }
 
-/* Returns true if an earlier row has the same image, and its name leads to the same file although
- * it may be spelled differently. */
+/* Returns true if an earlier row has the same image, and the names of both rows lead to the same
+ * file. The names may be spelled differently. */
 static bool is_repeated(const textures *t, uint64_t row)
 {
     char *name = safe_name(list_of(t, NAMES, row));

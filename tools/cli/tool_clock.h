@@ -14,7 +14,7 @@ static inline uint64_t tool_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-/* Sleeps until the clock reaches `when`. */
+/* Sleeps until tool_clock() reaches `when` nanoseconds. */
 static inline void tool_wait_until(uint64_t when)
 {
 #ifdef EBPO_HAVE_CLOCK_NANOSLEEP

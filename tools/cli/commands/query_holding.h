@@ -25,9 +25,9 @@ typedef struct query_holding {
     /* policy */
     bool automatic;           /* no memory limit was given */
     atomic_bool may_load_all; /* the model is loaded in parts, and may be loaded as a whole later */
-    bool loaded_all;          /* the whole model was loaded after parts; the reasons: */
+    bool loaded_all; /* the whole model was loaded after parts; the next 4 members say why */
     uint64_t queries_before, loads_before; /* numbers of queries and of loaded subtrees before */
-    double extra_seconds;    /* cost of parts beyond loading each part once, in seconds */
+    double extra_seconds;    /* seconds for loading parts again, and for slower queries */
     double whole_seconds;    /* estimated time to load the whole model */
     double subtree_overhead; /* extra share of the time of a query in parts, compared with the whole
                               * model */
@@ -44,7 +44,7 @@ typedef struct query_holding {
 int query_holding_open(query_holding *h, const char *command, const char *path,
                        const query_values *values, const ebpo_model_options *options,
                        double subtree_overhead);
-/* Initializes `h` for a job that has other data than a model. */
+/* Initializes `h` for a job that queries a catalogue instead of a model. */
 void query_holding_external(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 

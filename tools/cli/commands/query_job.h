@@ -25,8 +25,9 @@ struct query_job {
     size_t result_bytes;     /* size of the result of one row */
     double subtree_overhead; /* see query_holding_open */
     /* Evaluates rows[count][points_width(kind)]: writes results of a fixed size to worker->results,
-     * or prints lists until result_text_is_over. Called after query_holding_enter; the first call
-     * has no rows, so that an unsupported query is reported before the command waits for input. */
+     * or prints lists to worker->text until result_text_is_over. Called after query_holding_enter;
+     * the first call has no rows, so that an unsupported query is reported before the command waits
+     * for input. */
     ebpo_status (*result)(const query_job *job, query_worker *worker, const double *rows,
                           uint64_t count, ebpo_error *error);
     /* Prints worker->results of these rows; does not use the model. NULL: all results are lists. */

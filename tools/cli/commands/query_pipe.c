@@ -9,8 +9,8 @@
 #include "cli/command.h"
 #include "cli/points_parse.h"
 
-/* Number of blocks in progress for each thread; LARGE_EACH is for large blocks. With more than one,
- * a thread can go on while the oldest block is not finished. */
+/* Number of blocks in progress for each thread; LARGE_EACH is for large blocks. With more than one
+ * block, a thread can continue while the oldest block is not finished. */
 enum { BLOCKS_EACH = 4, LARGE_EACH = 2 };
 /* Number of rows of the first piece of the first block, see compute_block. */
 enum { FIRST_ROWS = 16 };
@@ -59,7 +59,7 @@ typedef struct pipe_line {
     bool stopped;             /* an error has occurred; no more blocks are taken or written */
     /* only the thread that writes blocks uses these */
     uint64_t rows_written;  /* number of rows in written blocks */
-    uint64_t bytes_written; /* bytes of their input */
+    uint64_t bytes_written; /* bytes of input of these blocks */
     int code;               /* exit code */
 } pipe_line;
 
@@ -89,8 +89,8 @@ static bool has_turn(slot *s)
 }
 
 /* Called when the results of a block have become long. Writes them if all earlier blocks have been
- * written. Otherwise marks the text as full: evaluation then stops after a row, and continues when
- * this thread has released the lock of the model and its turn to write has come. */
+ * written. Otherwise marks the text as full: evaluation then stops after a row. It continues when
+ * this thread has released the lock of the model, and all earlier blocks have been written. */
 static void spill_results(result_text *t, void *user)
 {
     slot *s = user;
@@ -130,7 +130,8 @@ static bool write_block(pipe_line *p, slot *s)
     return p->code == EXIT_OK;
 }
 
-/* Marks a block as done. If it is the oldest one, writes it and all finished blocks after it. */
+/* Marks a block as done. If all earlier blocks have been written, writes this block and the
+ * finished blocks that follow it. */
 static void finish_block(pipe_line *p, slot *s)
 {
     pthread_mutex_lock(&p->lock);
@@ -174,8 +175,8 @@ static double estimate_total(const points *in, const points_block *b)
     return (double)in->bytes_total * (double)b->row_count / (double)(b->count ? b->count : 1);
 }
 
-/* Evaluates the rows from number s->text.rows on. Call after query_holding_enter; leaves the model.
- */
+/* Evaluates the rows from number s->text.rows on. Call after query_holding_enter. The function
+ * calls query_holding_leave. */
 static void compute_from_row(pipe_line *p, query_worker *w, slot *s, const double *rows,
                              uint64_t count)
 {
@@ -247,7 +248,7 @@ static void compute_block(pipe_line *p, query_worker *w, slot *s)
 
 static void *work_on_blocks(void *user);
 
-/* Starts another thread, up to `threads` in all. */
+/* Starts another thread, unless p->threads threads have started. */
 static void start_thread(pipe_line *p)
 {
     pipe_thread *next = &p->pipe_thread[p->started];
@@ -312,7 +313,7 @@ static void make_wake_pipe(pipe_line *p)
 {
     int ends[2];
     if (pipe(ends) != 0)
-        return; /* the thread stops at the next input */
+        return; /* without the pipe, the reading thread stops only at the next input */
     for (int i = 0; i < 2; i++)
         (void)fcntl(ends[i], F_SETFD, FD_CLOEXEC);
     p->in->wake_fd = ends[0];
@@ -397,8 +398,8 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
     if (p.code == EXIT_OK) {
         p.started = 1;
         work_on_blocks(&p.pipe_thread[0]);
-        /* Only threads that take blocks start threads; thread 0 has ended, and a joined thread
-         * starts no more, so that `started` is final when the loop ends. */
+        /* A thread starts other threads only before it ends. Thread 0 and the joined threads have
+         * ended, so `started` is final when the loop ends. */
         for (unsigned i = 1; i < p.started; i++)
             pthread_join(p.pipe_thread[i].thread, NULL);
         if (p.code == EXIT_OK && !result_text_write(&p.slot[0].text, job->command))

@@ -43,8 +43,8 @@ static bool read_shard(query_shard *s, const char *text)
     return false;
 }
 
-/* Returns true, with a report on stderr, when `path` is the model, or the file of the points, which
- * may be named FILE.h5:/path. */
+/* Returns true, with a report on stderr, if `path` leads to the model or to the file of the points.
+ * The points may be named FILE.h5:/path. */
 static bool overwrites_input(const query_shard *s, const char *path)
 {
     struct stat in, out;
@@ -223,7 +223,7 @@ static bool check_note(const query_shard *s)
     struct stat st;
     char contents[sizeof beginning - 1];
     if (lstat(s->note, &st) != 0)
-        return true; /* other errors are reported for the results, which are in the same folder */
+        return true; /* writing the results, in the same folder, will report other errors */
     FILE *in = S_ISREG(st.st_mode) ? fopen(s->note, "re") : NULL;
     bool is_note = in && fread(contents, 1, sizeof contents, in) == sizeof contents &&
                    memcmp(contents, beginning, sizeof contents) == 0;
@@ -327,10 +327,10 @@ static int write_note(const query_shard *s, const struct stat *results)
     return status == EBPO_OK ? EXIT_OK : command_failed(s->command, &error);
 }
 
-/* Moves the results to their place. Removes the old note before and writes the new note afterwards,
- * so that a note is never beside other results, even if the process is killed. results: the open
- * file of the results, because another command may replace the file at the path. Returns an exit
- * code. */
+/* Gives the file of results its final name. Removes the old note before and writes the new note
+ * afterwards. So a note is never beside results of other inputs, even if the process is killed.
+ * results: the open file of the results, because another command may replace the file at the path.
+ * Returns an exit code. */
 static int put_in_place(query_shard *s, int results)
 {
     struct stat st;

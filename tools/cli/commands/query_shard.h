@@ -17,8 +17,9 @@ typedef struct query_shard {
     int saved_stdout; /* original standard output, while the file replaces it; -1: not replaced */
 } query_shard;
 
-/* Checks options of outputs and shards; reads I/N. Returns false after an error, reported on stderr
- * (exit with EXIT_USAGE). Call query_shard_free in any case. */
+/* Checks options of outputs and shards; reads the value I/N of --shard. Returns false after an
+ * error, reported on stderr; the caller then exits with EXIT_USAGE. Call query_shard_free in any
+ * case. */
 bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
                       const char *points_path);
 /* Examines the inputs. Returns true if the command has nothing more to do: the results exist,
@@ -26,8 +27,8 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
 bool query_shard_done(query_shard *s, const query_job *job, int *code);
 /* Redirects standard output to the file of results, if one is requested. */
 int query_shard_begin(query_shard *s);
-/* Restores standard output and, after EXIT_OK, moves the file to its place; returns the exit
- * code. */
+/* Restores standard output. If `code` is EXIT_OK, gives the file of results its final name. Returns
+ * the exit code. */
 int query_shard_end(query_shard *s, const query_job *job, int code);
 void query_shard_free(query_shard *s);
 

@@ -43,7 +43,7 @@ int subset_read_target(const char *name, double max_error, const char *target_si
 void subset_print_target(const ebpo_info *info, bool chosen);
 
 /* Checks options before the file is open, and sets the members of *out that do not depend on the
- * file. Returns an exit code; EXIT_OK: continue. */
+ * file. Returns an exit code; EXIT_OK: the options are valid. */
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path,
                    ebpo_subset_options *out);
 

@@ -1,5 +1,5 @@
-/* Draws captions with cairo: the text is drawn as coverage, which mixes its colour into the
- * picture. */
+/* Draws captions with cairo. cairo computes how much of each pixel the text covers, and this
+ * coverage mixes the colour of the text into the picture. */
 #include "ebpo_config.h"
 
 #include "cli/render/picture.h"
@@ -85,7 +85,7 @@ static cairo_surface_t *text_coverage(int width, int height, const char *text, b
         lib.set_font_size(cairo, size * 0.96 * width / extents.x_advance);
         lib.text_extents(cairo, text, &extents);
     }
-    /* begins at a whole pixel; all captions have the same baseline, whatever their letters are */
+    /* the text begins at a whole pixel; the baseline does not depend on the letters */
     lib.move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
     lib.show_text(cairo, text);
     *success = lib.status(cairo) == CAIRO_STATUS_SUCCESS;

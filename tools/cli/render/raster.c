@@ -85,8 +85,8 @@ static bool unit_normal(double (*c)[3], double out[3])
 
 /* --- first step --- */
 
-/* Returns the sides of a triangle that are outlines of its polygon, as bits; bit i: the side from
- * corner i to the next one. ebpo_lod_level divides a polygon into a fan of consecutive triangles
+/* Returns the sides of a triangle that are outlines of its polygon, as bits. Bit i is the side from
+ * corner i to the next corner. ebpo_lod_level divides a polygon into a fan of consecutive triangles
  * with the same first corner. A side between two triangles of a fan in one plane is no outline. */
 static unsigned outline_sides(const raster *r, uint64_t face, const double normal[3])
 {
@@ -108,8 +108,9 @@ static unsigned outline_sides(const raster *r, uint64_t face, const double norma
     return sides;
 }
 
-/* The sides of a triangle on the screen. Side i leads from corner i to the next one. a x + b y + c
- * is the distance of a sample from the side, in samples; it is not negative inside. */
+/* The sides of a triangle on the screen. Side i leads from corner i to the next corner. a[i] x +
+ * b[i] y + c[i] is the distance of a sample from side i, in samples; it is 0 or more inside the
+ * triangle. */
 typedef struct sides {
     double a[3], b[3], c[3];
 } sides;
@@ -132,8 +133,8 @@ static bool make_sides(const projected p[3], sides *out)
 
 static int clamp_index(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
 
-/* Gives a triangle to all its samples that have no nearer triangle. outlines: sides that are
- * outlines, as bits. */
+/* Stores a triangle in all samples that it covers, except those that have a nearer triangle.
+ * outlines: sides that are outlines, as bits. */
 static void fill_triangle(raster *r, const projected p[3], uint32_t triangle, unsigned outlines)
 {
     sides s;
@@ -434,7 +435,7 @@ static void resolve_picture(const raster *r, picture *out, int x, int y, int wid
            command_thread(&shares[started].thread, resolve_rows, &shares[started]) == 0)
         started++;
     resolve_rows(&shares[0]);
-    for (unsigned i = started; i < count; i++) /* threads that could not be started */
+    for (unsigned i = started; i < count; i++) /* rows of threads that could not be started */
         resolve_rows(&shares[i]);
     for (unsigned i = 1; i < started; i++)
         pthread_join(shares[i].thread, NULL);

@@ -13,9 +13,9 @@ typedef struct camera {
     double tangent;                  /* tangent of half the vertical angle of view */
 } camera;
 
-/* Sets the camera so that it looks from azimuth and elevation (degrees) with `up_axis` (0 x, 1 y, 2
- * z) upwards, from the least distance at which all vertices of the mesh are in a picture of that
- * size. The mesh must have at least one face. */
+/* Sets the camera to the direction given by azimuth and elevation (degrees), with `up_axis` (0 x, 1
+ * y, 2 z) upwards. The distance is the least one at which all vertices of the mesh are in a picture
+ * of width * height pixels. The mesh must have at least one face. */
 void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
                 int width, int height);
 

@@ -63,7 +63,8 @@ static ebpo_status load_mesh(drawing *d, const ebpo_file *file, ebpo_error *erro
     return status == EBPO_OK ? ebpo_mesh_colours(&d->mesh, &d->colours, error) : status;
 }
 
-/* Loads the envelopes of the deepest level with at most NODES_MAX nodes, at least of the root. */
+/* Loads the envelopes of the deepest level with at most NODES_MAX nodes; if there is none, of level
+ * 0. */
 static ebpo_status load_level(drawing *d, const ebpo_file *file, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);

@@ -1,6 +1,6 @@
 /* Measures distance queries under a memory budget. Under a budget, a model keeps only levels 0 to
- * its cut level in memory. These levels give an interval of each distance, and nothing is loaded
- * for it; an exact query loads subtrees. */
+ * its cut level in memory. From these levels alone, a query computes an interval that contains the
+ * distance. For the exact distance, a query loads subtrees. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -182,7 +182,7 @@ typedef struct report_values {
 typedef struct plane_setting {
     double percent;  /* value of --percent, used if `k_root` is "" */
     char k_root[24]; /* value of --k-root */
-    char word[32];   /* text after the selection's name in the method's name; "": one setting */
+    char word[32];   /* follows the selection's name in the method's name; "": only one setting */
 } plane_setting;
 
 typedef struct comparison {
@@ -220,15 +220,16 @@ void comparison_free(comparison *c);
 /* Writes the short name of a file or URL: "bunny" for "dir/bunny.ebpo.h5". */
 void report_stem(const char *path, char *out, size_t capacity);
 
-/* If `status` means that a file or this build does not support what was measured, adds the note
- * "WHAT: " and the message of `error`, and returns EBPO_OK. Otherwise returns `status`. */
+/* If `status` means that a file or this build does not support a measurement, adds the note "WHAT:
+ * " with the message of `error`, and returns EBPO_OK. Otherwise returns `status`. */
 ebpo_status method_note_missing(method *m, const char *what, ebpo_status status, ebpo_error *error);
 
-/* Sorts the values, and returns their quantile: the least of the values for which a fraction of at
- * least `share` of all values is less or equal. Returns NAN if `count` is 0. */
+/* Sorts the values, and returns their quantile: the least value v of which a fraction of at least
+ * `share` of all values is less than or equal to v. Returns NAN if `count` is 0. */
 double quantile_of(double *values, uint64_t count, double share);
 
-/* The steps of a report in their order. Each sets values of one method. */
+/* The steps of a report in their order. A function with the parameter `m` sets values of this
+ * method. */
 EBPO_MUST_USE ebpo_status report_make_points(comparison *c, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_gather(comparison *c, method *m, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file,

@@ -44,7 +44,7 @@ static void set_metrics(const comparison *c, timing *t, double *f)
     f[METRIC_DEADLINE_WIDTH_P99] = quantile_of(t->width, c->points, 0.99);
     f[METRIC_DEADLINE_TOOK_MEDIAN] = quantile_of(t->took, c->points, 0.5);
     f[METRIC_DEADLINE_TOOK_P99] = quantile_of(t->took, c->points, 0.99);
-    f[METRIC_DEADLINE_TOOK_MAX] = t->took[c->points - 1]; /* quantile_of has sorted them */
+    f[METRIC_DEADLINE_TOOK_MAX] = t->took[c->points - 1]; /* quantile_of has sorted `took` */
 }
 
 ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,

@@ -38,8 +38,8 @@ static bool is_out_of_range(const ebpo_info *info)
     return !isnormal(volume) || !isnormal(ldexp(volume, -60));
 }
 
-/* Returns the volume within the mesh as a share of the root cell, which does not depend on the
- * scale of the model. */
+/* Returns the volume within the mesh as a share of the volume of the root cell. The share does not
+ * depend on the scale of the model. */
 static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
 {
     double sum = 0;

@@ -39,7 +39,8 @@ static double doubled_area(const ebpo_mesh *mesh, uint64_t face, double unit)
                 pow(u[0] * v[1] - u[1] * v[0], 2));
 }
 
-/* Returns the first index whose sum is greater than `value`. sums[count]: ascending. */
+/* Returns the first index i with sums[i] > value. sums[count]: ascending sums of the areas of
+ * faces. */
 static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
 {
     uint64_t low = 0, high = count - 1;
@@ -53,7 +54,8 @@ static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
     return low;
 }
 
-/* Generates a point in a ball around a point that is uniform on the surface. */
+/* Generates a random point in a ball. The centre of the ball is random, and uniform on the surface.
+ */
 static void make_near_point(const ebpo_mesh *mesh, const double *sums, double radius,
                             uint64_t *random, double out[3])
 {

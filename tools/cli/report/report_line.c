@@ -19,7 +19,7 @@ typedef struct simulated_line {
     uint64_t size;  /* bytes of the file */
     uint64_t bytes; /* number of bytes sent so far */
     uint64_t trips; /* number of completed round trips */
-    /* for each block: number of the round trip that brings it, from 1; 0: not requested */
+    /* for each block: number (from 1) of the round trip that brings the block; 0: not requested */
     uint32_t *arrival_trip;
 } simulated_line;
 
@@ -64,7 +64,7 @@ static void prefetch_ranges(void *user, const ebpo_range *ranges, size_t count)
 }
 
 /* Opens the file over the simulated connection and reads levels 0 to `level`. Sets l->bytes and
- * l->trips to the numbers for this. */
+ * l->trips to the bytes and round trips that this takes. */
 static ebpo_status load_level(simulated_line *l, const char *path, int level, ebpo_error *error)
 {
     ebpo_stream_options stream_options = EBPO_STREAM_OPTIONS_INIT;

@@ -35,7 +35,7 @@ static ebpo_status measure_error(const comparison *c, ebpo_model *model, const c
     ebpo_error_bound bound = EBPO_ERROR_BOUND_INIT;
     ebpo_file *file = NULL;
     options.samples = 0;
-    options.tolerance = 0.01; /* a larger tolerance could show an error above the requested one */
+    options.tolerance = 0.01; /* a larger one could raise the upper bound above the target */
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     ebpo_status status = ebpo_open(path, &file, error);

@@ -1,10 +1,11 @@
 /* Computes the cost of sending each level of a tree in the cost model of the theses (BP 2008,
- * section 4.2): uncompressed, level after level from the root, each leaf with its faces and their
- * vertices. The costs are:
- *   leaf              1 byte for its corners
- *   plane             4 bytes for its offset; 16 more when its normal occurs first, otherwise 4
- * more face              12 bytes when it occurs first, otherwise 4 vertex of a leaf  12 bytes when
- * it occurs first, otherwise 4 */
+ * section 4.2). The tree is sent uncompressed, level after level from the root. A leaf is sent with
+ * its faces and their vertices. The costs are:
+ * - leaf: 1 byte for its corners
+ * - plane: 4 bytes for its offset, and 16 bytes for a new normal or 4 bytes for a known normal
+ * - face: 12 bytes for a new face, 4 bytes for a known face
+ * - vertex of a leaf: 12 bytes for a new vertex, 4 bytes for a known vertex
+ * A normal, face or vertex is new if it was not sent before. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -3,7 +3,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* A part of the head; not terminated. */
+/* A part of the head, without a zero byte at its end. */
 typedef struct span {
     const char *text;
     size_t length;

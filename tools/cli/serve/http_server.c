@@ -26,17 +26,17 @@ enum {
     HEAD_SECONDS = 15,
     SEND_SECONDS = 30,
     DRAIN_MILLISECONDS = 1000, /* time in which bytes are still received when a connection ends */
-    BLOCK = 1 << 16,
-    FIELDS_MAX = 2048,
-    FULL_MILLISECONDS = 100 /* until the next look for a free slot */
+    BLOCK = 1 << 16,           /* bytes that are read from a file at a time */
+    FIELDS_MAX = 2048,         /* maximum size of the header fields of a response */
+    FULL_MILLISECONDS = 100    /* interval of checks for a free slot */
 };
 
 typedef struct http_server http_server;
 
 typedef struct connection {
     http_server *server;
-    int socket; /* -1: the slot is free */
-    size_t received;
+    int socket;      /* -1: the slot is free */
+    size_t received; /* number of bytes in `head` */
     char head[HTTP_HEAD_MAX];
     char block[BLOCK];
 } connection;
@@ -46,7 +46,7 @@ struct http_server {
     void *user;
     pthread_mutex_t lock;    /* guards sockets and `open` */
     pthread_cond_t released; /* a slot became free */
-    int open;
+    int open;                /* number of open connections */
     connection slot[CONNECTIONS_MAX];
 };
 

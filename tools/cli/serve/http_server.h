@@ -5,12 +5,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What a path leads to. */
+/* The content of a path. */
 typedef struct http_content {
     const char *type;     /* media type of the bytes */
     const char *location; /* with HTTP_FOUND: address to which the client is sent; else NULL */
-    int file;             /* open file with the bytes, which the server closes; -1: in `bytes` */
-    const void *bytes;    /* must stay valid until the server ends */
+    int file; /* open file with the content; the server closes it. -1: `bytes` is the content */
+    const void *bytes; /* must stay valid until the server ends */
     uint64_t size;
     char tag[64]; /* version, in quotes; "": none */
 } http_content;
