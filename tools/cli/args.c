@@ -171,8 +171,8 @@ typedef struct parser {
     int argc, at; /* at: index of the next argument */
     char **argv;
     void *values;
-    const char *output; /* operand that was given as the option --output, or NULL */
-    size_t output_at;   /* index of that operand */
+    const char *output; /* value of the option --output, which stands for an operand; or NULL */
+    size_t output_at;   /* index of the operand for which `output` stands */
 } parser;
 
 /* Takes an option and its value. `joined`: the value, if it is in the same argument
@@ -317,7 +317,8 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
 
 enum { HELP_WIDTH = 80, HELP_INDENT = 25 };
 
-/* Prints words in lines of HELP_WIDTH; lines after the first one begin at `indent`. */
+/* Prints words in lines of HELP_WIDTH characters. All lines after the first line begin at column
+ * `indent`. */
 static void print_wrapped(const char *text, int indent)
 {
     int column = indent;

@@ -34,7 +34,7 @@ typedef struct arg_option {
                        * describes it */
 } arg_option;
 
-/* The values of a repeated option in the order of the command line. NULL follows the last one. */
+/* The values of a repeated option in the order of the command line. NULL follows the last value. */
 enum { ARG_LIST_MAX = 32 };
 typedef struct arg_list {
     const char *item[ARG_LIST_MAX + 1];

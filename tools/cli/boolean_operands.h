@@ -15,7 +15,7 @@ typedef struct boolean_input {
     const char *path;
     ebpo_scene *scene;     /* NULL: the file is a model */
     query_session session; /* the open model, if the file is a model */
-    uint32_t first, count; /* first operand of the file, and number of its operands */
+    uint32_t first, count; /* index of the file's first operand; number of the file's operands */
 } boolean_input;
 
 typedef struct boolean_operands {
@@ -37,7 +37,7 @@ int boolean_operands_open(boolean_operands *o, const char *name,
                           const ebpo_model_options *model_options, const remote_values *remote);
 void boolean_operands_close(boolean_operands *o);
 
-/* Returns the unit of the first operand that has one, or NULL. */
+/* Returns the unit of the first operand that has a unit, or NULL. */
 const char *boolean_operands_unit(const boolean_operands *o);
 
 #endif

@@ -13,7 +13,7 @@ typedef struct boolean_output {
     unsigned threads;
     bool doubles;              /* write double coordinates */
     bool changed_only;         /* write only faces that are not faces of the first operand */
-    bool colours;              /* colour faces by their operand */
+    bool colours;              /* give faces the colour of their operand */
     bool volume;               /* compute the volume of the exact result */
     bool crossings;            /* count the intersecting faces of the written mesh */
     ebpo_workspace *workspace; /* limits the memory for the exact result; NULL: no limit */

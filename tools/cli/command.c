@@ -148,8 +148,8 @@ bool command_has_level(const char *name, const ebpo_info *info, int64_t level)
     return false;
 }
 
-/* Reports an error of standard output, if it is the first one. `number`: errno; 0: not known.
- * Returns false. */
+/* Reports an error of standard output, unless an earlier error was reported. `number`: errno; 0:
+ * not known. Returns false. */
 static bool not_written(const char *name, int number)
 {
     static bool reported;

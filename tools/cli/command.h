@@ -10,7 +10,7 @@ enum {
     EXIT_OK = 0,
     EXIT_FAILED = 1,    /* error in data, input or output */
     EXIT_USAGE = 2,     /* error in the command line */
-    EXIT_NOT_SOLID = 3, /* the mesh is not a solid, but must be one */
+    EXIT_NOT_SOLID = 3, /* the mesh must be a solid, and is not a solid */
     EXIT_DIFFERS = 4,   /* a comparison found differences */
     EXIT_EMPTY = 5      /* the result is empty */
 };

@@ -313,7 +313,7 @@ static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
 }
 
 /* Writes the number of faces at the positions of an earlier face. If no vertices coincide, writes
- * null, because repeated_faces of the report then counts the same faces. */
+ * null, because then repeated_faces in the report is this number. */
 static void json_repeated(json *j, const mesh_input *p)
 {
     if (!p->prepared.report.repeated_positions.count) {

@@ -111,8 +111,8 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     ebpo_solid_volume solid =
         findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
                        same_mesh && p->shells_counted ? &p->shells : NULL, NULL);
-    /* Faces that repeat others with the same orientation count twice in the volume, so the volume
-     * is not known. */
+    /* A face that repeats another face with the same orientation counts twice in the volume, so the
+     * volume is not known. */
     if (same_mesh && p->repeated_same) {
         solid.lo = 0;
         solid.hi = INFINITY;

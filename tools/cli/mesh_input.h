@@ -27,8 +27,8 @@ typedef struct mesh_input {
     bool repairs_tried;     /* true: repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;
     ebpo_finding repeated; /* faces of the repaired mesh at the positions of an earlier face */
-    /* if vertices coincide: numbers of the faces in `repeated` that have the opposite orientation
-     * of the earlier face, or the same orientation; else 0 */
+    /* If vertices coincide: numbers of faces in `repeated` with the opposite orientation, and with
+     * the same orientation, as the earlier face. Otherwise 0. */
     uint64_t repeated_opposite, repeated_same;
     bool shells_counted; /* true: closed components were counted in `shells` */
     ebpo_shells shells;

@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Maximum size of the output of the functions number_write..., which has no zero byte at its end.
- */
+/* Maximum size in bytes of the output of the functions number_write... The output has no zero byte
+ * at the end. */
 enum { NUMBER_CAPACITY = 32 };
 
 /* Returns the number at `text`. A character that cannot be part of a number, such as a zero byte,
@@ -20,8 +20,8 @@ double number_read(const char *text, const char *end, const char **after);
 const char *number_skip_mark(const char *text);
 
 /* Each function writes a number at `out`, and returns the end of the output. A double that is not
- * finite is written as inf, -inf, nan or -nan. Exponents are written where printf's %.17g writes
- * them. */
+ * finite is written as inf, -inf, nan or -nan. An exponent is written if printf's %.17g would write
+ * an exponent. */
 char *number_write(char *out, double v);
 char *number_write_uint(char *out, uint64_t v);
 char *number_write_int(char *out, int64_t v);

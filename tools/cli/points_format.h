@@ -8,7 +8,7 @@
  * after an error, which is then in the block or has been reported. */
 bool points_recognise(points *p, points_block *b);
 
-/* Returns true for "FILE.h5:/path" where FILE.h5 is a file. */
+/* Returns true for "FILE.h5:/path" if FILE.h5 is a file. */
 bool points_is_dataset(const char *path);
 /* Gets the status of the file that has the points. Returns false if the file does not exist.
  * *dataset: the text after the file name (":/path"), or "". */

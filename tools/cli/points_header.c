@@ -79,8 +79,9 @@ static bool all_numbers(char **field, int fields)
     return fields > 0;
 }
 
-/* Sets p->field: chooses columns by their names. If no needed name is known and the number of
- * columns is right, takes the columns in their order. Returns false if columns are missing. */
+/* Sets p->field to the columns with the needed names. If no column has a needed name, and the
+ * number of columns is right, uses the columns in their order. Returns false if columns are
+ * missing. */
 static bool choose_fields(points *p, char **field, int fields)
 {
     int needed = points_raw_width(p->kind), width = points_width(p->kind), found = 0;

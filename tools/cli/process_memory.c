@@ -27,9 +27,9 @@ static uint64_t used_bytes(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Returns the number of bytes of the stacks of threads. The system counts the whole stacks for the
- * limit, although threads use little of them. `threads`: number of threads; 0: one for each core.
- */
+/* Returns the number of bytes of the stacks of threads. The system counts complete stacks for the
+ * limit, although threads use only a small part of a stack. `threads`: number of threads; 0: one
+ * for each core. */
 static uint64_t stack_bytes(int64_t threads)
 {
     struct rlimit stack;

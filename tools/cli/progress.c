@@ -57,8 +57,8 @@ void progress_end_stage(progress_line *line)
     line->begun = now;
 }
 
-/* Begins a stage. If the array `stages` is full, the time of a new stage is added to its last
- * entry. */
+/* Begins a stage. If the array `stages` is full, the time of a new stage is added to the last entry
+ * of the array. */
 static void begin_stage(progress_line *line, const char *stage)
 {
     int i = 0;

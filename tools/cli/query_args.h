@@ -44,9 +44,9 @@ static inline bool query_lists(const query_values *v)
     return v->nearest > 0 || isfinite(v->within);
 }
 
-/* Checks the options whose bits are in `ineffective`: they have no effect together with the option
- * `with`, such as "--mode leaves". Returns false, after an error message, if one of them was given.
- * The caller then exits with EXIT_USAGE. */
+/* Returns false, after an error message, if an option was given whose bit is in `ineffective`.
+ * These options have no effect together with the option `with`, such as "--mode leaves". The caller
+ * then exits with EXIT_USAGE. */
 bool query_check_effect(const char *name, const query_values *v, unsigned ineffective,
                         const char *with);
 /* Return false, after an error message, if an option was given that has no effect with the other

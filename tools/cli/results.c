@@ -158,8 +158,8 @@ void results_inside(result_text *t, result_form form, const ebpo_inside_result *
 
 /* --- distance --- */
 
-/* Returns true if there is a nearest point. Its distance may still be inf, if it is beyond the
- * range of doubles. */
+/* Returns true if there is a nearest point. The distance may be inf nevertheless, if it is beyond
+ * the range of doubles. */
 static bool has_point(const ebpo_distance_result *r)
 {
     return isfinite(r->distance) || r->face != EBPO_NO_FACE;
@@ -237,7 +237,7 @@ void results_distance(result_text *t, result_form form, bool intervals,
     }
 }
 
-/* --- the nearest faces: their count is known only at the end --- */
+/* --- the nearest faces: the number of faces is known only at the end --- */
 
 void results_near(result_text *t, result_form form, const ebpo_near_face *face, bool first,
                   const ebpo_sampler *sampler)

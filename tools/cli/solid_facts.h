@@ -7,11 +7,11 @@
 #include <stdio.h>
 
 /* Returns the volume of the envelopes that represent the model at `level`: its gray nodes, and the
- * leaves and black nodes of levels 0 to `level`. The volumes of leaves are those that the file
- * states; they do not consider planes that readers derive from faces. NAN: the volumes are beyond
- * the range of doubles. */
+ * leaves and black nodes of levels 0 to `level`. The volumes of leaves come from the file; they
+ * ignore the planes that readers derive from faces. NAN: the volumes are beyond the range of
+ * doubles. */
 double facts_volume(const ebpo_info *info, int level);
-/* Computes the same volume, but with planes of leaves that are derived from the leaves' faces.
+/* Computes the volume of facts_volume, but with the planes of leaves that follow from their faces.
  * Reads the faces; the file must have faces, and no stored planes of leaves. */
 EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads,
                                         ebpo_progress progress, double *volume, ebpo_error *error);

@@ -8,7 +8,7 @@
 #include "cli/args.h"
 
 /* Replaces closed standard streams by unusable files. Must be called before any file is opened.
- * Returns false if this is impossible; then nothing may be opened. */
+ * Returns false after a failure; then the program must not open any file. */
 bool standard_files_occupy(void);
 
 /* Replaces operands "-" by temporary files, as spec->dash states. If an output is replaced, all

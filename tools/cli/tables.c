@@ -57,8 +57,8 @@ const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exp
     double part = frexp(x, &own_exponent), log10_2 = 0.30102999566398119521;
     double power = log10(fabs(part)) + (double)(own_exponent + exponent) * log10_2,
            whole = floor(power);
-    /* `power` has about 13 exact digits. Up to four of them are before its point, so nine digits of
-     * the mantissa are exact. */
+    /* `power` has about 13 exact digits, of which up to four are before the decimal point. So nine
+     * digits of the mantissa are exact. */
     digits = digits < 9 ? digits : 9;
     snprintf(mantissa, sizeof mantissa, "%.*f", digits - 1, copysign(pow(10, power - whole), x));
     if (fabs(strtod(mantissa, NULL)) >= 10) { /* 9.9999... was rounded */

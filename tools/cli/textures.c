@@ -189,8 +189,8 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* Returns true if the name is that of a file below the folder. Such a name has no drive letter; no
- * word between its slashes is empty or ".."; and its last word is not ".". */
+/* Returns true if the name leads to a file below the folder. This is the case if the name has no
+ * drive letter, no word between slashes is empty or "..", and the last word is not ".". */
 static bool stays_below(const char *name)
 {
     size_t n = 0;

@@ -59,7 +59,8 @@ bool words_read_levels(const char *text, word_levels *out);
 bool words_end_with(const char *text, const char *end);
 void words_hex(const uint8_t digest[32], char out[65]);
 
-/* Lists of words for option tables, each in the order of its enum, NULL-terminated. */
+/* Lists of words for option tables, NULL-terminated. The words of a list have the order of an enum.
+ */
 extern const char *const rule_words[];
 extern const char *selection_words[];     /* by ebpo_selection; words_init fills it in */
 extern const char *const normals_words[]; /* by ebpo_normal_distance */

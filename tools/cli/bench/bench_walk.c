@@ -239,7 +239,7 @@ static void turn_walker(walker *w)
         place_on_face(w);
     subtract_vectors(w->p, w->corner[0], off);
     add_scaled(w->p, -dot_product(off, w->n),
-               w->n); /* without this, the sum of rounding errors would lead off the face */
+               w->n); /* keeps d in the face's plane in spite of rounding errors */
     for (int k = 0; k < 3; k++)
         w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
     if (!normalise_vector(w->side))

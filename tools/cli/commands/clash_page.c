@@ -135,8 +135,8 @@ void clash_free(clash_list *list)
 
 /* --- buttons ---
  *
- * A click on a button shows only rows with an instance of its group. Buttons are radio inputs that
- * hide rows by style rules, so that the page needs no scripts. */
+ * A click on the button of a group shows only rows with an instance of this group. Buttons are
+ * radio inputs, and style rules hide rows, so that the page needs no scripts. */
 
 /* Returns the nth group of the two instances: first the groups of `a`, then those of `b`. Returns
  * EBPO_SCENE_NONE after the last group. */
@@ -210,7 +210,8 @@ static bool put_filter(FILE *f, const clash_list *list, const ebpo_scene *scene)
     return true;
 }
 
-/* Writes the class attribute of a row, inside <tr>: "gN" for each group N of its instances. */
+/* Writes the class attribute of a row, inside <tr>: "gN" for each group N of the clash's instances.
+ */
 static void put_classes(FILE *f, const clash *c, const ebpo_scene *scene)
 {
     bool any = false;

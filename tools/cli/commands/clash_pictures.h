@@ -8,9 +8,8 @@
 /* Returns NULL if this build can draw pictures, otherwise the reason as text. */
 const char *clash_pictures_missing(void);
 
-/* Draws the two instances of a clash at the time and position of their worst clash, and sets
- * c->picture. If one instance is within the other, draws only the far side of the outer instance.
- */
+/* Draws the two instances of c->worst at the time c->time, near the contact. Sets c->picture. If
+ * one instance is within the other, draws only the far side of the outer instance. */
 EBPO_MUST_USE ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads,
                                      ebpo_error *error);
 
@@ -23,7 +22,8 @@ enum { CLASH_TILES = 24 }; /* maximum number of times in a strip */
  * enough memory. */
 clash_strip *clash_strip_new(ebpo_scene *scene, double from, double to, int tiles,
                              unsigned threads);
-/* Draws the scene at the next time, with its clashes at that time. */
+/* Adds the picture at `time`, the next time of the strip. clashes[count]: all clashes at this time.
+ */
 EBPO_MUST_USE ebpo_status clash_strip_add(clash_strip *strip, double time,
                                           const ebpo_scene_clash *clashes, uint64_t count,
                                           ebpo_error *error);

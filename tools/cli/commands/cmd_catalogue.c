@@ -316,8 +316,8 @@ static void print_words(const catalogue *c)
 
 /* --- command --- */
 
-/* Returns true if the catalogue would overwrite a file below the folder, or if there is not enough
- * memory; reports this on standard error and sets *code. */
+/* Returns true, with a report on standard error, if the catalogue would overwrite a file below the
+ * folder, or if there is not enough memory. Then *code is the exit code. */
 static bool overwrites_model(const catalogue *c, int *code)
 {
     for (size_t i = 0; i < c->files.count; i++) {

@@ -25,7 +25,7 @@
 /* --- positions of findings --- */
 
 typedef struct finding_printer {
-    json *j;                            /* where to print findings; NULL: not as JSON */
+    json *j;                            /* findings are printed here as JSON; NULL: no JSON */
     bool words;                         /* if `j` is NULL: print findings in words */
     progress_line *line;                /* wiped before printing */
     uint64_t count[EBPO_FINDING_KINDS]; /* number of findings of each kind so far */
@@ -112,8 +112,9 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
 }
 
 /* Finds the positions of findings. If `to` names a PLY file, writes the mesh with coloured findings
- * there. If `j` is not NULL, prints all positions into its open object. If `j` is NULL, prints the
- * legend of the PLY file or, without a file, all positions in words; if `quiet`, prints nothing. */
+ * there. If `j` is not NULL, prints all positions as a member of the open JSON object. If `j` is
+ * NULL, prints the legend of the PLY file or, without a file, all positions in words; if `quiet`,
+ * prints nothing. */
 static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigned threads,
                                   ebpo_progress progress, json *j, bool quiet, progress_line *line,
                                   ebpo_error *error)

@@ -43,8 +43,8 @@ static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "IN
                                                  "not known" };
 
 /* Finds the relation of two models for which a query returned no intersecting faces. *relation: the
- * name of an ebpo_relation to print; NULL if nothing is to be printed, because the models are
- * DISJOINT or their faces intersect. */
+ * name of the ebpo_relation to print. It is NULL if the models are DISJOINT or if faces intersect,
+ * because then no relation is printed. */
 static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *collide_options,
                                  const char **relation, ebpo_error *error)
 {
@@ -430,7 +430,7 @@ static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
     return status;
 }
 
-/* Runs the queries of the command line one after the other. */
+/* Runs the requested queries in order. */
 static ebpo_status query_all(collide_values *v, ebpo_collider *c,
                              const ebpo_collide_options *collide_options, ebpo_error *error)
 {

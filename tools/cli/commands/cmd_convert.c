@@ -63,7 +63,7 @@ static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
 
 /* --- the summary: five lines --- */
 
-/* Prints whether the file is a solid or a surface, and its counts. */
+/* Prints the kind of the model (solid or surface), and the counts of the file. */
 static void print_kind(const char *out, const ebpo_info *info)
 {
     char faces[64], parts[64];
@@ -118,8 +118,8 @@ static void print_name(const char *name)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
                                 "._-/+,:@%";
-    /* "./" prevents that a name with a leading '-' is read as an option; "-" alone is standard
-     * input */
+    /* Before a leading '-', "./" is printed, so that the name is not read as an option. "-" alone
+     * is standard input. */
     const char *folder = name[0] == '-' && name[1] ? "./" : "";
     if (strspn(name, plain) == strlen(name)) {
         printf(" %s%s", folder, name);
@@ -228,9 +228,9 @@ typedef struct values {
 
 #include "cli/options/convert.inc"
 
-/* Returns the parts that the text of --parts selects, as bits. Some parts need another part. If a
- * list with minus signs omits this other part, the function omits the parts that need it, too. For
- * a list without minus signs, the function then returns 0. */
+/* Returns the parts that the text of --parts selects, as bits. Some parts need another part, which
+ * a list may omit. For a list with minus signs, the function then omits the parts in need, too. For
+ * a list without minus signs, it returns 0. */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
@@ -310,8 +310,8 @@ static int check_target(const values *v, ebpo_subset_options *target)
 static bool chooses_parts(const values *v) { return v->target_size && v->profile < 0 && !v->parts; }
 
 /* Returns the parts to build. With --profile or chosen parts, the command builds all parts and then
- * writes some of them. So the file equals the one that `ebpo subset` makes from a file with all
- * parts. */
+ * writes some of them. So the output equals the output of `ebpo subset` for a file with all parts.
+ */
 static uint32_t parts_of(const values *v)
 {
     if (v->profile >= 0 || chooses_parts(v))

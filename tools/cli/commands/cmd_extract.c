@@ -18,7 +18,7 @@
 /* The mesh to write. */
 typedef struct extracted {
     ebpo_mesh mesh;
-    ebpo_subtree *mesh_owner; /* owns the arrays of `mesh`; NULL: `mesh` owns them */
+    ebpo_subtree *mesh_owner; /* owner of the arrays of `mesh`; NULL: `mesh` is the owner */
     double volume;            /* of the envelopes, with --level */
 } extracted;
 

@@ -144,7 +144,7 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
             remote_report(&transfers, &v->remote, false);
     }
     ebpo_close(file);
-    /* The fetched data may be damaged; with this data, the next run would fail in the same way. */
+    /* The fetched data may be damaged. If it were kept, the next run would fail, too. */
     if (part && status == EBPO_E_FORMAT && access(part, F_OK) == 0) {
         remove_part(part);
         int code = command_failed("fetch", &error);

@@ -32,7 +32,7 @@ enum { HAPTIC_BINS = 16 };
 
 typedef struct haptic_times {
     uint64_t step_count; /* number of steps */
-    uint64_t late;       /* steps that end more than a period after their due times */
+    uint64_t late; /* number of steps that end more than a period (1 / rate) after the due time */
     double p50, p99, p99_9, p99_99, max_time; /* seconds from the start to the end of a step */
     double wake_p99_9, wake_max;              /* seconds from the due time of a step to its start */
     double cpu_p99_9, cpu_max;    /* processor time from the start to the end of a step */
@@ -60,7 +60,7 @@ static const char *request_real_time(void)
     bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 #ifdef EBPO_HAVE_SCHED_SETSCHEDULER
     struct sched_param parameters = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
-    /* a loading thread that exists already keeps its scheduling */
+    /* a loading thread that exists already is not affected */
     bool is_real_time = sched_setscheduler(0, SCHED_FIFO, &parameters) == 0;
 #else
     bool is_real_time = false;
@@ -240,8 +240,8 @@ static uint64_t haptic_play_steps(const haptic_play *p)
     return count ? count : (uint64_t)ceil(p->rate * p->seconds);
 }
 
-/* Plays all steps and sets *out to their times. Returns false if there is not enough memory for
- * this. */
+/* Plays all steps, and sets *out to the times of the steps. Returns false if there is not enough
+ * memory. */
 static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 {
     uint64_t count = haptic_play_steps(p);

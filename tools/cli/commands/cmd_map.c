@@ -94,7 +94,8 @@ static bool read_plane(const map_job *j, const char *text, int *axis, double *at
 }
 
 /* Finds the rectangle of --plane. Edge 0 points to the right in the picture, edge 1 up. For a plane
- * across an axis, these are the other two axes in the order x, y, z. Returns an exit code. */
+ * across an axis, edges 0 and 1 are along the other two axes, in the order x, y, z. Returns an exit
+ * code. */
 static int find_rectangle(const map_job *j, rectangle *r)
 {
     double all[9], low[3], high[3], at;
@@ -244,8 +245,8 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
     return status;
 }
 
-/* Returns true if the surface is at this pixel: its value is 0, or has another sign than the value
- * of the next pixel in x or y. */
+/* Returns true if the surface is at the pixel (x, y): the value of the pixel is 0, or differs in
+ * sign from the value of the next pixel in x or y. */
 static bool on_surface(const double *values, int width, int height, int x, int y)
 {
     double value = values[(size_t)y * (size_t)width + (size_t)x];
@@ -434,7 +435,7 @@ static double *points_of(const ebpo_mesh *m)
 
 static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, ebpo_error *error)
 {
-    if (j->range == 0) /* no --range: few distances are beyond this percentile */
+    if (j->range == 0) /* without --range: a percentile that few distances exceed */
         j->range = j->stats.percentile_unsigned[5];
     if (!(j->range > 0))
         j->range = j->stats.farthest > 0 ? j->stats.farthest : 1;

@@ -31,8 +31,8 @@ static bool paint_read_colour(const char *text, uint32_t *out)
 
 /* --- paths --- */
 
-/* Reads numbers separated by blanks or commas. Returns their count; -1: other text, or more than
- * `most` numbers. */
+/* Reads numbers separated by blanks or commas. Returns the count of the numbers; -1: other text, or
+ * more than `most` numbers. */
 static int read_numbers(const char *text, double *out, int most)
 {
     int count = 0;
@@ -147,8 +147,8 @@ static ebpo_paint_info info_of(const paint_job *j)
     return info;
 }
 
-/* Sets *layer to the layer of --layer, or to the topmost layer. EBPO_E_ARGUMENT: there is no such
- * layer. */
+/* Sets *layer to the layer of --layer, or to the topmost layer. EBPO_E_ARGUMENT: this layer does
+ * not exist. */
 static ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *error)
 {
     ebpo_paint_info info = info_of(j);

@@ -1,5 +1,5 @@
 /* ebpo recover: makes a new file from the readable parts of a damaged one. The tree is built again
- * from the mesh; the mesh is read from the file or from its source. */
+ * from a mesh, which is read from the file or from the source of the file. */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -224,7 +224,7 @@ typedef struct rebuilt_mesh {
     ebpo_mesh mesh;
     ebpo_mesh_report report;
     ebpo_repair_record record;
-    /* source index of each vertex or face of the mesh; NULL: equal to its index */
+    /* source index of each vertex or face of the mesh; NULL: equal to the index in the mesh */
     uint32_t *vertex_source, *face_source;
 } rebuilt_mesh;
 
@@ -375,7 +375,7 @@ static ebpo_status make_file(const recovery *p, rebuilt_mesh *r, ebpo_error *err
     return status;
 }
 
-/* Compares the new file with the damaged file, and corrects the states of its parts. */
+/* Compares the new file with the damaged file, and corrects p->part_state. */
 static ebpo_status compare_content(recovery *p, ebpo_error *error)
 {
     ebpo_file *made;

@@ -97,7 +97,7 @@ static bool add_levels(job *j, const char *text)
     return true;
 }
 
-/* Adds the tiles of --levels, in its order. Returns false for invalid text. */
+/* Adds the tiles of --levels, in the order of this list. Returns false for invalid text. */
 static bool parse_levels(job *j)
 {
     for (const char *at = j->v.levels;; at++) {

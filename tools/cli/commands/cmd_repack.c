@@ -1,4 +1,5 @@
-/* ebpo repack: writes the same content in the current layout, or in another one. */
+/* ebpo repack: writes the content of a file in the current layout, or with other options of
+ * storage. */
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -143,8 +144,8 @@ static int run_repack(void *given, const char **operand)
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
     code = status == EBPO_OK ? EXIT_OK : command_failed("repack", &error);
-    /* EBPO_E_UNSUPPORTED: the content would differ. But if the error names the output file, this
-     * build cannot write such a file at all. */
+    /* EBPO_E_UNSUPPORTED has two reasons. If the error names the output file, this build cannot
+     * write the file. Otherwise the content would differ. */
     bool differs = written == EBPO_E_UNSUPPORTED && strcmp(error.file, operand[1]) != 0;
     return differs ? EXIT_DIFFERS : code;
 }

@@ -381,10 +381,10 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Sets v->from and v->to. With --from, --to or --step: to the given times; a missing --from is the
- * first time of the scene, and a missing --to the last time. With --time: both to this time.
- * Without these options: to the first and the last time of the scene if `spans`, otherwise both to
- * the first time. Returns NULL, or a text that says what is wrong. */
+/* Sets v->from and v->to. With --from, --to or --step, sets the given times; a missing --from is
+ * the first time of the scene, and a missing --to the last time. With --time, sets both to this
+ * time. Without any of these options, sets the first and the last time of the scene if `spans`,
+ * otherwise sets both to the first time. Returns NULL, or a text that says what is wrong. */
 static const char *set_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;

@@ -1,8 +1,8 @@
 /* ebpo serve: serves models and the web viewer to browsers of this machine.
  *
  * All paths that can be requested are in a table, which is made at the start. A request selects an
- * entry of the table, and opens the entry's file only if it is still the same file, so no request
- * leads to another file. */
+ * entry of the table. The server opens the file of the entry only if the file is unchanged, so no
+ * request leads to another file. */
 #include "ebpo_config.h"
 
 #include <dirent.h>
@@ -154,8 +154,8 @@ static const char *type_of(const char *name)
     return NULL;
 }
 
-/* Finds the folder of the viewer: beside the program in the folder of a build, or where the viewer
- * is installed. */
+/* Finds the folder of the viewer. In a build folder it is beside the program; otherwise it is the
+ * folder of the installed viewer. */
 static void find_viewer(const site *s, char out[PATH_MAX])
 {
     char program[PATH_MAX];

@@ -17,7 +17,7 @@ static bool is_model_name(const char *name)
 }
 
 /* Adds a path to the list, which owns the path from now on. When out of memory, frees `path` and
- * returns false. `path` may be NULL (the caller could not allocate it); this also counts as out of
+ * returns false. `path` is NULL if the caller could not allocate it; this also counts as out of
  * memory. */
 static bool add_path(folder_files *f, char *path)
 {

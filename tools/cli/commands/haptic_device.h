@@ -18,7 +18,7 @@ typedef struct haptic_pose {
 typedef struct haptic_result {
     haptic_pose proxy; /* the pose of the tool on the surface, see ebpo_haptic_ball_result */
     double force[3], torque[3], normal[3];
-    double depth;  /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
+    double depth;  /* as in ebpo_haptic_ball_result; for a probe the distance, or NAN */
     double lo, hi; /* bounds of the distance */
     uint64_t face;
     uint32_t flags;
@@ -47,7 +47,7 @@ typedef struct haptic_device {
 bool haptic_path_open(haptic_device *out, const char *path);
 
 /* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT'.
- * haptic_udp_open opens a device with such a name. */
+ * haptic_udp_open opens the device `name`. */
 bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 

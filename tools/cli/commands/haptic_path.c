@@ -20,8 +20,8 @@ static const char *skip_blanks(const char *at)
     return at;
 }
 
-/* Reads the numbers of a line, up to '#'. Returns their count; -1: other text, or more than seven
- * numbers. */
+/* Reads the numbers of a line, up to '#'. Returns the count of the numbers; -1: other text, or more
+ * than seven numbers. */
 static int read_numbers(const char *line, size_t length, double out[7])
 {
     const char *at = skip_blanks(line), *end = line + length;

@@ -1,6 +1,6 @@
-/* Drives a haptic device that sends its positions in UDP packets, and receives feedback in such
- * packets. docs/guide/haptic.md describes their layout. The sender of the first valid packet is the
- * device; other packets are ignored. */
+/* Drives a haptic device that sends positions, and receives feedback, in UDP packets.
+ * docs/guide/haptic.md describes the layout of the packets. The sender of the first valid packet is
+ * the device; other packets are ignored. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -30,7 +30,7 @@ typedef struct udp {
     bool known;                /* a valid packet has arrived; `device` is its sender */
     bool ended;                /* the device has sent a packet END */
     struct sockaddr_in device; /* address of the device */
-    uint64_t sequence, tag;    /* of the last valid packet; feedback repeats both */
+    uint64_t sequence, tag;    /* from the last valid packet; each feedback repeats both numbers */
     uint64_t ignored;          /* number of invalid packets */
     haptic_pose pose;          /* the last position */
 } udp;

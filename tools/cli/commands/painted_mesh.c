@@ -20,7 +20,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* --- red faces: faces that intersect the other instance --- */
+/* --- red faces: faces of an instance that intersect another instance --- */
 
 static bool take_red(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {

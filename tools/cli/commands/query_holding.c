@@ -11,9 +11,9 @@
  */
 enum { SMALL_MODEL = 16 << 20 };
 
-/* LOADS_MIN: number of loads from which their mean time is reliable. SAFETY_FACTOR: the whole model
- * is loaded early only if the estimated number of loads exceeds the number of subtrees by this
- * factor. */
+/* LOADS_MIN: number of loads that gives a reliable mean time of a load. SAFETY_FACTOR: the whole
+ * model is loaded early only if the estimated number of loads is at least this factor times the
+ * number of subtrees. */
 enum { LOADS_MIN = 8, SAFETY_FACTOR = 4 };
 
 /* --- opening --- */

@@ -26,12 +26,12 @@ typedef struct query_holding {
     bool automatic;           /* no memory limit was given */
     atomic_bool may_load_all; /* the model is loaded in parts, and may be loaded as a whole later */
     bool loaded_all; /* the whole model was loaded after parts; the next 4 members say why */
-    uint64_t queries_before, loads_before; /* numbers of queries and of loaded subtrees before */
+    uint64_t queries_before, loads_before; /* numbers of queries and of subtree loads until then */
     double extra_seconds;    /* seconds for loading parts again, and for slower queries */
     double whole_seconds;    /* estimated time to load the whole model */
     double subtree_overhead; /* extra share of the time of a query in parts, compared with the whole
                               * model */
-    ebpo_model_plan plan;    /* for half of the free memory */
+    ebpo_model_plan plan;    /* plan for a budget of half of the free memory */
     uint64_t free_memory;    /* bytes, before the model was made */
     uint64_t subtrees;       /* number of subtrees; 0: the whole model was loaded at first */
     uint64_t queries;        /* number of queries so far; protected by counts_lock */
@@ -49,8 +49,8 @@ void query_holding_external(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 
 /* Call before a thread queries: sets *context, which is NULL at first, to a context of the current
- * model. total: number of queries; 0: not known. After success, call query_holding_leave with the
- * number of queries done and their time. */
+ * model. total: number of queries; 0: not known. After success, evaluate queries, and then call
+ * query_holding_leave with the number and the time of these queries. */
 EBPO_MUST_USE ebpo_status query_holding_enter(query_holding *h, ebpo_context **context,
                                               double total, ebpo_error *error);
 /* Does the same as query_holding_enter, but with exclusive access to the model, and never loads the

@@ -14,7 +14,8 @@
 enum { BLOCKS_EACH = 4, LARGE_EACH = 2 };
 /* Number of rows of the first piece of the first block, see compute_block. */
 enum { FIRST_ROWS = 16 };
-/* Bytes of results for each row that a large block keeps in memory before they are written. */
+/* A large block keeps up to this number of bytes of results for each row in memory. When it has
+ * more, it tries to write them. */
 enum { KEPT_BYTES = 128 };
 
 /* A block of queries, and its results. */
@@ -73,7 +74,7 @@ static void stop_pipe(pipe_line *p)
     pthread_cond_broadcast(&p->changed);
 }
 
-/* Returns true if all earlier blocks have been written. Waits until they are, unless the thread
+/* Returns true if all earlier blocks have been written. Waits until this is true, unless the thread
  * holds the lock of the model. */
 static bool has_turn(slot *s)
 {
@@ -88,9 +89,10 @@ static bool has_turn(slot *s)
     return turn;
 }
 
-/* Called when the results of a block have become long. Writes them if all earlier blocks have been
- * written. Otherwise marks the text as full: evaluation then stops after a row. It continues when
- * this thread has released the lock of the model, and all earlier blocks have been written. */
+/* Called when the results of a block have become long. Writes the results if all earlier blocks
+ * have been written. Otherwise marks the text as full: evaluation then stops after a row. It
+ * continues when this thread has released the lock of the model, and all earlier blocks have been
+ * written. */
 static void spill_results(result_text *t, void *user)
 {
     slot *s = user;
@@ -100,7 +102,8 @@ static void spill_results(result_text *t, void *user)
         t->full = !t->failed;
 }
 
-/* Reports the number of queries. If the size of the input is known, estimates their total. */
+/* Reports the number of queries so far, and the total number. If only the size of the input is
+ * known, estimates the total. */
 static void report_progress(pipe_line *p, const slot *s)
 {
     uint64_t total = p->in->rows_known ? p->in->rows_total : 0;
@@ -189,8 +192,8 @@ static void compute_from_row(pipe_line *p, query_worker *w, slot *s, const doubl
 }
 
 /* Evaluates and prints rows of a block. After the call, s->text.rows is the number of evaluated
- * rows, which may be less than `count`. If the rows need memory that other threads use, evaluates
- * them again while no other thread uses the model. Returns false if no further rows may be
+ * rows, which may be less than `count`. If memory is short because other threads use it, evaluates
+ * the rows again while no other thread uses the model. Returns false if no further rows may be
  * evaluated. */
 static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
                          double total)

@@ -35,8 +35,8 @@ static void report_stats(const query_job *job, const query_holding *holding)
 }
 
 /* Returns the given number of threads or, if none was given, the number of cores that this process
- * may use. Loading modes that keep no data use one thread: each thread would drop the data of the
- * others. */
+ * may use. Loading modes that keep no data use one thread, because each thread would drop the data
+ * of other threads. */
 static unsigned threads_for(const query_values *v, const ebpo_model_options *model_options)
 {
     unsigned count = v->threads ? (unsigned)v->threads : command_cores();

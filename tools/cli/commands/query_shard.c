@@ -189,9 +189,9 @@ static int inspect_inputs(const query_shard *s, const query_job *job, char **fac
 
 /* --- the note --- */
 
-/* Returns the text of the note: the facts, and the length and time of the file of results, so that
- * the note does not match results that another command wrote at the same time. NULL: there is not
- * enough memory. */
+/* Returns the text of the note: the facts, and the length and time of the file of results. With
+ * length and time, the note does not match results that another command has written. NULL: there is
+ * not enough memory. */
 static char *note_text(const char *facts, const struct stat *results)
 {
     char *text = NULL;

@@ -1,6 +1,6 @@
 /* Writes results to a file atomically, for all queries or for a shard (one of N parts of the input,
- * --shard). Beside the results of a shard, writes a file with facts of the inputs, called the note:
- * a later run that finds a note with the same facts has nothing to do. */
+ * --shard). Beside the results of a shard, writes a file with facts of the inputs, called the note.
+ * If a later run finds a note with equal facts, it has nothing to do. */
 #ifndef EBPO_TOOLS_QUERY_SHARD_H
 #define EBPO_TOOLS_QUERY_SHARD_H
 

@@ -22,7 +22,8 @@ static const char *name_of(const ebpo_scene *scene, uint64_t model)
     return m.name;
 }
 
-/* Returns true for the first of the models that use a file, so that its bytes are counted once. */
+/* Returns true if no earlier model uses the model's file. So the bytes of a file are counted once.
+ */
 static bool is_first(const ebpo_scene *scene, uint64_t model)
 {
     for (uint64_t i = 0; i < model; i++)
@@ -129,7 +130,7 @@ typedef struct pack {
     const ebpo_scene *scene;
     json j;                /* used with --json */
     uint64_t bytes;        /* sizes of all written files */
-    uint64_t source_bytes; /* sizes of their source files */
+    uint64_t source_bytes; /* sizes of the files from which they were made */
 } pack;
 
 static void packed_json(pack *p, const ebpo_scene_packed *m)

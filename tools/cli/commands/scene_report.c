@@ -90,9 +90,9 @@ static void scene_head_csv(const scene_values *v)
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
-/* Writes the text in quotes; doubles the quotes within. A spreadsheet reads a text that begins with
- * =, +, - or @ as a formula: writes a ' before such a text. Also writes a ' before a text that
- * begins with ', so that removing the first ' always restores the text. */
+/* Writes the text in quotes; doubles the quotes within. A spreadsheet would read a text that begins
+ * with =, +, - or @ as a formula, so the function writes a ' before such a text. It also writes a '
+ * before a text that begins with '. So removing a leading ' always restores the text. */
 static void csv_text(const char *text)
 {
     putchar('"');
@@ -190,7 +190,8 @@ typedef struct report {
     json j;
     const char *path;          /* of the scene */
     uint64_t frames, reported; /* number of frames in all, and reported so far */
-    /* The ending of v->out sets one of these three; the others are NULL or false. */
+    /* The ending of v->out decides which of the next three members is set; the other two are NULL
+     * or false. */
     ebpo_scene_report *record; /* .h5 */
     clash_strip *strip;        /* .png */
     bool page;                 /* .html */
@@ -321,7 +322,7 @@ static ebpo_status begin_report(report *r, ebpo_error *error)
     return out && !r->page ? ebpo_scene_report_new(r->scene, out, &r->record, error) : EBPO_OK;
 }
 
-/* Pictures are drawn for at most this number of clashes, the worst ones. */
+/* Pictures are drawn only for the worst clashes, at most this number. */
 enum { PICTURES_MAX = 60 };
 
 static ebpo_status write_page(report *r, ebpo_error *error)

@@ -37,7 +37,7 @@ static bool read_box(const char *text, ebpo_subset_options *o)
     return o->boxed = true;
 }
 
-/* Returns the part of this name; 0: there is no such part. */
+/* Returns the bit of the part that word[length] names; 0: no part has this name. */
 static uint32_t part_named(const char *word, size_t length)
 {
     static const struct {

@@ -23,7 +23,7 @@ typedef struct subset_values {
         .profile = -1, .codec = -1, .remote = REMOTE_VALUES_INIT \
     }
 
-extern const char *const profile_words[]; /* by ebpo_profile; NULL ends them */
+extern const char *const profile_words[]; /* by ebpo_profile; NULL-terminated */
 
 /* Reads --parts, a list of part names separated by commas. With a minus sign before each name,
  * *parts becomes `base` without the named parts; with a plus sign, `base` and the named parts;

@@ -19,8 +19,8 @@ typedef struct installation {
     char plugin[PATH_MAX];            /* folder of the HDF5 plugin; "": none */
 } installation;
 
-/* Sets `out` to the path of an installed file, or to "" if there is no such file. path: relative to
- * the program's folder, or absolute. */
+/* Sets `out` to the path of an installed file, or to "" if the file does not exist. path: relative
+ * to the program's folder, or absolute. */
 static void locate_file(const char *program, const char *path, const char *name, char out[PATH_MAX])
 {
     char joined[3 * PATH_MAX];

@@ -21,8 +21,8 @@ const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
 
-/* Functions of cairo. cairo is loaded when the first caption is drawn, because it needs fifteen
- * libraries, which otherwise every command would load at its start. */
+/* Functions of cairo. cairo needs fifteen libraries. It is loaded when the first caption is drawn,
+ * so that other commands do not load these libraries. */
 #define CAIRO_FUNCTIONS(X)      \
     X(image_surface_create)     \
     X(image_surface_get_data)   \
@@ -59,7 +59,7 @@ static void load_cairo(void)
 #define FIND(name)                                                         \
     *(void **)&lib.name = library ? dlsym(library, "cairo_" #name) : NULL; \
     if (library && !lib.name)                                              \
-        loaded = MISSING; /* a version without this function */
+        loaded = MISSING; /* this version of cairo lacks the function */
     CAIRO_FUNCTIONS(FIND)
 #undef FIND
 }

@@ -29,7 +29,7 @@ typedef struct raster {
     const raster_style *style;
     int width, height;           /* size of the picture in samples */
     int side;                    /* samples across a pixel */
-    double focal, inverse_focal; /* samples per unit of x / depth, and its reciprocal */
+    double focal, inverse_focal; /* samples per unit of x / depth; 1 / focal */
     sample *samples;
     float (*normal)[3]; /* normal of each triangle, in camera axes, towards the eye */
     /* positions for ambient occlusion: a spiral in the unit disk, and rotations of the spiral as

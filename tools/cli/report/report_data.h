@@ -158,7 +158,7 @@ typedef struct method {
     target_result targets[TARGETS];
     int target_count, note_count;
     ebpo_thesis_levels *unlimited;  /* results of --unlimited; NULL: not computed */
-    double unlimited_seconds;       /* time of this computation */
+    double unlimited_seconds;       /* seconds to compute `unlimited` */
     char note[METHOD_NOTES][320];   /* [note_count] */
     char *picture[EBPO_LEVELS_MAX]; /* picture of each level as a data URI; NULL: no picture */
 } method;

@@ -56,7 +56,7 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
     return EBPO_OK;
 }
 
-/* Requests ranges that will be read: all their blocks come with one round trip. */
+/* Requests all blocks of ranges that will be read. The blocks come with one round trip. */
 static void prefetch_ranges(void *user, const ebpo_range *ranges, size_t count)
 {
     for (size_t i = 0; i < count; i++)

@@ -121,8 +121,8 @@ static int parse_first_line(span line, http_request *out)
 }
 
 /* Returns true if the host is a name of this machine. Any port is accepted, because a tunnel may
- * change the port. A page of another site whose name leads to this machine sends the name of the
- * site, so its requests are refused. */
+ * change the port. Another site may have a name that leads to this machine. Requests from its pages
+ * contain this name, so they are refused. */
 static bool is_own_host(span host)
 {
     static const char *const names[] = { "127.0.0.1", "localhost", "[::1]" };
@@ -183,7 +183,7 @@ static int take_field(span name, span value, http_request *out, seen_fields *see
         if (!copy_span(value, out->range, sizeof out->range))
             out->range[0] = 0; /* a server may ignore ranges */
     }
-    /* If-Range: a value that is too long becomes one that equals no tag. */
+    /* If the value of If-Range is too long, it is replaced by "?", which equals no tag. */
     if (span_is_word(name, "If-Range") && !copy_span(value, out->if_range, sizeof out->if_range))
         strcpy(out->if_range, "?");
     if (span_is_word(name, "If-None-Match") &&
