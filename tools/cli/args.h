@@ -10,13 +10,13 @@
 #include <stdint.h>
 
 typedef enum arg_kind {
-    ARG_FLAG, /* bool; the option has no value */
-    ARG_INT,  /* int64_t in [low, high] */
-    ARG_REAL, /* double in [low, high] */
-    ARG_TEXT, /* const char *, not empty */
-    ARG_LIST, /* arg_list; the option may be repeated */
-    ARG_WORD, /* int: index into `words` */
-    ARG_SET,  /* uint32_t: bit i is set for words[i]; words separated by commas; may be repeated */
+    ARG_FLAG,   /* bool; the option has no value */
+    ARG_INT,    /* int64_t in [low, high] */
+    ARG_REAL,   /* double in [low, high] */
+    ARG_TEXT,   /* const char *, not empty */
+    ARG_LIST,   /* arg_list; the option may be repeated */
+    ARG_WORD,   /* int: index into `words` */
+    ARG_SET,    /* uint32_t: bit i means words[i]; a list with commas, which may be repeated */
     ARG_OPERAND /* the operand OUT, given as the option --output; `offset` is the operand's index */
 } arg_kind;
 

@@ -39,9 +39,9 @@ bool command_same_file(const char *a, const char *b);
  * The caller then exits with EXIT_USAGE. */
 bool command_overwrites(const char *name, const char *in, const char *out);
 
-/* Returns 1 if the file begins with the signature of HDF5, 0 if it begins with other bytes, -1 if
- * it cannot be read (reported on stderr). Returns 1 also for a URL and for a file that does not
- * exist: the caller then opens the file, and reports the error. */
+/* Returns 1 if the file begins with the signature of HDF5, and 0 if it begins with other bytes.
+ * Returns -1, after a report on stderr, if the file cannot be read. Returns 1 also for a URL and
+ * for a file that does not exist: the caller then opens the file, and reports the error. */
 int command_is_hdf5(const char *name, const char *path);
 
 /* Returns false, after an error message, if the file cannot be read or is not HDF5. The caller then

@@ -75,8 +75,8 @@ static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try
     return findings_volume(text, &solid, &t->report, "");
 }
 
-/* Writes text for the result of a repair: "a solid of volume V", or, if the volume is not known, "a
- * solid with integral of the winding number V". */
+/* Writes text for the result of a repair: "a solid of volume V". If the volume is not known, writes
+ * "a solid with integral of the winding number V". */
 static const char *solid_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
 {
     char volume[FINDINGS_VOLUME];

@@ -34,8 +34,8 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
 const char *findings_plural(const char *name);
 /* Prints the effects of the requested repairs. */
 void findings_print_repair(FILE *out, const ebpo_repair_record *record);
-/* Writes the area (power 2) or volume (3) x of a mesh with %.6g, or states that x is beyond the
- * range of doubles, which is possible although each coordinate is a double. report: gives the box
+/* Writes the area (power 2) or the volume (power 3) x of a mesh with %.6g. If x is beyond the range
+ * of doubles, says so; this is possible although each coordinate is a double. report: gives the box
  * of the mesh. */
 const char *findings_extent(char *text, size_t size, double x, int power,
                             const ebpo_mesh_report *report);

@@ -12,7 +12,7 @@ typedef struct repair_request {
     bool weld, drop_duplicates, orient, flip, fill_holes;
     bool repair; /* --repair: apply the shortest sequence of the repairs weld, drop_duplicates,
                   * orient and fill_holes that gives a plausible solid */
-    /* above 0: merge vertices within this distance before other repairs; 0: do not */
+    /* if above 0: merge vertices within this distance before other repairs */
     double weld_distance;
     /* set by commands, not by an option: if no repair is requested, try repairs on copies */
     bool advise;
@@ -63,7 +63,8 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
 
-/* Returns the bounds of the volume of the solid. `after`: true: after repairs; false: before. */
+/* Returns the bounds of the volume of the solid. If `after`, these are the bounds after repairs,
+ * otherwise before repairs. */
 ebpo_solid_volume mesh_input_solid(const mesh_input *input, bool after);
 
 /* Warns of file contents that were not read, and of ambiguous triangulations. */

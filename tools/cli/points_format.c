@@ -38,8 +38,8 @@ static bool read_ply(points *p, points_block *b)
 
 /* --- NumPy arrays --- */
 
-/* Returns the value after 'name': in the header, which is a Python dictionary; NULL: no such name.
- */
+/* Returns the value that follows 'name': in the header, which is a Python dictionary. Returns NULL
+ * if the name is missing. */
 static const char *find_npy_value(const char *head, const char *name)
 {
     const char *at = strstr(head, name);
@@ -248,8 +248,8 @@ static bool begins_as_ply(const points *p)
     return true;
 }
 
-/* Returns true, after an error message, if the input is a file of another format, such as a mesh or
- * an image, and not text. ebpo_points_parse_ply recognises such files; then error.offset is 0. */
+/* Returns true, after an error message, if the input has a known format without points, such as a
+ * mesh or an image. ebpo_points_parse_ply recognises such files; then error.offset is 0. */
 static bool is_foreign(points *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -302,8 +302,8 @@ static bool recognise_format(points *p, points_block *b)
     return p->raw || !is_foreign(p);
 }
 
-/* Decides from the first eight bytes of binary input, or from the first four bytes of text, so that
- * a short line of text from a terminal or a pipe is evaluated at once. */
+/* Decides from the first eight bytes of binary input, or from the first four bytes of text. So a
+ * short line of text from a terminal or a pipe is evaluated at once. */
 bool points_recognise(points *p, points_block *b)
 {
     for (;;) {

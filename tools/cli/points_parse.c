@@ -119,8 +119,8 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-/* Reports a wrong number of values. `at`: the text at which parsing stopped. `more`: true: the row
- * is complete, but more values follow. */
+/* Reports a wrong number of values. `at`: the text at which parsing stopped. If `more`, the row is
+ * complete, but more values follow. */
 static bool wrong_count(const points *p, points_block *b, const char *at, bool more)
 {
     static const char *const expected[] = {

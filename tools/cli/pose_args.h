@@ -8,10 +8,10 @@
 /* For help texts. */
 #define POSE_FORM "X Y Z [QX QY QZ QW [SCALE]]"
 
-/* Reads a pose. The text has the form POSE_FORM, with a quaternion of any length except 0; or it is
- * the twelve numbers of a matrix (rotation and translation) of three rows and four columns, row by
- * row, and optionally a scale. Blanks or commas separate the numbers. If the text omits the
- * rotation or the scale, this member of *out stays unchanged. Returns false for other text. */
+/* Reads a pose. The text has the form POSE_FORM, with a quaternion of any length except 0. It may
+ * also be a matrix (rotation and translation) of three rows and four columns, row by row, and
+ * optionally a scale. Blanks or commas separate the numbers. If the text omits the rotation or the
+ * scale, this member of *out stays unchanged. Returns false for other text. */
 bool pose_read(const char *text, ebpo_pose *out);
 
 #endif

@@ -42,7 +42,7 @@ static uint64_t stack_bytes(int64_t threads)
 }
 
 /* Sets the limit, which never exceeds the limit inherited from the parent process. If `bytes` is 0,
- * only the inherited limit remains. `given`: true: the limit comes from --memory. */
+ * only the inherited limit remains. `given` is true if the limit comes from --memory. */
 static void set_limit(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;

@@ -46,8 +46,8 @@ typedef struct traffic {
 } traffic;
 traffic traffic_of(const ebpo_file *file);
 
-/* Print the traffic if --stats was given. remote_report prints it on stderr, as a line or as JSON;
- * remote_json writes it as the member "traffic" of a JSON object. */
+/* Print the traffic if --stats was given. remote_report prints a line or JSON on stderr.
+ * remote_json writes the member "traffic" of a JSON object. */
 void remote_report(const traffic *t, const remote_values *values, bool as_json);
 void remote_json(json *j, const traffic *t, const remote_values *values);
 

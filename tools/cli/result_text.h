@@ -1,7 +1,7 @@
 /* Buffers results as bytes until they are written to standard output.
  *
  * A *row* is all output for one input row; it has one or more *results*, such as the faces of a
- * list. A *piece* is a sequence of results that is written to a pipe at once; it has at most
+ * list. A *piece* is a sequence of results that is written to a pipe at once. It has at most
  * RESULT_PIECE bytes, unless a single result is longer. If a row becomes too long for the buffer,
  * the buffer *spills*: the owner decides whether to write or to drop the text (`spill`). */
 #ifndef EBPO_TOOLS_RESULT_TEXT_H

@@ -75,9 +75,9 @@ void raw_double(FILE *out, double v)
 
 /* --- attributes: written after the face index --- */
 
-/* Writes the attributes of a face at a point. `face` may be EBPO_NO_FACE; then the values are
- * written as missing. ebpo_sample should not fail, because the sampler was made for the file of the
- * queries; if it fails, the values are also written as missing. */
+/* Writes the attributes of a face at a point. If `face` is EBPO_NO_FACE, the values are written as
+ * missing. ebpo_sample should not fail, because the sampler was made for the file of the queries.
+ * If it fails, the values are also written as missing. */
 static char *put_attributes(char *at, result_form form, const ebpo_sampler *sampler,
                             const double point[3], uint64_t face)
 {

@@ -19,7 +19,7 @@ void results_inside(result_text *t, result_form form, const ebpo_inside_result *
  * NULL: none. `model`: [count] index of the model in the catalogue for each result, UINT64_MAX for
  * no model; NULL: there is no catalogue. */
 
-/* Writes distances. `intervals`: true: writes only lo and hi. */
+/* Writes distances. If `intervals`, writes only lo and hi. */
 void results_distance(result_text *t, result_form form, bool intervals,
                       const ebpo_distance_result *results, uint64_t count,
                       const ebpo_sampler *sampler, const uint64_t *model);

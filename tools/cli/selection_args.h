@@ -17,9 +17,9 @@ typedef struct selection_options {
  * code; errors have been reported on stderr. */
 int selection_check(const char *name, const selection_options *o);
 
-/* Sets *out to the number of planes at the root, 1 to 1e9. `text`: the checked value of --k-root: a
- * number such as "500", or a share of the faces such as "1%", which gives at least 1 plane. If
- * `text` is NULL, *out is 0. EBPO_E_ARGUMENT: the share is more than 1e9 planes. */
+/* Sets *out to the number of planes at the root, 1 to 1e9. `text` is the checked value of --k-root.
+ * It is a number such as "500", or a share of the faces such as "1%", which gives at least 1 plane.
+ * If `text` is NULL, *out is 0. EBPO_E_ARGUMENT: the share is more than 1e9 planes. */
 EBPO_MUST_USE ebpo_status selection_k_root(const char *text, uint64_t faces, double *out,
                                            ebpo_error *error);
 

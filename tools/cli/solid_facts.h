@@ -20,8 +20,8 @@ ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells);
 /* Returns the bounds of the volume of the solid. If the bounds from the header are not equal,
  * returns the bounds in `mass`, the measurements of the mesh. */
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass);
-/* Returns the word for the base of percentages: "solid"; "box" (the root box) for a surface;
- * "integral" (of the winding number) if the volume of the solid is not known. */
+/* Returns the word for the base of percentages: "box" (the root box) for a surface, "solid" for a
+ * solid, or "integral" (of the winding number) for a solid whose volume is not known. */
 const char *facts_whole(const ebpo_info *info, const ebpo_solid_volume *solid);
 /* Prints the line of a table's legend that explains the base of the percentages. */
 void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume *solid);

@@ -19,8 +19,8 @@ static int saved_stdout = -1; /* copy of standard output while it is redirected 
 
 /* Occupies those of the descriptors 0 to 2 that are closed. A file that is opened gets the lowest
  * free descriptor. So if descriptor 1 were free, a file could get it, and text for standard output
- * would go into this file. Descriptor 0 gets a file that cannot be read, 1 and 2 get files that
- * cannot be written, so that using the descriptors fails as for a closed stream (EBADF). */
+ * would go into this file. Descriptor 0 gets a file that cannot be read; descriptors 1 and 2 get
+ * files that cannot be written. So the use of a descriptor fails as for a closed stream (EBADF). */
 bool standard_files_occupy(void)
 {
     for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {

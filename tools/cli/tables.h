@@ -27,8 +27,8 @@ void table_beyond(FILE *out);
  * range of a double, such as 4.2e+901, has at most 9 digits. */
 const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exponent);
 
-/* Writes x * 2^exponent as a JSON number, or, beyond the range of a double, as the string of
- * table_scaled. */
+/* Writes x * 2^exponent as a JSON number. Beyond the range of a double, writes the text of
+ * table_scaled as a string. */
 void table_json(json *j, const char *key, double x, int64_t exponent);
 
 /* Returns true if x * 2^exponent is in the range of normal doubles, or 0. */

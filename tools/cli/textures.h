@@ -19,7 +19,7 @@ typedef struct textures {
     bool embedded;                    /* true: the file has the bytes of images */
 } textures;
 
-/* Reads the arrays. `bytes`: true: also reads the bytes of the images. After a failure, there is
+/* Reads the arrays. If `bytes`, also reads the bytes of the images. After a failure, there is
  * nothing to free. */
 EBPO_MUST_USE ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes,
                                         ebpo_error *error);

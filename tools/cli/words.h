@@ -14,7 +14,7 @@ void words_init(void);
 char *words_count(char *out, size_t capacity, double v);
 /* Writes 999 B, 12.3 kB, 4.56 MB: powers of 1000. */
 char *words_bytes(char *out, size_t capacity, uint64_t bytes);
-/* Writes the fewest digits that read as the same double, as number_write does. */
+/* Writes the fewest digits from which the double can be restored, as number_write does. */
 char *words_real(double x, char out[32]);
 /* Prints `count` numbers on standard output, with the text `between` between them. */
 void words_print_reals(const double *v, int count, const char *between);

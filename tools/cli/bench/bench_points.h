@@ -20,8 +20,8 @@ typedef struct bench_points {
  *          "camera", "segments" or "degenerate" (rays: bench_rays.h), or the name of a file
  *   count  number of generated rows (0: 100,000), or maximum number of rows of the file (0: all)
  *   raw    the file contains doubles, not text
- *   tmax   greatest parameter t of rays of a file whose rows do not state it; for generated rays
- *          an upper bound */
+ *   tmax   default of a ray's greatest parameter t if a row of the file does not state it; upper
+ *          bound of this parameter for generated rays */
 int bench_points_make(bench_points *out, points_kind kind, const char *model,
                       const remote_values *remote, const char *what, bool raw, uint64_t count,
                       uint64_t seed, double tmax);

@@ -4,7 +4,7 @@
 
 #include <ebpo/mesh.h>
 
-/* bench_random returns the next random number of splitmix64 (Steele, Lea, Flood, 2014);
+/* bench_random returns the next random number of splitmix64 (Steele, Lea, Flood, 2014).
  * bench_random_unit returns the next random number as a double in [0, 1), with 53 random bits. */
 uint64_t bench_random(uint64_t *state);
 double bench_random_unit(uint64_t *state);

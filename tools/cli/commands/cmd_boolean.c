@@ -1,4 +1,5 @@
-/* ebpo boolean: unions, intersections and differences of models at poses: queries, and meshes. */
+/* ebpo boolean: queries unions, intersections and differences of models at poses, and writes their
+ * meshes. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -456,7 +457,7 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
 }
 
 /* If the exact result is written with --memory, makes the workspace, and sets the limit of each
- * model: all models together may use a quarter of the memory. */
+ * model. All models together may use a quarter of the memory. */
 static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
                         ebpo_workspace **out)
 {

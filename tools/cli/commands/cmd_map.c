@@ -245,8 +245,8 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
     return status;
 }
 
-/* Returns true if the surface is at the pixel (x, y): the value of the pixel is 0, or differs in
- * sign from the value of the next pixel in x or y. */
+/* Returns true if the surface is at the pixel (x, y). The value of this pixel is then 0, or differs
+ * in sign from the value of the next pixel in x or y. */
 static bool on_surface(const double *values, int width, int height, int x, int y)
 {
     double value = values[(size_t)y * (size_t)width + (size_t)x];

@@ -245,8 +245,8 @@ static uint32_t *sorted_indices(const uint32_t *map, uint64_t count)
     return out;
 }
 
-/* Sets the source indices if vertices were welded or faces dropped when the file was made: source
- * indices then have gaps, which the mesh alone does not show. */
+/* Sets the source indices if vertices were welded or faces dropped when the file was made. Then
+ * source indices have gaps, and do not follow from the mesh alone. */
 static ebpo_status set_source_indices(const recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
     const ebpo_repair_record *m = &p->info->repair_record;

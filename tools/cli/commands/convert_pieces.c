@@ -36,7 +36,7 @@ static bool is_safe(char c)
 }
 
 /* Writes "KIND-NUMBER-NAME", with letters, digits, '-' and '_' only. The number has `digits` digits
- * and makes the name unique. own_name: the NAME; NULL: none. */
+ * and makes the name unique. own_name: the source of NAME; NULL: the name has no NAME. */
 static void piece_file_name(char out[NAME_SIZE], const char *kind, int digits, uint64_t number,
                             const char *own_name)
 {

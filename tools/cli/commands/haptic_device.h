@@ -42,8 +42,8 @@ typedef struct haptic_device {
     void *self; /* the first argument of these functions */
 } haptic_device;
 
-/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
- * false after an error, reported on stderr. Call `end` in any case. */
+/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'. The path '-' means standard
+ * input. Returns false after an error, reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
 /* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT'.

@@ -1,6 +1,6 @@
-/* Simulates a haptic device: moves around the longest axis of the model in 8 seconds, slowly up and
- * down along the axis, and meanwhile into the surface and out of it. Rays find the surface in
- * advance. */
+/* Simulates a haptic device. The device moves around the longest axis of the model in 8 seconds. At
+ * the same time it moves slowly up and down along the axis, and into the surface and out of it.
+ * Rays find the surface in advance. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -21,9 +21,9 @@ typedef struct builtin_path {
     double hit[HEIGHTS][ANGLES];
 } builtin_path;
 
-/* Computes the point at an angle around the middle axis of the box, a height from -0.5 to 0.5 along
- * the axis, and a distance `radius` from the axis; height and radius are shares of the box's sides.
- */
+/* Computes a point from cylindrical coordinates: the angle around the middle axis of the box, the
+ * height along this axis (-0.5 to 0.5), and the distance `radius` from the axis. Height and radius
+ * are shares of the sides of the box. */
 static void box_point(const builtin_path *p, double angle, double height, double radius,
                       double out[3])
 {

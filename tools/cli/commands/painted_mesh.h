@@ -18,8 +18,8 @@ void painted_free(painted_mesh *p);
 EBPO_MUST_USE ebpo_status painted_find_red(ebpo_scene *scene, uint64_t a, uint64_t b, double time,
                                            unsigned threads, uint8_t *red[2], ebpo_error *error);
 
-/* Adds the faces of the instance's model. red: an array of painted_find_red, or NULL. paint: for
- * faces that are not red. */
+/* Adds the faces of the instance's model. red: an array of painted_find_red, or NULL. paint: the
+ * paint of faces that are not red. */
 EBPO_MUST_USE ebpo_status painted_add(painted_mesh *p, const ebpo_scene *scene, uint64_t instance,
                                       double time, const uint8_t *red, uint8_t paint,
                                       ebpo_error *error);

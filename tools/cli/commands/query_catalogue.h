@@ -20,8 +20,8 @@ ebpo_catalogue_query_options query_catalogue_options(const query_job *job);
 void query_catalogue_report(const query_job *job);
 
 /* Writes the facts of the catalogue on which results depend, as members of the note of a shard (see
- * query_shard.h): the size and hash of the catalogue file, and the sizes and times of files that
- * have the source indices of models ("numbers"). Returns an exit code. */
+ * query_shard.h). These are the size and hash of the catalogue file, and the sizes and times of the
+ * files of source indices that the catalogue names ("numbers"). Returns an exit code. */
 int query_catalogue_facts(json *j, const char *command, const char *path);
 
 #endif

@@ -145,9 +145,9 @@ void query_holding_drop_context(query_holding *h, ebpo_context **context)
 /* Returns true if the whole model should be loaded now. Loading the whole model costs as much as
  * loading each subtree once. Loading parts costs more, because subtrees are loaded again, and
  * because queries that change between subtrees are slower. The function returns true when this
- * extra cost reaches the cost of loading the whole model; then the total cost is at most about
- * twice the least possible cost. The function returns true earlier if the remaining queries will
- * clearly need all subtrees. total: number of queries; 0: not known. */
+ * extra cost reaches the cost of loading the whole model. So the total cost is at most about twice
+ * the least possible cost. The function returns true earlier if the remaining queries will clearly
+ * need all subtrees. `total` is the number of queries, or 0 if it is not known. */
 static bool loading_pays(query_holding *h, double total)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;

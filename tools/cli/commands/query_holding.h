@@ -1,6 +1,6 @@
 /* Opens the model of a query command for all threads. Without --memory and similar options, the
- * command begins with the upper levels and the subtrees that queries need, and loads the whole
- * model when loading parts has cost as much as loading the whole model would. */
+ * command first loads the upper levels and the subtrees that queries need. It loads the whole model
+ * when the extra cost of loading parts reaches the cost of loading the whole model. */
 #ifndef EBPO_TOOLS_QUERY_HOLDING_H
 #define EBPO_TOOLS_QUERY_HOLDING_H
 
@@ -48,9 +48,10 @@ int query_holding_open(query_holding *h, const char *command, const char *path,
 void query_holding_external(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 
-/* Call before a thread queries: sets *context, which is NULL at first, to a context of the current
- * model. total: number of queries; 0: not known. After success, evaluate queries, and then call
- * query_holding_leave with the number and the time of these queries. */
+/* A thread calls this function before it queries. Sets *context, which is NULL at first, to a
+ * context of the current model. `total` is the number of queries, or 0 if it is not known. After
+ * success, evaluate queries, and then call query_holding_leave with the number and the time of
+ * these queries. */
 EBPO_MUST_USE ebpo_status query_holding_enter(query_holding *h, ebpo_context **context,
                                               double total, ebpo_error *error);
 /* Does the same as query_holding_enter, but with exclusive access to the model, and never loads the

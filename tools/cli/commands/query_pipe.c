@@ -220,9 +220,9 @@ static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *r
 }
 
 /* Evaluates all rows of a block. The first block is evaluated in pieces, because the whole model
- * may be loaded before each piece: the first piece is small, and each other piece is as large as
- * all pieces before it. If a piece fails, its rows are evaluated one by one, so that the results
- * before the failing row are printed. */
+ * may be loaded before each piece. The first piece is small; each other piece is as large as all
+ * pieces before it. If a piece fails, its rows are evaluated one by one, so that the results before
+ * the failing row are printed. */
 static void compute_block(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;

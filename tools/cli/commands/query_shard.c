@@ -329,7 +329,7 @@ static int write_note(const query_shard *s, const struct stat *results)
 
 /* Gives the file of results its final name. Removes the old note before and writes the new note
  * afterwards. So a note is never beside results of other inputs, even if the process is killed.
- * results: the open file of the results, because another command may replace the file at the path.
+ * results: descriptor of the written file; at the path, another command may replace the file.
  * Returns an exit code. */
 static int put_in_place(query_shard *s, int results)
 {

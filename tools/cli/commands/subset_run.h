@@ -25,9 +25,9 @@ typedef struct subset_values {
 
 extern const char *const profile_words[]; /* by ebpo_profile; NULL-terminated */
 
-/* Reads --parts, a list of part names separated by commas. With a minus sign before each name,
- * *parts becomes `base` without the named parts; with a plus sign, `base` and the named parts;
- * without signs, the named parts. Returns false if the list is invalid. */
+/* Reads --parts, a list of part names separated by commas. Without signs, *parts becomes the named
+ * parts. With a minus sign before each name, it becomes `base` without the named parts; with a plus
+ * sign, `base` and the named parts. Returns false if the list is invalid. */
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 #define SUBSET_PARTS_EXPECTED                                                                     \
     "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, border, surface, " \
@@ -38,8 +38,8 @@ bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 int subset_read_target(const char *name, double max_error, const char *target_size,
                        ebpo_subset_options *out);
 
-/* Continues the line of a summary with ", ...": the profile, if the command chose the parts
- * (`chosen`), and the maximum error, if the file is pruned. */
+/* Continues the line of a summary with ", ...". Prints the profile if `chosen` (the command chose
+ * the parts), and the maximum error if the file is pruned. */
 void subset_print_target(const ebpo_info *info, bool chosen);
 
 /* Checks options before the file is open, and sets the members of *out that do not depend on the

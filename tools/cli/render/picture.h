@@ -21,8 +21,9 @@ EBPO_MUST_USE ebpo_status picture_caption(picture *p, int x, int y, int width, i
                                           const uint8_t colour[3], const char *text,
                                           ebpo_error *error);
 
-/* Encodes pixels as a PNG in memory, which the caller frees. channels: 3 (RGB) or 4 (RGB and
- * opacity), of 8 bits; rows from the top. what: name for messages. */
+/* Encodes pixels as a PNG in memory, which the caller frees. pixels: [height][width][channels],
+ * rows from the top. channels: 3 (RGB) or 4 (RGB and opacity), 8 bits each. what: name for
+ * messages. */
 EBPO_MUST_USE ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height,
                                              int channels, const char *what, void **bytes,
                                              size_t *size, ebpo_error *error);

@@ -213,8 +213,8 @@ static void sample_position(const raster *r, int x, int y, double inverse, doubl
     out[2] = r->view->distance - depth;
 }
 
-/* Returns the hidden share of the sky near a sample, 0 .. 1. It is estimated from points on a
- * spiral around the sample that are above the plane of the sample. max_distance: radius of the
+/* Returns the hidden share of the sky near a sample, 0 .. 1. The estimate uses samples on a spiral
+ * around this sample, if they are above the plane of this sample. max_distance: radius of the
  * spiral, in the unit of the model. */
 static double sky_hidden(const raster *r, int x, int y, const sample *at, const float n[3],
                          double max_distance)

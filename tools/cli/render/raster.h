@@ -19,9 +19,9 @@ typedef struct camera {
 void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
                 int width, int height);
 
-/* Values of raster_style.paint: the colour of a face, and the bit RASTER_HOLLOW: the face is drawn
- * only if its back is visible. RASTER_PLAIN: raster_style.colour. RASTER_OTHER: blue, for a second
- * model. */
+/* Values of raster_style.paint: the colour of a face, and the bit RASTER_HOLLOW. A face with this
+ * bit is drawn only if its back is visible. RASTER_PLAIN: raster_style.colour. RASTER_OTHER: blue,
+ * for a second model. */
 enum { RASTER_PLAIN = 0, RASTER_OTHER = 1, RASTER_RED = 2, RASTER_HOLLOW = 4 };
 
 typedef struct raster_style {

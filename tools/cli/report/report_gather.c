@@ -1,5 +1,5 @@
-/* Gathers the results of one method that are not times: values of the header, volumes, hulls, error
- * bounds, targets and budgets, and the costs in the cost model of the theses. */
+/* Gathers the results of one method that are not times. These are values of the header, volumes,
+ * hulls, error bounds, targets, budgets, and the costs in the cost model of the theses. */
 #include <stdio.h>
 #include <string.h>
 

@@ -114,8 +114,8 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->progress = c->progress;
 }
 
-/* Computes the levels of --unlimited, to which the limits of the file format do not apply, such as
- * that on the number of planes of a node. Empties the mesh. */
+/* Computes the levels of --unlimited. For these levels, limits of the file format, such as the
+ * limit on the number of planes of a node, do not apply. Empties the mesh. */
 static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
                                      const ebpo_build_options *build, build_result *out,
                                      ebpo_error *error)

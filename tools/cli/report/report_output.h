@@ -14,9 +14,9 @@ enum {
 };
 
 /* Makes the temporary folder. Returns an exit code; errors have been reported on stderr.
- * EXIT_FAILED: `place` exists and is not a report, or the folder cannot be made; EXIT_USAGE: one of
- * the operands (NULL-terminated) is in the report that would be replaced. A folder is a report if
- * all of its files have names of a report and it has report.json. */
+ * EXIT_FAILED: `place` exists and is not a report, or the folder cannot be made. EXIT_USAGE: an
+ * operand is in the report that would be replaced. `operand`: NULL-terminated. A folder is a report
+ * if all of its files have names of a report and it has report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
 /* Sets `path` to the path of the model file STEM.ebpo.h5 in the temporary folder. A signal removes
  * this file. Must be called before the file is made. */

@@ -249,8 +249,8 @@ int http_request_range(const http_request *request, uint64_t size, const char *t
     uint64_t last = UINT64_MAX;
     *first = 0;
     *count = size;
-    /* As RFC 9110 says, a range is ignored if its unit is unknown, if its form is wrong, if it has
-     * several parts, or if it is meant for another version of the content. */
+    /* RFC 9110 permits that a server ignores a range. This server ignores it if the unit is
+     * unknown, the form is wrong, there are several ranges, or If-Range names another version. */
     if (strncasecmp(at, "bytes=", 6) != 0 ||
         (request->if_range[0] && strcmp(request->if_range, tag) != 0))
         return HTTP_OK;
