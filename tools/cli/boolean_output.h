@@ -1,4 +1,4 @@
-/* Writes meshes of Boolean results: the exact result, or its cells. */
+/* Writes meshes of Boolean results: the exact result, or octree cells that enclose the result. */
 #ifndef EBPO_TOOLS_BOOLEAN_OUTPUT_H
 #define EBPO_TOOLS_BOOLEAN_OUTPUT_H
 
@@ -21,8 +21,8 @@ typedef struct boolean_output {
     uint64_t vertices, faces; /* numbers of vertices and faces that were written */
     ebpo_boolean_mesh_report report;
     uint64_t temporary;      /* greatest size of the temporary files, in bytes */
-    uint64_t crossing_pairs; /* if `crossings`: number of pairs of faces that intersect, because
-                              * the vertices were rounded */
+    uint64_t crossing_pairs; /* if `crossings`: number of pairs of intersecting faces; rounded
+                              * vertices cause such pairs */
 } boolean_output;
 
 /* Writes a mesh to o->path: OUT.ply or OUT.ebpo.h5. */

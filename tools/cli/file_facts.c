@@ -85,7 +85,8 @@ static void print_model(FILE *out, const ebpo_info *info)
         char text[FINDINGS_VOLUME], extent[40];
         ebpo_solid_volume solid = facts_solid(info, NULL);
         findings_extent(extent, sizeof extent, solid.integral, 3, &info->report);
-        /* true: the text contains the volume as one number; false: as an interval, or not at all */
+        /* true: the text contains the volume as one number; false: it contains an interval or no
+         * volume */
         bool printed =
             findings_volume_known(&solid) && (isnormal(solid.integral) || extent[0] == '0');
         fprintf(out, "\n  solid     %s%s, by winding number, rule %s",

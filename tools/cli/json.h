@@ -19,8 +19,8 @@ typedef struct json {
 
 /* Begins JSON text. */
 void json_begin(json *j, FILE *out);
-/* json_object and json_array begin an object or an array. In all functions, `key` is the key of a
- * member; it is NULL inside arrays and for the outermost value. An outermost object on standard
+/* json_object and json_array begin an object or an array. In all functions, `key` is the key of the
+ * new member; it is NULL inside arrays and for the outermost value. An outermost object on standard
  * output or error gets the first member "ebpo", the version of the library. */
 void json_object(json *j, const char *key);
 void json_array(json *j, const char *key);

@@ -1,3 +1,5 @@
+/* Prints doubts (reasons why a mesh may not bound the intended solid), and the repairs that were
+ * tried on copies of the mesh. */
 #include "cli/mesh_advice.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* Prints the findings of a mesh report: edges, vertices and faces that are possible defects. */
 #include "cli/mesh_findings.h"
 
 #include <float.h>

@@ -1,3 +1,5 @@
+/* Reads the mesh of a command, and makes the requested repairs. Without such a request, may try
+ * repairs on copies of the mesh, to advise the user. */
 #include "cli/mesh_input.h"
 
 #include <math.h>

@@ -10,8 +10,8 @@ typedef struct npy_results {
     const char *command; /* name of the command, for messages */
     const char *dtype;   /* type of a result, as NumPy writes it in a header */
     unsigned bytes;      /* bytes of a result */
-    /* offset of the header in standard output, for npy_end, which rewrites the header; -1: the
-     * number of results was known at the beginning */
+    /* offset of the header in standard output, where npy_end rewrites it; -1: npy_end does nothing,
+     * because the number of results was known at the beginning */
     off_t begin;
 } npy_results;
 

@@ -1,3 +1,5 @@
+/* Reads the input into blocks of rows. Bytes that were read, but belong to a later block, are in
+ * p->unread. */
 #include "cli/points.h"
 
 #include <errno.h>

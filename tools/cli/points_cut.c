@@ -1,3 +1,4 @@
+/* Selects part `number` of `part_count` parts of the input, by a range of bytes or rows. */
 #include "cli/points_cut.h"
 
 #include <errno.h>

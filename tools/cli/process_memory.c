@@ -1,3 +1,4 @@
+/* Limits the memory of the process by RLIMIT_DATA, which counts private writable memory. */
 #include "cli/process_memory.h"
 
 #include <ebpo/memory.h>

@@ -1,3 +1,5 @@
+/* Buffers the results of queries. A row is the output for one input row; a piece is a part of the
+ * output that is written to a pipe at once. */
 #include "cli/result_text.h"
 
 #include <stdlib.h>

@@ -1,3 +1,5 @@
+/* Checks the options for selections, the methods that choose planes of envelopes. A trait is a
+ * property of a selection. */
 #include "cli/selection_args.h"
 
 #include <inttypes.h>

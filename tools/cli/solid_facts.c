@@ -1,3 +1,5 @@
+/* Computes volumes in percent of a base: the volume of the solid or, if this is not known, the
+ * integral of the winding number or the volume of the root box. */
 #include "cli/solid_facts.h"
 
 #include <math.h>

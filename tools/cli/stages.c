@@ -1,3 +1,5 @@
+/* Prints the times of the stages of a build. A row is a stage as users see it; it sums several
+ * stages of the library. */
 #include "cli/stages.h"
 
 #include <string.h>

@@ -1,3 +1,5 @@
+/* Replaces the operand "-" by a temporary file, which is copied from standard input or to standard
+ * output. */
 #include "cli/standard_files.h"
 
 #include <errno.h>

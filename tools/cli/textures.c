@@ -1,3 +1,4 @@
+/* Reads and writes the images of textures. Row i of each array about images is for image i. */
 #include "cli/textures.h"
 
 #include <errno.h>

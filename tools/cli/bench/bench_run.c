@@ -1,3 +1,4 @@
+/* Measures queries: each query separately, and all queries in a batch. */
 #include "cli/bench/bench_run.h"
 
 #include <errno.h>

@@ -1,3 +1,5 @@
+/* Simulates a walk along the surface of a mesh, for points of a continuous path. The walk has a
+ * position in a face, and a direction in the plane of this face. */
 #include "cli/bench/bench_walk.h"
 
 #include <math.h>

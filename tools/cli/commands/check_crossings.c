@@ -1,3 +1,4 @@
+/* Prints the pairs of intersecting faces that `ebpo check --crossings` finds. */
 #include "cli/commands/check_crossings.h"
 
 #include <stdio.h>

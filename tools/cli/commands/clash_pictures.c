@@ -1,3 +1,5 @@
+/* Draws pictures of clashes, the contacts of two instances in a scene. A strip is a picture with a
+ * tile for each of several times. */
 #include "ebpo_config.h"
 
 #include "cli/commands/clash_pictures.h"

@@ -1,3 +1,5 @@
+/* Finds models below a folder. `folder`: where the search starts. `below`: path of a subfolder,
+ * relative to `folder`. */
 #include "cli/commands/folder_files.h"
 
 #include <dirent.h>

@@ -1,3 +1,5 @@
+/* Builds a mesh from instances of a scene. The paint of a face is a byte that selects its colour.
+ */
 #include "cli/commands/painted_mesh.h"
 
 #include <math.h>

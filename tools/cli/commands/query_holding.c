@@ -1,3 +1,6 @@
+/* Holds the model of a query command for all threads. The model is loaded as a whole, or in parts:
+ * its upper levels, and below them single subtrees when queries need them. Each thread queries the
+ * model through a separate context. */
 #include "cli/commands/query_holding.h"
 
 #include <ebpo/memory.h>
@@ -180,8 +183,8 @@ static ebpo_status load_all(query_holding *h, ebpo_error *error)
     h->session.model = NULL;
     ebpo_status status = ebpo_model_new(h->session.file, &all, &h->session.model, error);
     h->loaded_all = status == EBPO_OK;
-    if (status == EBPO_E_LIMIT ||
-        status == EBPO_E_MEMORY) /* the model needs more memory than its counts suggest */
+    /* the model needs more memory than its counts suggest, and is loaded in parts again */
+    if (status == EBPO_E_LIMIT || status == EBPO_E_MEMORY)
         status = ebpo_model_new(h->session.file, &h->options, &h->session.model, error);
     return status;
 }

@@ -1,3 +1,5 @@
+/* Threads take blocks of consecutive input rows, evaluate them, and write the results in the order
+ * of the input. A slot holds a block in progress, and its results. */
 #include "cli/commands/query_pipe.h"
 
 #include <fcntl.h>

@@ -1,3 +1,5 @@
+/* Runs a query command: opens the model or catalogue, reads rows (points, rays or boxes), and
+ * writes the results of each row. */
 #include "cli/commands/query_run.h"
 
 #include <stdio.h>

@@ -1,3 +1,5 @@
+/* Writes the results of a shard, one of N parts of the input (--shard I/N). The note is a file
+ * beside the results. It contains facts of the inputs: model, points and options. */
 #include "cli/commands/query_shard.h"
 
 #include <errno.h>

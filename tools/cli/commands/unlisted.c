@@ -1,3 +1,4 @@
+/* Reads a file as if it were one byte longer, so that the library ignores the lists of chunks. */
 #include "cli/commands/unlisted.h"
 
 #include <errno.h>

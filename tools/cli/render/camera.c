@@ -1,3 +1,4 @@
+/* Sets the camera of raster.h so that it shows a mesh completely. */
 #include <math.h>
 #include <string.h>
 

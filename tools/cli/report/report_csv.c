@@ -4,7 +4,7 @@
 #include "cli/report/report_data.h"
 
 /* Prints a line. Names have no commas. If `v` is NAN (not available), the field of the value is
- * empty. `level`: -1: the value does not belong to a level. */
+ * empty. If `level` is -1, the value does not belong to a level. */
 static void print_metric(FILE *out, const char *name, int level, const char *parameter,
                          const metric_name *q, double v)
 {

@@ -1,3 +1,5 @@
+/* Writes a report to a temporary folder, which then replaces `place`, the folder of the report. A
+ * report is recognized by the names of its files. */
 #include "cli/report/report_output.h"
 
 #include <dirent.h>

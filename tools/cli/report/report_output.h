@@ -18,8 +18,8 @@ enum {
  * operand is in the report that would be replaced. `operand`: NULL-terminated. A folder is a report
  * if all of its files have names of a report and it has report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
-/* Sets `path` to the path of the model file STEM.ebpo.h5 in the temporary folder. A signal removes
- * this file. Must be called before the file is made. */
+/* Sets `path` to the path of the model file STEM.ebpo.h5 in the temporary folder. A signal handler
+ * then removes this file. Call before the file is made. */
 void output_add_model(const char *folder, const char *stem, char *path, size_t capacity);
 /* Renames the folder to `place`, and replaces an existing report. Returns false after a failure,
  * which has been reported on stderr. */

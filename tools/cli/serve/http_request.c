@@ -1,3 +1,4 @@
+/* Parses the head of a request: the first line and the fields, up to an empty line. */
 #include "cli/serve/http_request.h"
 
 #include <string.h>
