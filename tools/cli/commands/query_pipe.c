@@ -25,10 +25,10 @@ typedef struct slot {
     struct pipe_line *pipe;
     points_block block;
     result_text text;   /* the results */
-    uint64_t number;    /* of the block, from 0 */
+    uint64_t number;    /* number of the block, from 0 */
     bool holds_model;   /* the thread of the block holds the lock of the model */
     bool done;          /* the block is evaluated, and not yet written */
-    ebpo_status status; /* of the evaluation */
+    ebpo_status status; /* status of the evaluation */
     ebpo_error error;
 } slot;
 
@@ -46,21 +46,21 @@ typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
     points *in;
-    int wake_pipe; /* writing a byte here ends the wait of the reading thread; -1: unsupported */
+    int wake_pipe; /* writing a byte here ends the wait of the reading thread; -1: no pipe */
     progress_line *progress;
     unsigned threads;         /* maximum number of threads */
     uint64_t slots;           /* maximum number of blocks in progress */
     slot *slot;               /* [slots] block i is in slot i % slots */
     pipe_thread *pipe_thread; /* [threads] the first `started` threads have started */
     atomic_uint started;      /* changed by the thread that is taking a block */
-    pthread_mutex_t lock;     /* protects all members below */
-    pthread_cond_t changed;   /* signals that one of the members below has changed */
+    pthread_mutex_t lock;     /* protects the members from here to `stopped` */
+    pthread_cond_t changed;   /* signals that one of these members has changed */
     bool taking;              /* a thread is taking a block; only one at a time */
     uint64_t taken;           /* number of blocks that were taken */
     uint64_t written;         /* number of blocks whose results have been written */
     bool writing;             /* a thread is writing block `written`; only one at a time */
     bool stopped;             /* an error has occurred; no more blocks are taken or written */
-    /* only the thread that writes blocks uses these */
+    /* only the thread that writes blocks uses the next members */
     uint64_t rows_written;  /* number of rows in written blocks */
     uint64_t bytes_written; /* bytes of input of these blocks */
     int code;               /* exit code */
