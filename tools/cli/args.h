@@ -4,7 +4,7 @@
 #ifndef EBPO_TOOLS_ARGS_H
 #define EBPO_TOOLS_ARGS_H
 
-#include <float.h> /* for the tables */
+#include <float.h> /* the generated tables use DBL_MAX */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>

@@ -33,7 +33,7 @@ const char *clash_kind_word(int32_t kind)
  * severity. */
 static int rank_of(const ebpo_scene_clash *m)
 {
-    static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* by ebpo_clash_kind */
+    static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* the index is an ebpo_clash_kind */
     return ranks[m->kind];
 }
 

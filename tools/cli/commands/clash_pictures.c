@@ -22,7 +22,7 @@ enum {
     UP = 2,       /* the z axis points up */
     THREADS_MAX = 64
 };
-static const double azimuth = 35, elevation = 28; /* of the camera, in degrees */
+static const double azimuth = 35, elevation = 28; /* direction of the camera, in degrees */
 
 const char *clash_pictures_missing(void) { return NULL; }
 

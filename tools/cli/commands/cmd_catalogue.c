@@ -31,7 +31,7 @@ static const values standard = { .out = NULL };
 /* A file below the folder. */
 typedef struct entry {
     bool listed;                   /* the catalogue lists the file */
-    char *reason;                  /* if not `listed`: why */
+    char *reason;                  /* if not `listed`: the reason, for messages */
     char *path;                    /* path to write to the catalogue */
     char *shown_path;              /* relative to the folder, for messages */
     ebpo_catalogue_entry reported; /* if `listed`: facts from the file's header */

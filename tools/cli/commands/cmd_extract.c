@@ -19,7 +19,7 @@
 typedef struct extracted {
     ebpo_mesh mesh;
     ebpo_subtree *mesh_owner; /* owner of the arrays of `mesh`; NULL: `mesh` is the owner */
-    double volume;            /* of the envelopes, with --level */
+    double volume;            /* with --level: volume of the envelopes */
 } extracted;
 
 typedef struct values {

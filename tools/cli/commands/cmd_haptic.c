@@ -99,9 +99,9 @@ static void sort_times(float *times, uint64_t count)
 
 /* Times of each step, in seconds, as in haptic_times. */
 typedef struct step_times {
-    float *duration; /* from the start to the end */
-    float *wake;     /* from the due time to the start */
-    float *cpu;      /* processor time from the start to the end */
+    float *duration; /* times from the start to the end of each step */
+    float *wake;     /* times from the due time to the start of each step */
+    float *cpu;      /* processor times from the start to the end of each step */
 } step_times;
 
 /* Sets the histogram and the quantiles; sorts the times of `s`. */
@@ -262,7 +262,7 @@ static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 /* --- the command --- */
 
 typedef struct values {
-    /* as text; NULL: not given */
+    /* texts of the options; NULL: not given */
     const char *path, *device, *record, *tool, *memory;
     double rate, seconds, radius, friction, stiffness, damping, skin, search_radius;
     int64_t faces;

@@ -50,8 +50,8 @@ typedef struct tile {
     uint64_t face_count; /* number of drawn faces; also valid when the mesh has been freed */
     ebpo_mesh mesh;
     ebpo_colours colours;  /* colours of the model, if it has colours */
-    float *normals;        /* of the triangles of a level, for lighting; or NULL */
-    float *vertex_normals; /* of the vertices of a simplified surface; or NULL */
+    float *normals;        /* normals of the triangles of a level, for lighting; or NULL */
+    float *vertex_normals; /* normals of the vertices of a simplified surface; or NULL */
     bool closed;           /* only front sides of faces are visible */
     char caption[64];
 } tile;

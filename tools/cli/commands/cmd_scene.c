@@ -17,8 +17,8 @@
 
 /* Totals of a scene. */
 typedef struct scene_sums {
-    uint64_t bytes, faces; /* of all model files; a file that several models use counts once */
-    uint64_t posed_faces;  /* of all instances */
+    uint64_t bytes, faces; /* sums over model files; a file of several models counts once */
+    uint64_t posed_faces;  /* sum of the faces of all instances */
 } scene_sums;
 
 static scene_sums sum_models(const ebpo_scene *scene, uint64_t models)

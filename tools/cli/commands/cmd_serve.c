@@ -48,7 +48,7 @@ typedef struct served {
 } served;
 
 typedef struct model {
-    char *path;            /* of the file */
+    char *path;            /* path of the file */
     char *name;            /* last part of the path */
     char *address;         /* path in requests, after "/models/"; encoded */
     char tag[64];          /* version of the file, as in http_content */
@@ -66,7 +66,7 @@ typedef struct site {
     model **model;
     size_t models, model_capacity;
     char *start; /* address of the first page, from "/" on */
-    char *list;  /* of models, for the viewer */
+    char *list;  /* list of models as JSON, for the viewer */
     size_t list_bytes;
 } site;
 

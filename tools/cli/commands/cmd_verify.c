@@ -22,7 +22,7 @@ typedef struct values {
 
 /* Kinds of checks. */
 static const struct kind {
-    size_t offset; /* of the kind's ebpo_verify_count in ebpo_verify_report */
+    size_t offset; /* offset of the kind's ebpo_verify_count in ebpo_verify_report */
     const char *name;
     const char *meaning; /* what is true without violations */
 } kinds[] = {

@@ -16,7 +16,7 @@
 #include "cli/commands/haptic_device.h"
 
 enum {
-    VERSION = 1,  /* of the layout of packets */
+    VERSION = 1,  /* version of the layout of packets */
     POSITION = 1, /* kinds of packets */
     FEEDBACK = 2,
     END = 3,

@@ -126,7 +126,7 @@ int query_catalogue_facts(json *j, const char *command, const char *path)
     snprintf(hash, sizeof hash, "%016" PRIx64, facts.file_hash);
     json_object(j, "catalogue");
     json_uint(j, "bytes", facts.file_bytes);
-    json_text(j, "fnv1a", hash); /* of the catalogue file, which contains all digests */
+    json_text(j, "fnv1a", hash); /* hash of the catalogue file, which contains all digests */
     json_array(j, "numbers");
     for (uint64_t i = 0; i < facts.count; i++) {
         const char *numbers = ebpo_catalogue_get_entry(c, i)->numbers;

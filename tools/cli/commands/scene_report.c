@@ -188,14 +188,14 @@ typedef struct report {
     uint64_t capacity;      /* capacity of frame.found_clashes */
     bool prints;            /* print rows on standard output */
     json j;
-    const char *path;          /* of the scene */
+    const char *path;          /* path of the scene */
     uint64_t frames, reported; /* number of frames in all, and reported so far */
     /* The ending of v->out decides which of the next three members is set; the other two are NULL
      * or false. */
     ebpo_scene_report *record; /* .h5 */
     clash_strip *strip;        /* .png */
     bool page;                 /* .html */
-    clash_list clashes;        /* for the page */
+    clash_list clashes;        /* all clashes, for the page */
 } report;
 
 /* --- a frame --- */

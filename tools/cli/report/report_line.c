@@ -19,7 +19,8 @@ typedef struct simulated_line {
     uint64_t size;  /* bytes of the file */
     uint64_t bytes; /* number of bytes sent so far */
     uint64_t trips; /* number of completed round trips */
-    /* for each block: number (from 1) of the round trip that brings the block; 0: not requested */
+    /* [number of blocks] number of the round trip that brings the block, from 1; 0: not requested
+     */
     uint32_t *arrival_trip;
 } simulated_line;
 
