@@ -24,9 +24,9 @@
 
 typedef enum part_state {
     NONE,    /* the file has no such part */
-    KEPT,    /* can be read, and is in the new file */
-    REBUILT, /* cannot be read, and is made again from the mesh or its source */
-    LOST     /* cannot be read, and is not in the new file */
+    KEPT,    /* the part can be read, and is in the new file */
+    REBUILT, /* the part cannot be read, and is made again from the mesh or the source */
+    LOST     /* the part cannot be read, and is not in the new file */
 } part_state;
 
 typedef enum file_part { MESH, MAPS, ATTRIBUTES, LEVELS, CHECKSUMS, FILE_PARTS } file_part;
@@ -61,8 +61,8 @@ static bool is_damage(ebpo_status status)
            status == EBPO_E_ABSENT;
 }
 
-/* Records the result of reading a part, with the error in `reported`. Fails with this error if the
- * cause is not damage of the file. */
+/* Records the result of reading a part. `reported`: the error. If the file is not the cause, fails
+ * with this error. */
 static ebpo_status record_result(recovery *p, file_part which, ebpo_status status,
                                  const ebpo_error *reported, ebpo_error *error)
 {

@@ -6,7 +6,8 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* State while the needs of models are printed. */
+/* State while needs are printed. The need of a model is the data that queries on the scene can use.
+ */
 typedef struct plan {
     const scene_values *v;
     const ebpo_scene *scene;
