@@ -201,11 +201,13 @@ static ebpo_stored_sizes reader_sizes(const ebpo_file *file)
 
 ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
 {
-    ebpo_stored_sizes sizes = reader_sizes(file);
-    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
-                      sizes.subtree_bytes + sizes.attribute_bytes + sizes.checksum_bytes;
+    uint64_t stored = 0;
     for (int level = 0; level < file->info.level_count; level++)
-        stored += sizes.level_bytes[level];
+        stored += level_bytes(file, level, true);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        stored += file->root_array[id].stored_bytes;
+    for (int i = 0; i < file->attributes.arrays; i++)
+        stored += file->attributes.array[i].stored_bytes;
     if (stored > file->end)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, file->in.shown,

@@ -78,7 +78,7 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo
 /* --- stored sizes --- */
 
 /* Returns EBPO_E_FORMAT if the arrays whose chunks are located take more bytes than the file has.
- * Does not count the border and the simplified surface. */
+ */
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* Returns EBPO_E_LIMIT if the decoded size of all arrays exceeds both `most` times the file size

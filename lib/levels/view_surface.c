@@ -32,7 +32,6 @@ typedef struct choosing {
     /* [replaced_count] patches that are replaced by faces, greatest error first */
     uint64_t *replaced;
     uint64_t chosen_count, replaced_count;
-    double pixels; /* greatest error of a visible patch that is drawn */
 } choosing;
 
 static ebpo_octcode octcode_of(const choosing *c, uint64_t patch)

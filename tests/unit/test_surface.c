@@ -12,6 +12,7 @@
 
 #include "check_main.h"
 #include "construct/simplify.h"
+#include "format/chunk_directory.h"
 #include "format/surface_patches.h"
 #include "geometry/distance.h"
 #include "scratch.h"
@@ -200,6 +201,9 @@ START_TEST(test_files_and_threads)
     uint64_t first = a->patch[EBPO_PATCH_VERTICES];
     ck_assert_mem_eq(part.point, a->point + 3 * first, part.vertex_count * 6);
     ebpo_surface_free(&part);
+    ck_assert(ebpo_stored_check(file, &error) == EBPO_OK);
+    file->root_array[EBPO_A_SURFACE_POINTS].stored_bytes = file->end;
+    ck_assert(ebpo_stored_check(file, &error) == EBPO_E_FORMAT);
     ebpo_close(file);
     ebpo_tree_free(&one);
     ebpo_tree_free(&three);
