@@ -327,7 +327,7 @@ async function pageLate(browser, address) {
     return setTimeout(() => response.end(html.subarray(html.indexOf('<body>'))), 3000);
   });
   await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  for (const query of ['file=models/small.ebpo.h5', 'model=models/small.ebpo.h5&model=models/red.ebpo.h5']) {
+  for (const query of ['file=models/plates.ebpo.h5', 'model=models/plates.ebpo.h5&model=models/red.ebpo.h5']) {
     const page = await show(browser, `http://localhost:${server.address().port}/?${query}`);
     assert.equal((await settled(page)).error, undefined);
     await page.close();
@@ -340,7 +340,7 @@ async function pageLate(browser, address) {
 async function codeFails(browser, address) {
   const page = await browser.newPage({ viewport: SIZE }), failed = new Promise((done) => page.on('pageerror', done));
   await page.route('**/app.js', (route) => route.abort());
-  await page.goto(`${address}?file=models/small.ebpo.h5`, { waitUntil: 'commit' });
+  await page.goto(`${address}?file=models/plates.ebpo.h5`, { waitUntil: 'commit' });
   await failed;
   assert.match(await page.textContent('#openingText'), /The page's code could not be run/);
   assert.ok(await page.isVisible('#openingText'));
