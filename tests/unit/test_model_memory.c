@@ -130,10 +130,17 @@ START_TEST(test_model_memory_estimate_is_close)
 }
 END_TEST
 
+/* With EBPO_TEST_SCALE below 1, each solid has every second variant. */
+static bool wants_variant(int solid, int variant)
+{
+    return ebpo_test_scale() >= 1 || (solid + variant) % 2 == 0;
+}
+
 START_TEST(test_model_memory_stays_below_estimate)
 {
     for (int v = 0; v < query_variant_count; v++)
-        check_model(query_solid_name(_i), query_solid_make(_i), &query_variants[v], 1e9);
+        if (wants_variant(_i, v))
+            check_model(query_solid_name(_i), query_solid_make(_i), &query_variants[v], 1e9);
 }
 END_TEST
 
@@ -247,6 +254,8 @@ START_TEST(test_subtree_memory_stays_below_quota)
 {
     for (int v = 0; v < query_variant_count; v++) {
         query_model m;
+        if (!wants_variant(_i, v))
+            continue;
         query_model_make(&m, query_solid_name(_i), query_solid_make(_i), &query_variants[v]);
         for (int cut_level = 1; cut_level < 4 && cut_level < m.info.level_count; cut_level++)
             ebpo_top_free(check_subtrees(&m, cut_level).top);
