@@ -1,6 +1,7 @@
-/* Reads the index of a part's face in the whole model. The file is a .npy file of integers with one
- * dimension (NumPy's format, versions 1 to 3). Any thread may read single indices when they are
- * needed.
+/* Reads face indices. A catalogue can cut a model into several files (parts). A face of a part has
+ * an index in this part and an index in the whole model. A .npy file lists, for each face of a
+ * part, its index in the whole model. The list consists of integers and has one dimension (NumPy's
+ * format, versions 1 to 3). Any thread may read single indices when they are needed.
  *
  * The file is untrusted input, as is the catalogue that refers to it. Its header is read once, when
  * the file is opened. The header states the type, the byte order and the number of indices; the

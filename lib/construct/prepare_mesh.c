@@ -132,9 +132,9 @@ typedef struct trying {
 
 /* --- doubts about a result --- */
 
-/* Returns true if, before holes were filled, more than half of the edges were boundary edges. The
- * counts before are computed from those after: filling a loop of n boundary edges adds n - 2 faces
- * and n - 3 edges. */
+/* Returns true if more than half of the edges were boundary edges before holes were filled.
+ * `report` is about the filled mesh. The counts for the unfilled mesh follow from it, because
+ * filling a loop of n boundary edges adds n - 2 faces and n - 3 edges. */
 static bool mostly_open(const ebpo_mesh_report *report, const ebpo_repair_record *record)
 {
     uint64_t boundary = record->added_faces + 2 * record->filled_holes;
@@ -153,8 +153,8 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
         doubts |= EBPO_DOUBT_UNWELDED;
     if (mostly_open(report, record))
         doubts |= EBPO_DOUBT_MOSTLY_OPEN;
-    /* the area of the filled holes is at least the area of the given surface, except for rounding
-     * errors */
+    /* tests if the area of the filled holes is at least the area of the given surface, except for
+     * rounding errors */
     if (area > 0 && report->area - area >= area * 0.999999)
         doubts |= EBPO_DOUBT_MOSTLY_FILLED;
     return doubts;

@@ -1,9 +1,9 @@
 /* Fills in errors, and reads and writes versioned structs, for all public functions. An error has a
- * status and a message that names file and object; callers pass on the first cause. Versioned
- * structs begin with their size (ebpo/base.h), so the caller may have been compiled with an older
- * or newer version of the header. The library reads from options, and writes to results, only as
- * many bytes as the caller's struct has. Members of options that this version does not know must be
- * 0. */
+ * status and a message that names file and object. A function whose callee fails returns the
+ * callee's error, so the error describes the first cause. Versioned structs begin with their size
+ * (ebpo/base.h), so the caller may have been compiled with an older or newer version of the header.
+ * The library reads from options, and writes to results, only as many bytes as the caller's struct
+ * has. Members of options that this version does not know must be 0. */
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>

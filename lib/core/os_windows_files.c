@@ -3,7 +3,7 @@
  * Every file is opened so that other programs may read, write, rename and remove it at any time, as
  * on POSIX. A removed file loses its name at once if the file system supports this (NTFS), and
  * otherwise when the file is closed. A path gets the prefix "\\?\", which permits paths of 32,767
- * characters. A descriptor of a folder stands for the folder's current path. */
+ * characters. Functions that get a descriptor of a folder use the folder's current path. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
@@ -146,8 +146,8 @@ static WCHAR *wide_path(const char *path)
     return out;
 }
 
-/* Converts a path with the prefix to a path without the prefix and with '/'. Returns NULL when out
- * of memory. The caller frees the result. Changes `wide`. */
+/* Removes the prefix of a path, if there is one, and replaces each backslash by '/'. Returns NULL
+ * when out of memory. The caller frees the result. Changes `wide`. */
 static char *plain_path(WCHAR *wide)
 {
     bool is_network = wcsncmp(wide, L"\\\\?\\UNC\\", 8) == 0;
@@ -223,8 +223,8 @@ static bool names_link(const WCHAR *path)
     return yes;
 }
 
-/* Converts the flags of open to the value with which CreateFile creates or truncates the file, or
- * does neither. */
+/* Converts the flags of open to the argument of CreateFile that decides whether to create, truncate
+ * or only open the file. */
 static DWORD way_of(int flags)
 {
     if (flags & O_CREAT)
@@ -698,8 +698,8 @@ int fsync(int fd)
 
 int fcntl(int fd, int what, ...)
 {
-    /* The argument of F_DUPFD_CLOEXEC, the least new descriptor (3), is ignored, because the
-     * descriptors 0 to 2 are in use anyway. */
+    /* F_DUPFD_CLOEXEC has an argument: the new descriptor must not be less than it. All callers
+     * give 3. The argument is ignored, because the descriptors 0 to 2 are always in use. */
     if (what == F_DUPFD_CLOEXEC) {
         int copy = _dup(fd);
         return copy;

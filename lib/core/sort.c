@@ -1,9 +1,9 @@
-/* Sorts records that may take more than memory, in three passes. The first pass makes the records.
- * The second pass distributes the records to groups by the leading bits of their keys. The third
- * pass sorts each group in memory, by the digits of the keys; the caller's comparison orders
- * records with equal keys. A pass reads and writes an array either from begin to end, or at one
- * position for each group. So a workspace can keep the arrays in files. The result depends neither
- * on the number of threads nor on memory. */
+/* Sorts records in three passes. The records may be larger than the memory. The first pass makes
+ * the records. The second pass distributes the records to groups by the leading bits of their keys.
+ * The third pass sorts each group in memory, by the digits of the keys; the caller's comparison
+ * orders records with equal keys. A pass reads and writes an array either from begin to end, or in
+ * each group from the group's begin to its end. With such sequential access, a workspace can keep
+ * the arrays in files. The result depends neither on the number of threads nor on memory. */
 #include "core/sort.h"
 
 #include <stdlib.h>
@@ -16,8 +16,8 @@
 enum {
     GROUP = 1 << 16, /* least number of records in a group; this number fits in a core's cache */
     LARGE_GROUP = 4 * GROUP, /* groups with more records are sorted in arrays of the workspace */
-    /* about the maximum number of groups; limited, because the second pass writes to all groups at
-     * the same time */
+    /* approximate maximum number of groups; limited, because the second pass writes to all groups
+     * at the same time */
     GROUPS_MAX = 1024,
     GRAIN = 1 << 14,     /* number of records that a thread takes at a time */
     DIGIT = 256,         /* number of values of a digit of a key */
@@ -91,10 +91,10 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    /* For each group, cursor is first the number of the group's records in [begin, end). Then it is
-     * the index in `grouped` of the first of these records, and after the copying, the index after
-     * the last of these records. There can be slightly more than GROUPS_MAX groups, because
-     * form_groups rounds the size of groups down. */
+    /* cursor[g] belongs to group g and has two meanings. The first loop counts the group's records
+     * in [begin, end). The second loop replaces the counts by positions: cursor[g] becomes the
+     * index in `grouped` for the group's next record. There can be slightly more than GROUPS_MAX
+     * groups, because form_groups rounds the size of groups down. */
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);

@@ -1,11 +1,12 @@
 /* Manages workspaces, the owners of large arrays. A large array is an extent (a range of whole
- * pages). A new extent is in memory if all extents in memory then take at most half of the budget;
- * otherwise it is in an unnamed temporary file. Arrays smaller than LEAST_EXTENT share an extent (a
- * pool), and arrays smaller than a page come from malloc. Each extent counts as a holder of its
- * workspace, so the workspace and its extents may be freed in any order. Pages of a file count
- * towards the budget only while they are in memory (resident). Loops release these pages between
- * pieces of work (ebpo_release_pages); the written data stay in the file. Any thread may allocate
- * and free. docs/develop/building.md describes how a build keeps to a budget. */
+ * pages). A new extent is in memory if the extents in memory, including the new extent, take at
+ * most half of the budget. Otherwise the new extent is in an unnamed temporary file. Arrays smaller
+ * than LEAST_EXTENT share an extent (a pool), and arrays smaller than a page come from malloc. Each
+ * extent counts as a holder of its workspace, so the workspace and its extents may be freed in any
+ * order. Pages of a file count towards the budget only while they are in memory (resident). Loops
+ * release these pages between pieces of work (ebpo_release_pages); the written data stay in the
+ * file. Any thread may allocate and free. docs/develop/building.md describes how a build keeps to a
+ * budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -493,15 +494,16 @@ typedef struct residency {
 static residency read_residency(const ebpo_workspace *w)
 {
     char text[128], *at = text;
-    uint64_t pages[3]; /* number of pages: of the process, resident, resident pages of files */
+    uint64_t pages[3]; /* numbers of pages: all pages of the process; resident pages; resident pages
+                          of files */
     ssize_t size = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
     text[size > 0 ? size : 0] = 0;
     for (int i = 0; i < 3; i++) {
         char *end;
         pages[i] = strtoull(at, &end, 10);
         if (end == at)
-            return (residency){ UINT64_MAX,
-                                UINT64_MAX }; /* not known; so large that pages are released */
+            /* not known; with so large values, the caller releases pages */
+            return (residency){ UINT64_MAX, UINT64_MAX };
         at = end;
     }
     return (residency){ pages[1] * w->page, pages[2] * w->page };

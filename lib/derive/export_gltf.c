@@ -34,7 +34,7 @@ enum {
 
 /* A block (a level or the mesh, export_job.h) with its coordinates. */
 typedef struct gltf_block {
-    ebpo_block block;      /* block.mesh has no positions, which are in xyz */
+    ebpo_block block;      /* xyz has the positions of vertices; block.mesh has none */
     float *xyz;            /* [vertex_count][3] positions minus the origin */
     float low[3], high[3]; /* least and greatest coordinates of xyz */
 } gltf_block;
@@ -178,7 +178,8 @@ static void print_nodes(FILE *f, const model *m)
     fprintf(f,
             "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":["
             "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}");
-    /* Blocks with colours get a material without a base colour, which would change the colours. */
+    /* Blocks with colours get a material without a base colour, because a base colour would change
+     * these colours. */
     if (first_view(m, m->count) > VIEW_COLOURS * m->count)
         fprintf(f, ",\n{\"name\":\"coloured\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,"
                    "\"roughnessFactor\":0.8}}");

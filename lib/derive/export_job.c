@@ -23,8 +23,9 @@ const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
     { "octcode", EBPO_H5_I64 },     /* locational code of the node; 0 for the mesh */
     { "level", EBPO_H5_I32 },       /* level of the node in the octree; -1 for the mesh */
     { "type", EBPO_H5_I32 },        /* type of the node (ebpo_node_type); -1 for the mesh */
-    { "winding", EBPO_H5_I32 },     /* winding number in a black node's cell, or at a leaf's lowest
-                                       corner; else 0 */
+    { "winding", EBPO_H5_I32 },     /* black nodes: winding number in the cell; leaves: winding
+                                       number at the lowest corner of the cell; all other nodes, and
+                                       the mesh: 0 */
     { "volume", EBPO_H5_F64 },      /* volume of the envelope; 0 for the mesh */
     { "source_face", EBPO_H5_I64 }, /* -1 in a level; in the mesh, the source index of the face, or
                                        -1 if the file has no maps */
@@ -121,7 +122,7 @@ static void report_block(const ebpo_block *block, ebpo_export_report *report)
 
 /* --- columns --- */
 
-/* Stores an integer as value i of an array of this type. */
+/* Stores an integer as values[i]; `number` is the type of the array. */
 static void set_integer(void *values, ebpo_h5_number number, uint64_t i, int64_t v)
 {
     if (number == EBPO_H5_I64)

@@ -56,7 +56,7 @@ ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_val
     return EBPO_OK;
 }
 
-/* A position in valid JSON, and the number of lines before it. */
+/* A position in valid JSON, and the number of its line; the first line has number 1. */
 typedef struct cursor {
     const char *at;
     uint64_t line;
@@ -130,8 +130,9 @@ static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
     return false;
 }
 
-/* Returns the line, from 1, on which the value with a path of `count` steps begins in valid JSON.
- * If the value does not exist, returns the line of the last existing value on its path. */
+/* Returns the number of the line on which a value of valid JSON begins; the first line has number
+ * 1. path[count] are the keys and indices that lead from the outermost value to this value. If the
+ * value does not exist, returns the line of the last existing value on its path. */
 static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count)
 {
     cursor c = { text, 1 };

@@ -64,10 +64,11 @@ typedef struct ebpo_model_options {
     size_t struct_size;
 
     /*
-     * Maximum memory of the model in bytes, including its caches and buffers for loading. 0: 256
-     * MiB for a remote file (http.h) larger than 2 MiB if `cut_level` is -1; no limit in all other
-     * cases. A remote file larger than 2 MiB that has a table of subtrees (ebpo_info.subtree_level)
-     * is loaded subtree by subtree for any budget.
+     * Maximum memory of the model in bytes, including its caches and buffers for loading. If
+     * `memory` is 0, a local file has no limit. A remote file (http.h) has a limit of 256 MiB if
+     * `cut_level` is -1, and otherwise no limit. A remote file larger than 2 MiB is loaded subtree
+     * by subtree if `memory` is 0. If such a file has a table of subtrees
+     * (ebpo_info.subtree_level), it is loaded subtree by subtree for any value of `memory`.
      *
      * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
      * per loading thread) and contexts. A context contains results; for distances, it also contains
@@ -78,8 +79,8 @@ typedef struct ebpo_model_options {
     /*
      * Levels 0 to cut_level stay in memory. The subtrees below this level are loaded on demand. A
      * subtree is a node with all nodes and faces below this node. -1: the level is chosen so that
-     * the budget is met. If everything fits, everything is loaded at once, except for a remote file
-     * that has a table of subtrees and is larger than 2 MiB.
+     * the budget is met. If everything fits, everything is loaded at once. `memory` describes
+     * exceptions for remote files.
      */
     int cut_level;
 
@@ -101,9 +102,9 @@ typedef struct ebpo_model_options {
     ebpo_progress progress;
 
     /*
-     * Shared budget; `memory` is then ignored. NULL: no shared budget. Requires EBPO_LOAD_CACHE.
-     * The new model is loaded entirely if it takes, together with all models of the budget that are
-     * entirely in memory, at most half of the budget. Otherwise the new model is loaded subtree by
+     * Shared budget, which replaces `memory`. NULL: no shared budget. Requires EBPO_LOAD_CACHE.
+     * Models that are entirely in memory take at most half of the shared budget. If the new model
+     * fits in the free part of this half, it is loaded entirely. Otherwise it is loaded subtree by
      * subtree.
      */
     ebpo_budget *budget;
@@ -175,7 +176,8 @@ typedef struct ebpo_model_plan {
      * Parts of the budget in bytes. Subtrees use the remaining part.
      * - top: for levels 0 to cut_level.
      * - chunks: for decoded chunks.
-     * - skeletons: for data that is kept of subtrees after they leave memory.
+     * - skeletons: for skeletons. A skeleton is a small part of a subtree's data. It stays in
+     *   memory after the subtree has been removed.
      */
     uint64_t top, chunks, skeletons;
 
@@ -435,8 +437,8 @@ typedef struct ebpo_inside_result {
 
     /*
      * Winding number; for a surface, 1 inside and 0 outside. For EBPO_ON and EBPO_MAYBE, it is 0.
-     * With a level or deadline, it is also 0 if an envelope decided that the point is outside. For
-     * rules other than EBPO_RULE_NONZERO, the true winding number may then differ from 0.
+     * In a query with a level or deadline, it is also 0 if the point is outside an envelope. In
+     * this case the true winding number may differ from 0 if the rule is not EBPO_RULE_NONZERO.
      */
     int32_t winding;
 
@@ -591,8 +593,8 @@ typedef struct ebpo_distance_result {
  * level or a deadline the result is `lo` and `hi`; `distance` is then NAN, except if `lo` and `hi`
  * are equal.
  *
- * EBPO_E_ABSENT: the file has no mesh, no level is given, and the mode is not
- * EBPO_DISTANCE_ENVELOPE; or a subset lacks the required data.
+ * EBPO_E_ABSENT: a subset lacks the required data, or the file has no mesh although the query needs
+ * one. A query needs no mesh if a level is given or the mode is EBPO_DISTANCE_ENVELOPE.
  *
  * Threads: one at a time per context.
  */
@@ -615,12 +617,12 @@ typedef struct ebpo_within_options {
     size_t struct_size;
 
     /*
-     * Maximum distance of the faces that are passed, in the model's unit, compared exactly; at
-     * least 0. INFINITY: all faces.
+     * Only faces with at most this distance from the point are passed to the callback. Distances
+     * are compared exactly. In the model's unit; at least 0. INFINITY: all faces.
      */
     double radius;
 
-    /* Maximum number of faces that are passed, nearest first. 0: all faces. */
+    /* Maximum number of faces that are passed to the callback, nearest first. 0: all faces. */
     uint64_t most;
 
     /* True: normals are computed. False: normals are NAN, which is faster. */
@@ -659,11 +661,11 @@ typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
  * options   NULL: all faces of the model
  * take      must not use the context
  *
- * Uses at most 16 MiB besides the model's budget, for any number of faces. For this reason, a
- * search finds at most 65,536 faces and passes them to `take`, and the next search finds the faces
- * that follow. If `most` is 0, the first three searches find fewer faces: 256, 2,048 and 16,384.
- * Subtrees are loaded in order of distance, and only if they may contain a result. A subtree is
- * loaded once if the budget is large enough to keep it.
+ * Uses at most 16 MiB besides the model's budget, for any number of faces. For this reason, the
+ * call works in steps. Each step finds the next faces, at most 65,536, and passes them to `take`.
+ * If `most` is 0, the first three steps find at most 256, 2,048 and 16,384 faces. Subtrees are
+ * loaded in order of distance, and only if they may contain a result. A subtree is loaded once if
+ * the budget is large enough to keep it.
  *
  * EBPO_E_ABSENT: as for ebpo_distance. In a subset, the call may pass some faces before it returns
  * this error; these faces are correct. EBPO_E_ARGUMENT: returned before the first face.
@@ -683,8 +685,8 @@ typedef struct ebpo_ray_hit {
     /*
      * Parameter of the hit, which is at origin + t direction; correctly rounded. INFINITY although
      * `face` is an index: t is larger than every double, because the direction is very short. If
-     * the direction is multiplied by a power of two, t is finite for the same face. Hits are sorted
-     * by exact values of t.
+     * the direction is multiplied by a sufficiently large power of two, t is finite for the same
+     * face. Hits are sorted by exact values of t.
      */
     double t;
 
@@ -778,8 +780,9 @@ typedef struct ebpo_ray {
 /*
  * Finds the first hit of each of rays[count] as ebpo_ray_first does, into out[count]. For a ray
  * without a hit, t is INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or
- * other rays. If not everything is in memory, the rays are sorted by the points at which they enter
- * the model, along a space-filling curve. So each subtree is loaded only a few times.
+ * other rays. If not everything is in memory, rays are processed in another order: the points at
+ * which rays enter the model are sorted along a space-filling curve. So each subtree is loaded only
+ * a few times.
  *
  * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
  * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
@@ -878,13 +881,15 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  *     w_a = 1 - w_b - w_c, or 0 if negative
  *
  * Each weight is divided by the sum of the three weights. If D is at most 2^-900, the face counts
- * as a face without area. The weights are then the weights of a point on the longest of the edges
- * ab, ac, bc (the first of several edges with equal length): the point of this edge that is nearest
- * to p.
+ * as a face without area, and only its longest edge is used. (If several of the edges ab, ac and bc
+ * are longest, the first in this order is used.) Let q be the point of this edge that is nearest to
+ * p. The weights of the edge's two corners interpolate linearly at q. The weight of the third
+ * corner is 0.
  *
- * The value is (w_a A + w_b B) + w_c C, without the terms whose weight is 0. The value is clamped
- * to the range of the values in the sum. At a corner, the result is the corner's value. If the
- * three values are equal, the result is this value.
+ * The value is the sum (w_a A + w_b B) + w_c C. Corners with weight 0 are omitted from the sum. The
+ * sum is clamped to the range from the least to the greatest value of the remaining corners. At a
+ * corner, the result is the corner's value. If the three values are equal, the result is this
+ * value.
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
@@ -1034,10 +1039,12 @@ typedef struct ebpo_mass {
     int64_t exponent;
 
     /*
-     * Bounds of the volume. If the volume is known: for a solid, both bounds are `volume`; for a
-     * surface with EBPO_PART_BORDER, they are `volume` minus and plus the sum of integral_error and
-     * caps_integral. If the volume is not known: for a solid, the bounds of ebpo_solid_volume; for
-     * a surface, 0 and INFINITY.
+     * Bounds of the volume.
+     * - Solid whose volume is known, or surface without EBPO_PART_BORDER: both bounds are `volume`.
+     * - Solid whose volume is unknown: the bounds of ebpo_solid_volume.
+     * - Surface with EBPO_PART_BORDER whose volume is known: `volume` minus e (but at least 0) and
+     *   `volume` plus e, where e is integral_error + caps_integral.
+     * - Surface with EBPO_PART_BORDER whose volume is unknown: 0 and INFINITY.
      */
     double volume_lo, volume_hi;
 
@@ -1048,17 +1055,18 @@ typedef struct ebpo_mass {
     double integral, scaled_integral;
 
     /*
-     * For surfaces with EBPO_PART_BORDER, else 0: bounds of the rounding errors of `integral`, and
-     * of `centroid` on each axis; in powers of the model's unit.
+     * Upper bounds of the rounding errors of `integral` and of each coordinate of `centroid`, in
+     * powers of the model's unit. 0 if the file has no EBPO_PART_BORDER.
      */
     double integral_error, centroid_error;
 
     /*
-     * For surfaces with EBPO_PART_BORDER, else 0: greatest difference that other caps could make to
-     * `integral`, and to the centroid of the winding number (INFINITY: no bound). This holds for
-     * caps that satisfy two conditions. First, each cap is in the convex hull of its loop. Second,
-     * this cap and the reversed cap of format-spec/border.md form a closed mesh, whose winding
-     * numbers are all -1, 0 or 1, times the weight of the loop (border.md).
+     * A surface with EBPO_PART_BORDER is measured with the caps that format-spec/border.md defines:
+     * one cap for each loop of the border. Other caps would change `integral` and the centroid of
+     * the winding number by at most these members (INFINITY: no bound). This holds if each other
+     * cap satisfies two conditions. First, it is in the convex hull of its loop. Second, it forms a
+     * closed mesh with the reversed cap of border.md, and the winding numbers of this mesh are -w,
+     * 0 or w, where w is the weight of the loop (border.md). 0 if the file has no EBPO_PART_BORDER.
      */
     double caps_integral, caps_centroid;
 } ebpo_mass;

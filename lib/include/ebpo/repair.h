@@ -86,10 +86,10 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1 in two
-     * cases. Either there are doubts about the mesh of every try, or there are no doubts about the
-     * unrepaired mesh. The unrepaired mesh then needs no repair, even if dropping repeated faces
-     * was tried.
+     * Index of the chosen try: the last try, if there are no doubts about its mesh. -1: no try was
+     * chosen, for one of two reasons. Either there are doubts about the mesh of every try. Or there
+     * are no doubts about the unrepaired mesh, so it needs no repair. In the second case, dropping
+     * repeated faces may have been tried, but is not chosen.
      */
     int64_t chosen;
 } ebpo_repairs;

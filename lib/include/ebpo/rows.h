@@ -14,16 +14,17 @@ extern "C" {
  * Reads a whole dataset of rows x columns as doubles. The dataset may contain integers or floats of
  * any size and byte order. Values are rounded to the nearest double.
  *
- * dataset        path of the dataset in the file, such as "/points". NULL or "": reads no dataset;
- *                the error message lists the suitable datasets
+ * dataset        path of the dataset in the file, such as "/points". NULL or "": the call fails,
+ *                and the message of the error lists the suitable datasets
  * least, most    minimum and maximum number of columns of the dataset, 1 to 64
  * fill           value for missing columns, if the dataset has fewer than `most`
  * rows           [*count][most] doubles; freed by free()
  *
  * EBPO_E_IO: the file cannot be read, or another program has it open for writing. EBPO_E_FORMAT:
- * the file is not an HDF5 file; the dataset does not exist; its values are in another file; or its
- * shape or type is not suitable (for example complex numbers, or the codes in an array of an
- * .ebpo.h5 file). EBPO_E_ABSENT: `dataset` is NULL or "", and the file has no suitable dataset.
+ * the file is not an HDF5 file; the dataset does not exist; its values are in another file; its
+ * shape or type is not suitable (for example complex numbers); the file is an .ebpo.h5 file whose
+ * dataset has coded values instead of plain numbers; or `dataset` is NULL or "", and the file has
+ * suitable datasets. EBPO_E_ABSENT: `dataset` is NULL or "", and the file has no suitable dataset.
  * EBPO_E_LIMIT: the rows would take more than 64 MiB, and more than 1,024 times the file size.
  * EBPO_E_UNSUPPORTED: the library was built without libhdf5.
  *

@@ -9,9 +9,10 @@
  *
  * `file` may be opened by a URL. In this case only the data that is kept is fetched.
  *
- * Some gray nodes (nodes with children) of a file are *pruned* in a subset: they keep their
- * envelopes, but have no children (format-spec/README.md, section 7). Results from a subset are
- * never wrong. If a query needs missing data, a query with a level returns EBPO_MAYBE or a wider
+ * A gray node is a node with children. A subset can have *pruned* nodes, which are gray nodes
+ * without children: their children in `file` are omitted, but their envelopes are kept. A leaf can
+ * also become a pruned node (format-spec/README.md, section 7). Results from a subset are never
+ * wrong. If a query needs missing data, a query with a level returns EBPO_MAYBE or a wider
  * interval, and an exact query returns EBPO_E_ABSENT.
  */
 #ifndef EBPO_SUBSET_H
@@ -87,9 +88,10 @@ typedef struct ebpo_subset_options {
     double max_error;
 
     /*
-     * Maximum size of the new file in bytes. If the new file would be larger, the least max_error
-     * (to 1 %) with which it has at most this size is found and used. Otherwise no max_error is
-     * used. 0: no maximum size. target_bytes and max_error cannot be set together.
+     * Maximum size of the new file in bytes. 0: no maximum size. If the file is too large without a
+     * max_error, ebpo_subset searches for the least max_error with which the file is small enough,
+     * and uses the result of the search. The result is at most 1 % too large. target_bytes and
+     * max_error cannot be set together.
      */
     uint64_t target_bytes;
 
@@ -127,18 +129,22 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  *
  * Guarantee for every node that was pruned because of max_error: no point of the node's envelope,
  * including the interior, is farther than max_error from the solid and its faces (for a surface:
- * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is also pruned if the part
- * of its parent's envelope in the leaf's cell has an error bound of at most max_error. In the new
- * file, this leaf becomes a pruned gray node without planes. Leaves that are kept have the same
- * error bound as in `file`, which may be larger than max_error. A smaller max_error keeps all nodes
- * that a larger max_error keeps. With max_error or target_bytes, the whole model is loaded into
- * memory (see ebpo_subset_memory).
+ * from its faces). `kept_error` of ebpo_info is this max_error. A leaf becomes a pruned gray node
+ * if the parent's envelope, cut off at the faces of the leaf's cell, has an error bound of at most
+ * max_error. The pruned node stores no planes: its envelope is that part of the parent's envelope.
+ * Leaves that are kept have the same error bound as in `file`, which may be larger than max_error.
+ * A smaller max_error keeps all nodes that a larger max_error keeps. With max_error or
+ * target_bytes, the whole model is loaded into memory (see ebpo_subset_memory).
  *
- * EBPO_E_ARGUMENT: the level is not valid; the box has no points; the box does not intersect the
- * model's root cell, or the box with which `file` itself was made; or target_bytes is too small,
- * and the message gives the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file
- * has no mesh or is a subset. EBPO_E_IO: also if `path` is the path of `file`, and another program
- * has replaced the file since opening. Also the errors of reading (base.h).
+ * EBPO_E_ARGUMENT: one of these conditions is true.
+ * - The level is not valid.
+ * - The box has no points, or does not intersect the model's root cell.
+ * - `file` is a subset that was made with a box, and the two boxes do not intersect.
+ * - target_bytes is too small; the message gives the minimum.
+ *
+ * EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a subset.
+ * EBPO_E_IO: also if `path` is the path of `file`, and another program has replaced the file since
+ * opening. Also the errors of reading (base.h).
  *
  * Threads: any.
  */

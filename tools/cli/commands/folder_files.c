@@ -88,8 +88,9 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
     if (!has_stat && errno == ENOENT)
         return true; /* the entry was removed meanwhile */
     bool is_folder = has_stat && S_ISDIR(st.st_mode);
-    /* The type of the entry is unknown; it may be a folder that cannot be searched. But an entry
-     * with the name of a model is added, and the error is reported when the model is opened. */
+    /* An entry of unknown type may be a folder, which cannot be searched, so the entry is reported
+     * here. An entry with the name of a model is not reported here but added; the error is reported
+     * when the model is opened. */
     if (!has_stat && !is_model_name(name))
         return report_unread(f, folder, below, name);
     if (!is_folder && !is_model_name(name))

@@ -39,8 +39,8 @@ static double doubled_area(const ebpo_mesh *mesh, uint64_t face, double unit)
                 pow(u[0] * v[1] - u[1] * v[0], 2));
 }
 
-/* Returns the first index i with sums[i] > value. sums[count]: ascending sums of the areas of
- * faces. */
+/* Returns the first index i with sums[i] > value. sums[i] is the sum of the areas of faces 0 to
+ * i. */
 static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
 {
     uint64_t low = 0, high = count - 1;
@@ -54,8 +54,8 @@ static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
     return low;
 }
 
-/* Generates a random point in a ball. The centre of the ball is random, and uniform on the surface.
- */
+/* Generates a random point in a ball. The centre of the ball is a random point of the mesh's faces,
+ * uniform by area. */
 static void make_near_point(const ebpo_mesh *mesh, const double *sums, double radius,
                             uint64_t *random, double out[3])
 {
@@ -121,7 +121,9 @@ ebpo_status report_make_points(comparison *c, ebpo_error *error)
 
 /* --- queries --- */
 
-/* The queries of a method in a round. Arrays have an entry for each point. */
+/* State of the queries of one method (an .ebpo.h5 file that is compared with others). All queries
+ * are run in several rounds, and each round measures their times. Arrays have an entry for each
+ * point. */
 typedef struct level_queries {
     comparison *c;
     method *m;
