@@ -27,10 +27,10 @@
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
  * - Batches of points and rays keep their completed results if options.done is given (query.h). For
- *   a batch, also begin a second operation before each repetition, and end one of the two after
- *   ebpo_async_needed. If the repetition has completed items, end the older operation; bytes that
- *   only earlier repetitions used may then be removed. If the repetition has completed no items,
- *   end the newer operation.
+ *   a batch, also begin a second operation before each repetition, and end one of the two
+ *   operations after ebpo_async_needed. If the repetition has completed items, end the older
+ *   operation. The library may remove bytes that only earlier repetitions used. If the repetition
+ *   has completed no items, end the newer operation.
  * - ebpo_ray_all_many keeps no completed results: its hits are one array in the order of the rays,
  *   so the position of a hit depends on all earlier rays. Each call evaluates all rays, so pass few
  *   rays at a time.
@@ -61,7 +61,8 @@ typedef struct ebpo_async ebpo_async;
  * name      name of the file for messages; copied
  * version   text that changes when the file changes, such as an ETag; copied. "": not known
  * memory    maximum number of supplied bytes in memory. When an operation ends, the least recently
- *           used bytes are removed until this number is met. The first 128 KiB of the file stay
+ *           used bytes are removed until at most this number remains. The first 128 KiB of the file
+ *           stay
  *
  * Threads: any.
  */
@@ -96,8 +97,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_source(ebpo_async *async, ebpo_sou
 EBPO_API uint64_t ebpo_async_begin(ebpo_async *async);
 
 /*
- * Ends an operation that is complete, or that the caller no longer repeats. Bytes that no running
- * operation has used may then be removed.
+ * Ends an operation that is complete, or that the caller no longer repeats. After this, bytes that
+ * no running operation has used may be removed.
  *
  * Threads: any.
  */

@@ -22,15 +22,15 @@
  *
  * Failure: a function that fails makes no object, and sets its output for a new object to NULL.
  *
- * A callback that receives results returns false to stop the call. The callback is then not called
- * again, and the call succeeds.
+ * A callback that receives results returns false to stop the call. After this, the callback is not
+ * called again, and the call succeeds.
  *
  * Errors: comments list the statuses that need an explanation. Any function that returns
  * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
  * range or not initialized with its macro. A function with a progress callback can return
  * EBPO_E_CANCELLED. "The errors of reading" are EBPO_E_IO and EBPO_E_FORMAT, and EBPO_E_PENDING for
  * files with a source of async.h. "Also if ..." after a status adds a case in which the function
- * returns this status. The cases that ebpo_status gives, and those of functions to which the
+ * returns this status. The cases that ebpo_status gives, and the cases of functions to which the
  * comment refers, still apply.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
@@ -64,9 +64,9 @@
 /* ---- structs with struct_size ---- */
 
 /*
- * A struct that may grow in later versions begins with its own size. All options structs do, and
- * most structs that the library fills in. Initialize them with their macro, which sets the size and
- * the default values:
+ * A struct that may grow in later versions begins with its own size. These structs are all options
+ * structs, and most structs that the library fills in. Initialize each of them with its macro,
+ * which sets the size and the default values:
  *
  *     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
  *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
@@ -213,8 +213,8 @@ EBPO_API const char *ebpo_status_name(ebpo_status status);
 
 /*
  * Returns true for a valid calendar date in ISO 8601: YYYY, YYYY-MM or YYYY-MM-DD. The last form
- * may continue with T and a time (HH:MM, HH:MM:SS or HH:MM:SS with decimals), and then with Z,
- * +HH:MM or -HH:MM.
+ * may continue with T and a time (HH:MM, HH:MM:SS or HH:MM:SS with decimals). The time may be
+ * followed by Z, +HH:MM or -HH:MM.
  *
  * Threads: any.
  */
@@ -224,8 +224,8 @@ EBPO_API bool ebpo_is_date(const char *text);
 
 /*
  * Callback that reports progress. The library calls the callback in the thread of the caller, when
- * a stage begins and then at most a few times a second. `stage` is a static string. `done` counts
- * up to `total`, which is 0 if unknown.
+ * a stage begins, and at most a few times a second during the stage. `stage` is a static string.
+ * `done` counts up to `total`, which is 0 if unknown.
  *
  * Return false to stop: the running call returns EBPO_E_CANCELLED and leaves no file.
  */

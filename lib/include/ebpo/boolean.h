@@ -123,14 +123,16 @@ typedef struct ebpo_boolean_result {
     /*
      * ebpo_where. EBPO_IN: the point is certainly in the interior of the result. EBPO_OUT: the
      * point is certainly in the interior of the complement of the result. EBPO_ON: the point is on
-     * a posed face of an operand, and the other operands leave open if the point is in the result.
+     * a posed face of an operand, and the other operands do not decide if the point is in the
+     * result.
      */
     int32_t where;
 
     /*
-     * 1: `where` is certain; EBPO_ON then means that the point is a boundary point of the result.
-     * 0: the point may or may not be a boundary point. This is possible only with EBPO_ON, if faces
-     * in different planes intersect at the point, as on edges and at vertices.
+     * 1: `where` is certain. In this case EBPO_ON means that the point is a boundary point of the
+     * result. 0: `where` is EBPO_ON, but the point may or may not be a boundary point. The value 0
+     * is possible only at points where faces in different planes intersect, as on edges and at
+     * vertices.
      */
     int32_t certain;
 } ebpo_boolean_result;
@@ -249,7 +251,7 @@ typedef struct ebpo_exact_volume {
 
     /*
      * doubt: ebpo_volume_doubt, the first reason found. operand: indices of the two operands of
-     * this reason; if the reason has one operand, this is operand[0].
+     * this reason. If the reason concerns one operand, operand[0] is its index.
      */
     int32_t doubt;
     uint32_t operand[2];
@@ -348,7 +350,7 @@ typedef struct ebpo_boolean_mesh_options {
 
     /*
      * True: each operand has one colour, which its faces get as the attributes red, green and blue.
-     * The colours in the operands' files are then ignored.
+     * In this case the colours in the operands' files are ignored.
      */
     bool colours;
 
@@ -417,13 +419,13 @@ typedef struct ebpo_boolean_mesh_report {
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
  *
- * EBPO_E_ARGUMENT: operands have different units; or `changed_only` is true, and the expression
- * does not use operand 0, or `volume` or `attributes` is also true. EBPO_E_ABSENT: an operand is a
- * subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices. EBPO_E_FORMAT: an operand is not
- * closed, although its file says that it is a solid. EBPO_E_UNSUPPORTED: `changed_only` is true,
- * and operand 0 has one of these properties in the box of the other operands: faces that intersect
- * each other, faces without area, or winding numbers other than 0 and 1. Also the errors of
- * reading. On failure `out` is cleared.
+ * EBPO_E_ARGUMENT: operands have different units. Also if `changed_only` is true and one of these
+ * conditions is met: the expression does not use operand 0; `volume` is true; `attributes` is true.
+ * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices.
+ * EBPO_E_FORMAT: an operand is not closed, although its file says that it is a solid.
+ * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 has one of these properties in the box
+ * of the other operands: faces that intersect each other, faces without area, or winding numbers
+ * other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
  *
  * Threads: one at a time per expression.
  */
@@ -449,7 +451,7 @@ typedef struct ebpo_cells_options {
 
     /*
      * Maximum number of mixed cells of a level; if there are more, EBPO_E_LIMIT is returned. While
-     * the next level is made, each mixed cell takes 32 bytes. 0: 2^25.
+     * the next level is made, each mixed cell takes 32 bytes. 0: the maximum is 2^25.
      */
     uint64_t most;
 
@@ -474,10 +476,10 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 
 /*
  * Makes the cells. Each operand is tested in a ball around the cell. White and black nodes of the
- * operand's tree are tested first. Usually they decide if the cell is larger than the operand's
- * leaves. If they do not decide, the operand's faces are tested. An operand that cannot change the
- * result in a cell is not tested in the cell's children. An operand that is used twice counts as
- * two operands, so cells at its boundary are mixed.
+ * operand's tree are tested first. For a cell that is larger than the operand's leaves, these nodes
+ * usually give the result of the test. Otherwise the operand's faces are tested. An operand that
+ * cannot change the result in a cell is not tested in the cell's children. An operand that is used
+ * twice counts as two operands, so cells at its boundary are mixed.
  *
  * The cells stay valid after the expression is freed.
  *

@@ -32,8 +32,8 @@ typedef enum ebpo_selection {
      * From the root down. Candidates are the facet normals of the convex hull of the solid in the
      * cell. A node starts with its parent's envelope. Again and again, the candidate that removes
      * the greatest volume is added. The additions end when this volume is less than a share of the
-     * cell (`epsilon` of ebpo_build_options). Then planes are added that cut off needles. A needle
-     * is a long, thin portion of the envelope that has little volume.
+     * cell (`epsilon` of ebpo_build_options). Finally, planes that cut off needles are added. A
+     * needle is a long, thin portion of the envelope that has little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 
@@ -155,8 +155,8 @@ typedef struct ebpo_build_options {
 
     /*
      * For the selections of the theses: number of planes at the root; 0: `percent` decides. The
-     * number for a level is half the number for the level above. In a node, it is halved further
-     * until it is less than the number of candidates (BP 2008, 3.5.1).
+     * number for a level is half the number for the level above. In a node, this number is halved
+     * further until it is less than the number of candidates (BP 2008, 3.5.1).
      */
     double k_root;
 

@@ -362,9 +362,10 @@ typedef struct ebpo_catalogue_query_options {
  * of the models. A model counts as 0 if the point is on one of its faces. A point is inside if it
  * is inside any model. Otherwise it is on a face if it is on a face of any model.
  *
- * For parts, the rule is applied to the sum. The result is exactly the result for the whole model,
- * also for points on caps. EBPO_E_LIMIT: each of 64 rays from a point on a cap hits an edge or runs
- * along a face. EBPO_E_ABSENT: a point is on a cap, and the catalogue has no surface of any part.
+ * If the models are parts of one model, the rule is applied to the sum of the winding numbers. The
+ * result is exactly the result for the whole model, also for points on caps. EBPO_E_LIMIT: each of
+ * 64 rays from a point on a cap hits an edge or runs along a face. EBPO_E_ABSENT: a point is on a
+ * cap, and the catalogue has no surface of any part.
  *
  * EBPO_E_NOT_SOLID: a model is a surface.
  *
@@ -396,7 +397,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
  * have the same rounded t, the first of them in the catalogue is used. Exception: the nearest hits
  * of several models may all have t = INFINITY (ebpo_ray_hit). These hits are compared by their t
- * along the same direction, multiplied by a power of two. The returned t stays INFINITY.
+ * for a longer direction: the direction of the ray, multiplied by a power of two. The returned t
+ * stays INFINITY.
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -195,8 +195,8 @@ typedef struct ebpo_relation_result {
  *
  * A subtree of a partly loaded model is loaded if some of its faces intersect the other model. A
  * subtree is also loaded if it may show that its model is only partly inside the other model. This
- * is so if a face of its model is known to be inside and the subtree may have a face outside, or
- * the reverse.
+ * is the case if a face of its model is known to be inside and the subtree may have a face outside.
+ * It is also the case if a face is known to be outside and the subtree may have a face inside.
  *
  * Errors are those of ebpo_collide_first. If the deadline passes, the call succeeds with the
  * relation EBPO_RELATION_UNDECIDED. EBPO_E_ABSENT: as for ebpo_inside.
@@ -219,15 +219,15 @@ typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t 
 /*
  * Finds every pair of intersecting faces once. Pairs are sorted by the index of the face in the
  * file of the first model, then by the index in the file of the other model. The first model is the
- * model with the lower content_sha256. If the models have the same content_sha256, it is the model
- * with the lower pose, compared bit by bit.
+ * model with the lower content_sha256. If both models have the same content_sha256, the first model
+ * is the model with the lower pose; the bits of the poses are compared.
  *
  * Partly loaded models give the same pairs in the same order. Subtrees whose envelopes may
  * intersect are loaded. Each subtree is loaded about once if all pairs fit in `memory` of the
  * options, and about a hundred subtrees fit in the budgets.
  *
- * EBPO_E_CANCELLED: also if the deadline has passed. `take` has then received the first pairs of
- * the complete list. Other errors are those of ebpo_collide_first.
+ * EBPO_E_CANCELLED: also if the deadline has passed. In this case `take` has received the first
+ * pairs of the complete list. Other errors are those of ebpo_collide_first.
  *
  * Threads: one at a time per collider.
  */
@@ -390,8 +390,8 @@ typedef struct ebpo_collide_distance_options {
     double tolerance;
 
     /*
-     * If 0 or more: the query decides only if the distance is at least this value, in the world's
-     * unit. Below 0: the query computes the distance.
+     * Below 0: the query computes the distance. 0 or more: the query does not compute the distance,
+     * but decides whether the distance is at least this value, in the world's unit.
      */
     double at_least;
 
@@ -427,9 +427,9 @@ typedef struct ebpo_collide_distance_result {
     int32_t reserved;
 
     /*
-     * Pair of faces at this distance (with a tolerance, at distance.hi or less); of several such
-     * pairs, the first in the order of ebpo_collide_all. If faces intersect: a pair of intersecting
-     * faces. Indices are EBPO_NO_FACE if no pair was found.
+     * Pair of faces at this distance. With a tolerance, the distance of this pair is at most
+     * distance.hi. If several pairs qualify, this is the first in the order of ebpo_collide_all. If
+     * faces intersect: a pair of intersecting faces. Indices are EBPO_NO_FACE if no pair was found.
      */
     ebpo_face_pair pair;
 
@@ -448,10 +448,10 @@ typedef struct ebpo_collide_distance_result {
  * the returned pair is nearer than at_least. After the deadline, `distance` has the bounds known so
  * far.
  *
- * For partly loaded models, subtrees whose envelopes are not farther apart than the best distance
- * found so far are loaded, nearest first. Exact distances and their pairs do not depend on the
- * subtrees in memory. Bounds of intervals, and the reported pair of intersecting faces, do depend
- * on them.
+ * For partly loaded models, pairs of subtrees are loaded in the order of the distances of their
+ * envelopes. A pair is not loaded if this distance exceeds the best distance found so far. Exact
+ * distances and their pairs do not depend on the subtrees in memory. Bounds of intervals, and the
+ * reported pair of intersecting faces, do depend on them.
  *
  * EBPO_E_ARGUMENT: also if the tolerance is below 0 or infinite, or at_least is NAN. Other errors
  * are those of ebpo_collide_first.

@@ -30,9 +30,9 @@ typedef struct ebpo_error_bound_options {
     uint64_t seed;
 
     /*
-     * Refining stops when about this many distances have been computed, with the bounds known so
-     * far. At least two distances are computed for each node. 0: no limit for the level, but at
-     * most 65,536 distances for each node.
+     * Refining stops, with the bounds known so far, when about this many distances have been
+     * computed. At least two and at most 65,536 distances are computed for each node. 0: the level
+     * has no limit.
      */
     uint64_t queries;
 
@@ -97,8 +97,8 @@ typedef struct ebpo_error_bound {
  * The level's surface, for `mean` and `rms`, is the part of the envelopes' polygons that is in no
  * other envelope.
  *
- * model    model of `file`, which then must have a mesh. If `file` is a subset of any kind, `model`
- *          may also be the model of the file from which the subset was made
+ * model    model of `file`; in this case `file` must have a mesh. If `file` is a subset of any
+ *          kind, `model` may also be the model of the file from which the subset was made
  *
  * Memory, in addition to the memory of `model`: the entire tree and mesh, and 80 bytes for each
  * node of the level.

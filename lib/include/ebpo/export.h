@@ -92,9 +92,9 @@ typedef struct ebpo_export_options {
     const uint8_t *vertex_colours;
 
     /*
-     * GLB with `surface`: the greatest number of triangles. last_level is then ignored, and patches
-     * of any levels are chosen, so that the error is as small as this number of triangles allows.
-     * 0: no limit.
+     * GLB with `surface`: the greatest number of triangles. 0: no limit. With a limit, last_level
+     * is ignored, and patches of any levels are chosen, so that the error is as small as this
+     * number of triangles allows.
      */
     uint64_t triangles;
 
@@ -178,7 +178,7 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
 
 /*
  * Exports levels, a surface or the mesh to a file, which is replaced atomically. A second file is
- * replaced just before the first file. If replacing the first file then fails (EBPO_E_IO), the
+ * replaced just before the first file. If the replacement of the first file fails (EBPO_E_IO), the
  * second file has already been replaced.
  *
  * For XDMF and VTKHDF, one level is in memory at a time; for other formats, all levels are.

@@ -539,8 +539,8 @@ typedef struct ebpo_write_options {
      * of faces. If there is no such level, they are the gray nodes of level 1. The data of a
      * subtree is contiguous, so that one read loads it.
      *
-     * 0 (default): the number is 1,024, but the file has no table of subtrees if no level reaches
-     * this number, or if the mesh has fewer than 131,072 faces.
+     * 0 (default): the number is 1,024. With this default, the file has no table of subtrees if no
+     * level reaches this number, or if the mesh has fewer than 131,072 faces.
      *
      * EBPO_NO_SUBTREES: no table of subtrees is written, as in format 1.0. Files of fewer than
      * three levels never have such a table.
@@ -613,8 +613,8 @@ typedef struct ebpo_source {
 
     /*
      * Number of bytes at the beginning of the file that are already available, if `prefetch` is not
-     * NULL. If this number is more than 0 and less than `size`, opening reads only these bytes. The
-     * chunk offsets of arrays with several chunks are then read when they are needed, or by
+     * NULL. If this number is more than 0 and less than `size`, opening reads only these bytes.
+     * Later, the chunk offsets of arrays with several chunks are read when they are needed, or by
      * ebpo_file_locate. If this number is 0 or `size`, opening also reads all chunk offsets.
      */
     uint64_t prefetched;
@@ -669,8 +669,8 @@ typedef struct ebpo_open_options {
     uint64_t max_expansion;
 
     /*
-     * Source to open. The path is then only the file's name in messages. The source is closed as by
-     * ebpo_open_source. NULL: the file at the path is opened.
+     * Source to open instead of the file at the path. Messages use the path as the file's name. The
+     * source is closed as by ebpo_open_source. NULL: the file at the path is opened.
      */
     const ebpo_source *source;
 
@@ -727,10 +727,10 @@ typedef struct ebpo_compat_options {
  * large as the original. Chunks are encoded again if their filters, size or byte order differ from
  * the format. A file at a URL is first fetched completely to TMPDIR.
  *
- * The copy is then opened like any other file, and its content checksum is compared. This checksum
- * does not include HDF5 attributes, such as the root's box. The headers that other programs write
- * have no checksums, so use ebpo_verify to find errors in attributes. Sizes in ebpo_info are those
- * of the copy.
+ * The complete copy is opened like any other file, and its content checksum is compared. This
+ * checksum does not include HDF5 attributes, such as the root's box. The headers that other
+ * programs write have no checksums, so use ebpo_verify to find errors in attributes. Sizes in
+ * ebpo_info are those of the copy.
  *
  * Errors are those of ebpo_open. EBPO_E_FORMAT: libhdf5 rejected the file or crashed, or the
  * content does not match its checksum. EBPO_E_IO: the process or the temporary file could not be
@@ -815,8 +815,8 @@ typedef struct ebpo_array_facts {
 
 /*
  * Describes the n-th array of the file. First come the arrays of the levels, from level 0 on, then
- * the arrays of the root, then the arrays of attributes. Returns false if the file has fewer
- * arrays; `out` is then unchanged.
+ * the arrays of the root, then the arrays of attributes. If the file has fewer arrays, returns
+ * false and does not change `out`.
  *
  * Threads: any.
  */
@@ -856,8 +856,8 @@ typedef struct ebpo_attribute_facts {
 #define EBPO_ATTRIBUTE_FACTS_INIT EBPO_SIZED(ebpo_attribute_facts)
 
 /*
- * Describes the n-th array of attributes. Returns false if the file has fewer arrays; `out` is then
- * unchanged.
+ * Describes the n-th array of attributes. If the file has fewer arrays, returns false and does not
+ * change `out`.
  *
  * Threads: any.
  */
@@ -908,8 +908,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_
 
 /*
  * Prefetch hint: levels `first` to `last` will be read; `last` may be beyond the last level. A
- * remote source then fetches them with as few requests as possible. The function may wait for the
- * chunk directory (ebpo_file_locate), but not for levels. Errors are reported by later reads.
+ * remote source fetches these levels with as few requests as possible. The function may wait for
+ * the chunk directory (ebpo_file_locate), but not for levels. Errors are reported by later reads.
  *
  * Threads: any.
  */

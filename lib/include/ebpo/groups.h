@@ -18,7 +18,7 @@ extern "C" {
  * Named groups of an OBJ file. A group contains the faces that follow a line `g` or `o`, up to the
  * next line `g` or `o`. The name of the group is the text after `g` or `o`, without surrounding
  * spaces. Groups of equal name are one group. Faces before the first line `g` or `o`, and faces
- * after such a line without a name, are in the group "default".
+ * after a line `g` or `o` without a name, are in the group "default".
  */
 typedef struct ebpo_mesh_groups ebpo_mesh_groups;
 

@@ -62,8 +62,8 @@ typedef struct ebpo_haptic_options {
     /*
      * Radius of the ball in the model's unit, at least 0. 0: the ball is a point. `faces` must be
      * large enough for all faces within the radius plus `search_radius` of the device. A step tests
-     * at most 512 of these faces, in the order in which the ball may touch them. If there are more,
-     * the next steps test the other faces.
+     * at most 512 of these faces, in the order in which the ball may touch them. If there are more
+     * faces, the next steps test the remaining faces.
      */
     double radius;
 
@@ -76,9 +76,10 @@ typedef struct ebpo_haptic_options {
 
     /*
      * Search distance for the nearest face, in the model's unit, at least 0. Faces within this
-     * distance of the ball contribute to `normal` of the result; nearer faces contribute more. 0:
-     * the distance is 3 times the diagonal of the root cell, divided by the square root of the
-     * number of faces. If all edges have similar lengths, this distance is a few edge lengths.
+     * distance of the ball contribute to `normal` of the result; nearer faces contribute more. 0
+     * selects a default distance: 3 times the diagonal of the root cell, divided by the square root
+     * of the number of faces. If all edges have similar lengths, the default distance is a few edge
+     * lengths.
      */
     double search_radius;
 
@@ -330,8 +331,8 @@ typedef struct ebpo_haptic_tool_result {
     double force[3], torque[3];
 
     /*
-     * In contact: length of that part of the motion from proxy to device which contacts prevent;
-     * rotations count as lengths (ebpo_haptic_step_tool). Without contact: 0.
+     * In contact: contacts prevent a part of the motion from proxy to device; the depth is the
+     * length of this part. Rotations count as lengths (ebpo_haptic_step_tool). Without contact: 0.
      */
     double depth;
 
@@ -386,8 +387,8 @@ EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double position[3
 
 /*
  * Places the proxy at another position, without collisions on the way, and waits until the
- * surroundings are loaded. A tool gets the rotation 0, 0, 0, 1. Because it waits, do not call this
- * function in the loop of haptic steps.
+ * surroundings are loaded. A tool gets the rotation 0, 0, 0, 1. The function waits, so do not call
+ * it in the loop of haptic steps.
  *
  * Errors are those of ebpo_haptic_new. After a failure the position is unchanged.
  *
@@ -397,8 +398,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const 
                                                      ebpo_error *error);
 
 /*
- * Returns the error that stopped the loading thread (EBPO_HAPTIC_STOPPED). Because it takes a lock,
- * do not call this function in the loop of haptic steps.
+ * Returns the error that stopped the loading thread (EBPO_HAPTIC_STOPPED). The function takes a
+ * lock, so do not call it in the loop of haptic steps.
  *
  * EBPO_OK: the thread is not stopped. Other statuses: the errors of reading (base.h), EBPO_E_LIMIT,
  * EBPO_E_MEMORY.

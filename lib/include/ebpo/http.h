@@ -171,9 +171,9 @@ typedef struct ebpo_http_stats {
 #define EBPO_HTTP_STATS_INIT EBPO_SIZED(ebpo_http_stats)
 
 /*
- * Copies a URL to `out` for use in messages, without user name, password and the part from "?" on.
- * A name that is not a URL is copied unchanged. The result is truncated to `space` bytes. Returns
- * `out`.
+ * Copies a URL to `out` for use in messages, without the user name, the password, and the text from
+ * "?" on. A name that is not a URL is copied unchanged. The result is truncated to `space` bytes.
+ * Returns `out`.
  *
  * Threads: any.
  */
@@ -214,8 +214,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(const char *url, const ebpo_htt
                                                  ebpo_file **out, ebpo_error *error);
 
 /*
- * Gets statistics of network transfers. EBPO_E_ABSENT: the file was not opened by a URL; all
- * members of `out` are then 0.
+ * Gets statistics of network transfers. EBPO_E_ABSENT: the file was not opened by a URL; in this
+ * case all members of `out` are 0.
  *
  * Threads: any.
  */

@@ -77,8 +77,9 @@ typedef struct ebpo_lattice {
 } ebpo_lattice;
 
 /*
- * Makes a lattice that fills a box: the first points on each axis are on its lower face, the last
- * points on its upper face. On an axis with one point, the point is in the middle.
+ * Makes a lattice that fills a box: on each axis, the first points are on the box's lower face, and
+ * the last points are on the box's upper face. On an axis with one point, the point is in the
+ * middle.
  *
  * EBPO_E_ARGUMENT: a count is 0, the box is not finite, or `low` is not below `high` on each axis.
  *
@@ -90,8 +91,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lattice_of_box(const double low[3], cons
 
 /*
  * Callback that gets values[layers][count[1]][count[0]] of the lattice, from layer `first` on. The
- * values are valid until the callback returns. If it returns a status other than EBPO_OK, the call
- * ends with this status; the callback then fills in `error`.
+ * values are valid until the callback returns. If the callback returns a status other than EBPO_OK,
+ * it also fills in `error`, and the call ends with this status.
  */
 typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t first,
                                    uint64_t layers, ebpo_error *error);
@@ -179,7 +180,7 @@ typedef struct ebpo_map_hausdorff_options {
 
     /*
      * The search stops after about this many distances have been computed. The given distances of
-     * vertices do not count. 0: 16 distances for each face.
+     * vertices do not count. 0: the search stops after 16 distances for each face.
      */
     uint64_t queries;
 

@@ -257,7 +257,7 @@ typedef struct ebpo_finding {
     /* Number of findings of this kind. */
     uint64_t count;
 
-    /* Least source indices, ascending: min(count, EBPO_FINDING_LOCATIONS) of them. */
+    /* The min(count, EBPO_FINDING_LOCATIONS) least source indices, ascending. */
     uint64_t locations[EBPO_FINDING_LOCATIONS];
 } ebpo_finding;
 
@@ -268,8 +268,8 @@ typedef struct ebpo_finding {
  */
 typedef struct ebpo_mesh_report {
     /*
-     * True if each edge is used equally often in both directions. Then winding numbers are well
-     * defined, and the mesh is a solid. The theses (README.md) require a closed 2-manifold
+     * True if each edge is used equally often in both directions. In this case winding numbers are
+     * well defined, and the mesh is a solid. The theses (README.md) require a closed 2-manifold
      * (`manifold`).
      */
     bool balanced;
@@ -368,9 +368,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsign
 
 /*
  * Sorts vertices and faces along a Morton curve, so that neighbours in space are neighbours in
- * memory. Checking and building then access memory in order, so a mesh can be larger than memory.
- * The mesh keeps the source indices, which reports and files use. ebpo_build calls this function if
- * needed.
+ * memory. With this order, checking and building access memory sequentially, so a mesh can be
+ * larger than memory. The mesh keeps the source indices, which reports and files use. ebpo_build
+ * calls this function if needed.
  *
  * Errors are those of ebpo_mesh_check. EBPO_E_LIMIT: a coordinate is beyond 2^1000, so that the
  * cell faces of an octree would not be exact doubles. On failure the mesh is unchanged.
@@ -450,8 +450,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_r
  * Merges vertices of equal position as ebpo_mesh_weld does, and then vertices that are within a
  * distance of each other. Positions are visited in ascending order of x, then y, then z. A vertex
  * is kept if no earlier kept vertex is within the distance. Each vertex that is not kept is merged
- * into the nearest kept vertex (the first of several at equal distance). Distances are compared
- * exactly.
+ * into the nearest kept vertex (if several are equally near, into the first). Distances are
+ * compared exactly.
  *
  * No vertex moves farther than the distance, even in a chain of near vertices. No two kept vertices
  * are within the distance. The result does not depend on the order of vertices. A kept vertex keeps
@@ -508,9 +508,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
                                                             ebpo_error *error);
 
 /*
- * Orients faces consistently. First, two faces that share an edge used twice get directions that
- * agree: they use the edge in opposite directions. Then shells are turned outwards, or inwards if
- * they bound a cavity.
+ * Orients faces consistently. First, directions are made to agree: if an edge has exactly two
+ * faces, both faces use the edge in opposite directions. Then shells are turned outwards, or
+ * inwards if they bound a cavity.
  *
  * Here a *patch* is a set of faces that are connected by edges that are used twice. A patch is a
  * *shell* if it uses each edge equally often in both directions. So two cubes that share only a
@@ -520,8 +520,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * has its own faces in the common square, so four faces use each side of the square. The square of
  * a cube is one patch, the other five sides of the cube are another patch, and both patches are
  * open. Patches are joined at edges that are used more than twice. The faces at such an edge are
- * sorted by their angle around the edge. Then each face gets the direction opposite to the
- * direction of the previous face. The angles are compared exactly; faces at the same angle are
+ * sorted by their angle around the edge. In this order, each face gets the direction opposite to
+ * the direction of the previous face. The angles are compared exactly; faces at the same angle are
  * ordered by source index. Faces that already alternate are unchanged. Joined patches are a shell
  * if they use each edge equally often in both directions.
  *
@@ -554,9 +554,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_r
  * The triangles are appended at the end; no vertices are added.
  *
  * A loop of up to 256 edges gets the triangulation of least area. If possible, triangulations that
- * use an existing edge of the mesh are excluded. Longer loops are closed by ear clipping. A chain
- * of boundary edges may not close, because orientations differ (see ebpo_mesh_orient). Such a chain
- * is unchanged, and is counted in `unfilled_holes`.
+ * use an existing edge of the mesh are excluded. Longer loops are closed by ear clipping. Some
+ * chains of boundary edges do not close, because orientations differ (see ebpo_mesh_orient). Such
+ * chains are unchanged, and are counted in `unfilled_holes`.
  *
  * Threads: one at a time per mesh.
  */
@@ -570,11 +570,11 @@ typedef struct ebpo_prepare_options {
     size_t struct_size;
 
     /*
-     * True for each step to make. The order of all steps is ebpo_mesh_weld,
-     * ebpo_mesh_drop_duplicates, ebpo_mesh_orient, ebpo_mesh_flip, ebpo_mesh_fill_holes. After
-     * holes were filled, closed components are oriented again. A mesh from STL (`source_format`) is
-     * welded even if `weld` is false. This does not change a mesh from ebpo_mesh_read, which has
-     * already merged vertices of equal position.
+     * True: the step is made. The order of all steps is ebpo_mesh_weld, ebpo_mesh_drop_duplicates,
+     * ebpo_mesh_orient, ebpo_mesh_flip, ebpo_mesh_fill_holes. After holes were filled, closed
+     * components are oriented again. A mesh from STL (`source_format`) is welded even if `weld` is
+     * false. This does not change a mesh from ebpo_mesh_read, which has already merged vertices of
+     * equal position.
      */
     bool weld;
     bool orient;

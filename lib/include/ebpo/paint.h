@@ -235,7 +235,7 @@ typedef struct ebpo_paint_layer {
     /* Opacity of the whole layer, 0 to 255. */
     uint32_t opacity;
 
-    /* 1: the layer is visible. 0: it is not. */
+    /* 1: the layer is visible. 0: the layer is invisible. */
     uint64_t visible;
 } ebpo_paint_layer;
 
@@ -587,8 +587,8 @@ typedef struct ebpo_paint_face {
     double corner[3][3];
 
     /*
-     * For each corner, 1: the corner is covered; 0: it is not. A face without covered corners may
-     * be covered in its middle.
+     * For each corner, 1: the corner is covered; 0: the corner is not covered. A face without
+     * covered corners may be covered in its middle.
      */
     uint8_t covered[3];
 

@@ -38,8 +38,8 @@ typedef struct ebpo_pose {
  * Sets pose->rotation from a quaternion x, y, z, w of any length; w is the real part. The result is
  * bitwise equal to the rotation of an instance with this quaternion in a scene file.
  *
- * EBPO_E_ARGUMENT: the greatest absolute value of a component is not within 2^-500 .. 2^500. The
- * pose is then unchanged.
+ * EBPO_E_ARGUMENT: the greatest absolute value of a component is not within 2^-500 .. 2^500. In
+ * this case the pose is unchanged.
  *
  * Threads: any.
  */

@@ -40,7 +40,8 @@ extern "C" {
 /* ---- models and contexts ---- */
 
 /*
- * How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on this.
+ * How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on this
+ * mode.
  */
 typedef enum ebpo_loading {
     /*
@@ -193,8 +194,9 @@ typedef struct ebpo_model_plan {
 #define EBPO_MODEL_PLAN_INIT EBPO_SIZED(ebpo_model_plan)
 
 /*
- * Estimates memory use for a budget from the counts in the file header; reads no chunks. With both
- * a cut level and a budget, ebpo_model_new may still find that the levels exceed the budget.
+ * Estimates memory use for a budget from the counts in the file header; reads no chunks. If a cut
+ * level and a budget are given, the estimate can succeed although ebpo_model_new fails because the
+ * levels exceed the budget.
  *
  * EBPO_E_LIMIT: the budget is too small; the message names a sufficient budget.
  *
@@ -577,7 +579,10 @@ typedef struct ebpo_distance_result {
      */
     double point[3];
 
-    /* Unit normal of the nearest face, outward by its orientation; (0, 0, 0) if it has no area. */
+    /*
+     * Unit normal of the nearest face, outward by its orientation; (0, 0, 0) if the face has no
+     * area.
+     */
     double normal[3];
 
     /*
@@ -590,8 +595,8 @@ typedef struct ebpo_distance_result {
 
 /*
  * Computes the distance from a point to the model, and the nearest face (EBP 2017, 4.4). With a
- * level or a deadline the result is `lo` and `hi`; `distance` is then NAN, except if `lo` and `hi`
- * are equal.
+ * level or a deadline, the results are `lo` and `hi`, and `distance` is NAN, except if `lo` and
+ * `hi` are equal.
  *
  * EBPO_E_ABSENT: a subset lacks the required data, or the file has no mesh although the query needs
  * one. A query needs no mesh if a level is given or the mode is EBPO_DISTANCE_ENVELOPE.

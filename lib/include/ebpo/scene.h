@@ -339,10 +339,10 @@ EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t cam
                                            ebpo_scene_camera *out);
 
 /*
- * Returns true if a pair of instances is to be tested. This is so if the scene does not ignore the
- * pair, the instances are different, and at most one of the two is fixed. In this case *clearance
- * is the largest clearance (minimum distance) that the rules of the scene require for the pair, in
- * the world's unit; 0: no clearance. Returns false if an index is out of range.
+ * Returns true if a pair of instances is to be tested: the scene does not ignore the pair, the
+ * instances are different, and at most one of them is fixed. If the result is true, *clearance is
+ * the largest clearance (minimum distance) that the rules of the scene require for the pair, in the
+ * world's unit; 0: no clearance. Returns false if an index is out of range.
  *
  * Threads: any.
  */
@@ -370,9 +370,9 @@ typedef struct ebpo_load_options {
 #define EBPO_LOAD_OPTIONS_INIT EBPO_SIZED(ebpo_load_options)
 
 /*
- * Opens those files of models that are not open yet, once for each path. Compares the digests and
- * computes the boxes. Only the headers of the files are read. Files of models without instances are
- * also opened.
+ * Opens the files of models that are not open yet. A path that several models share is opened once.
+ * Compares the digests and computes the boxes. Only the headers of the files are read. Files of
+ * models without instances are also opened.
  *
  * EBPO_E_FORMAT: a file is not an .ebpo.h5 file, its digest differs from that in the scene, or a
  * link leads out of the scene's folder (ebpo_scene_options.allow_outside). EBPO_E_ARGUMENT: an
@@ -769,10 +769,10 @@ typedef struct ebpo_scene_approach_options {
 /*
  * Finds the time in from .. to at which two instances are first within their clearance of each
  * other; no time is missed. For each pair of ebpo_scene_pairs (from, to), the distance is evaluated
- * at time `from`. From this distance and the bound of ebpo_scene_motion follows a later time,
- * before which the pair cannot be near. The distance is evaluated at this later time, and so on.
- * There is one result per pair, in ascending order of a, then b. If one instance is inside another
- * instance from the beginning, and no faces are near, the instances count as apart.
+ * at time `from`. This distance and the bound of ebpo_scene_motion give a later time, before which
+ * the pair cannot be near. The distance is evaluated at this later time, and so on. There is one
+ * result per pair, in ascending order of a, then b. If one instance is inside another instance from
+ * the beginning, and no faces are near, the instances count as apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -940,9 +940,9 @@ typedef struct ebpo_pack_options {
     double margin;
 
     /*
-     * Maximum total size of the new models' files in bytes. If they are larger, the size of each
-     * file is reduced by the same ratio, with the least possible error bound (ebpo_subset). 0: no
-     * maximum.
+     * Maximum total size, in bytes, of the files of the new models. If the total size would be
+     * larger, the size of each file is reduced by the same ratio, with the least possible error
+     * bound (ebpo_subset). 0: no maximum.
      */
     uint64_t target_bytes;
 

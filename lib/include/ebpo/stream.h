@@ -40,7 +40,7 @@ typedef struct ebpo_stream_options {
 /*
  * One node. Its pointers are valid until the next call with the stream. Streams never read the
  * mesh. So in a file without EBPO_PART_LEAF_PLANES, a leaf has no planes, and its envelope is the
- * part of its parent's envelope in the leaf's cell.
+ * intersection of the parent's envelope with the leaf's cell.
  *
  * The vertices of an envelope's polygons are rounded, and planes that remove a negligible volume
  * are omitted. So the polygons usually enclose slightly more than the envelope. The half-spaces in
@@ -136,9 +136,9 @@ typedef struct ebpo_stream_level {
 typedef struct ebpo_stream ebpo_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Reads no data yet. The stream keeps the
- * node types of the levels that it has read in memory; with the option `polygons`, it also keeps
- * their planes.
+ * Makes a stream of an open file, which must stay open. Reads no data yet. The stream has in memory
+ * the node types of all levels that it has read and, with the option `polygons`, the planes of
+ * these levels.
  *
  * Threads: any.
  */
@@ -154,8 +154,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_new(const ebpo_file *file,
 EBPO_API void ebpo_stream_free(ebpo_stream *stream);
 
 /*
- * Prefetch hint: the stream will be read down to level `last`. A remote source then fetches these
- * levels with as few requests as possible. Errors are reported by later reads.
+ * Prefetch hint: the stream will be read down to level `last`. A remote source fetches these levels
+ * with as few requests as possible. Errors are reported by later reads.
  *
  * Threads: one at a time per stream.
  */

@@ -130,11 +130,11 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * Guarantee for every node that was pruned because of max_error: no point of the node's envelope,
  * including the interior, is farther than max_error from the solid and its faces (for a surface:
  * from its faces). `kept_error` of ebpo_info is this max_error. A leaf becomes a pruned gray node
- * if the parent's envelope, cut off at the faces of the leaf's cell, has an error bound of at most
- * max_error. The pruned node stores no planes: its envelope is that part of the parent's envelope.
- * Leaves that are kept have the same error bound as in `file`, which may be larger than max_error.
- * A smaller max_error keeps all nodes that a larger max_error keeps. With max_error or
- * target_bytes, the whole model is loaded into memory (see ebpo_subset_memory).
+ * if the intersection of the parent's envelope with the leaf's cell has an error bound of at most
+ * max_error. The pruned node stores no planes, and its envelope is this intersection. Leaves that
+ * are kept have the same error bound as in `file`, which may be larger than max_error. A smaller
+ * max_error keeps all nodes that a larger max_error keeps. With max_error or target_bytes, the
+ * whole model is loaded into memory (see ebpo_subset_memory).
  *
  * EBPO_E_ARGUMENT: one of these conditions is true.
  * - The level is not valid.

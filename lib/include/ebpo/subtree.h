@@ -11,9 +11,9 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Little more of the file is read than the returned data; a remote file (http.h) takes a few
- * requests. The octcode (locational code) of a node is a leading 1 and three bits for each level
- * (stream.h); ebpo_octcode_at returns the octcode of the cell that contains a point.
+ * The library reads little more of the file than the returned data; a remote file (http.h) takes a
+ * few requests. The octcode (locational code) of a node is a leading 1 and three bits for each
+ * level (stream.h); ebpo_octcode_at returns the octcode of the cell that contains a point.
  */
 #ifndef EBPO_SUBTREE_H
 #define EBPO_SUBTREE_H
@@ -93,7 +93,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_open(const ebpo_file *file, uint
 EBPO_API void ebpo_subtree_close(ebpo_subtree *subtree);
 
 /*
- * Returns the octcode of that cell of a level which contains the point. A point on a cell face
+ * Returns the octcode of the cell of level `level` that contains the point. A point on a cell face
  * belongs to the cell with the larger coordinates. The tree may have no node for this cell
  * (ebpo_subtree_options.or_leaf_above). Returns 0 if the point is not in the model's root cell, or
  * the level is invalid.
@@ -121,7 +121,7 @@ typedef struct ebpo_subtree_nodes {
 
     uint64_t node_count;
 
-    /* [level_count + 1] index of the first node of each level; then node_count */
+    /* [level_count + 1] index of the first node of each level; the last item is node_count */
     const uint64_t *level_first;
 
     /* [node_count] octcodes of the nodes */

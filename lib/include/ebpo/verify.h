@@ -90,8 +90,9 @@ typedef struct ebpo_verify_options {
 
     /*
      * Number of cells whose labels (`labels` of ebpo_verify_report) are checked, at least one of
-     * each level and type. 0: all cells if there are at most 2^22 cells, else 2^20 cells. If these
-     * checks would take more than a few seconds, only 4,096 cells are checked.
+     * each level and type. 0 selects a default number: all cells if there are at most 2^22 cells,
+     * otherwise 2^20 cells. If the checks of these cells would take more than a few seconds, the
+     * default number is 4,096.
      */
     uint64_t label_samples;
 

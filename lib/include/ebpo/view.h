@@ -149,7 +149,7 @@ typedef struct ebpo_view_options {
 
     /*
      * True: reads the faces of each leaf (ebpo_view_stream_get_faces); their bytes and chunks count
-     * for `bytes` and `memory`. The stream then also takes one bit per face of the file.
+     * for `bytes` and `memory`. In this case the stream also takes one bit per face of the file.
      */
     bool faces;
 
@@ -174,8 +174,8 @@ typedef struct ebpo_view_node {
     int level;
 
     /*
-     * True for the root, and for the last of eight siblings. All eight siblings are then delivered,
-     * and replace their parent.
+     * True for the root, and for the last of eight siblings. With this node, all eight siblings are
+     * delivered, and they replace their parent.
      */
     bool complete;
 
@@ -192,9 +192,10 @@ typedef struct ebpo_view_node {
     double distance;
 
     /*
-     * Size of the cell in the image: the length in pixels of a segment in the middle of the image
-     * that is as long as the cell's diagonal, parallel to the image, and `distance` away from the
-     * eye. INFINITY: the eye is in the cell. NAN without an observer.
+     * Size of the cell in the image, in pixels. The size is the length of the image of a segment.
+     * This segment is as long as the cell's diagonal, parallel to the image plane, in the middle of
+     * the image, and `distance` away from the eye. INFINITY: the eye is in the cell. NAN without an
+     * observer.
      */
     double pixels;
 } ebpo_view_node;
@@ -230,7 +231,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(const ebpo_file *file,
 EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
 
 /*
- * Gets the next node; its pointers are valid until the next call with the stream. Unless *end is
+ * Gets the next node; its pointers are valid until the next call with the stream. If *end is not
  * EBPO_VIEW_NODE, there is no node and *out is unchanged.
  *
  * Reads the chunks of the node and its siblings that are not in memory. For a remote file, chunks

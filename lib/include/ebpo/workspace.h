@@ -20,8 +20,8 @@ extern "C" {
 /*
  * Allocates the arrays of models that are read, built or verified. A new array is in memory if it
  * and the other arrays in memory fit into half of the budget. All other arrays are in unnamed
- * temporary files, which disappear with the process. These files are mapped into memory, and the
- * part of them that is resident stays within the budget. Results do not depend on the workspace.
+ * temporary files, which disappear with the process. These files are mapped into memory, and their
+ * resident part stays within the budget. Results do not depend on the workspace.
  */
 typedef struct ebpo_workspace ebpo_workspace;
 
