@@ -8,7 +8,7 @@
  * No relevant box is skipped, in spite of rounding. A length is rounded some ten times in this
  * file, each time by at most 2^-53 of its value. A box is skipped only if its distance exceeds the
  * limit by more than 2^-40 of this distance. So a query may return boxes that are not relevant;
- * queries of the models in these boxes then return no face. */
+ * later queries of the models in such boxes return no face. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -7,12 +7,12 @@
  * of the whole model. If the point is on no face and no cap, the winding numbers of all parts add
  * up to the winding number of the whole model. A point on a face or cap of a part is *doubtful*.
  * The point is on the surface of the whole model if a face that is not a cap contains it; a box
- * query for the point decides this exactly. Otherwise the point is on a cap. Then the point's
- * winding number is counted along a ray through the files `surface` of the parts, which have no
- * caps. The winding number is the number of faces where the ray leaves the solid, minus the number
- * of faces where the ray enters the solid. If a ray hits an edge or runs along a face, its
- * crossings are not counted, and a ray in another direction is cast. All queries use the same
- * sequence of directions. The winding number does not depend on the ray whose crossings are
+ * query for the point decides this exactly. Otherwise the point is on a cap, and its winding number
+ * is counted along a ray. The ray passes through the files `surface` of the parts, because these
+ * files have no caps. The winding number is the number of faces where the ray leaves the solid,
+ * minus the number of faces where the ray enters the solid. If a ray hits an edge or runs along a
+ * face, its crossings are not counted, and a ray in another direction is cast. All queries use the
+ * same sequence of directions. The winding number does not depend on the ray whose crossings are
  * counted.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */

@@ -4,10 +4,11 @@
  * First the root box of the grid is chosen. At every level in use, the coordinates of cell faces
  * must be doubles without rounding. Vertices are sorted by the octcode of their cell (the cell's
  * position on the curve) and, within a cell, by position, so that equal positions are neighbours.
- * Vertices without faces ("unreferenced") come after the others. Faces are sorted by the least of
- * their vertices' new indices. Sorting uses the mesh's workspace (arrays in memory or in temporary
- * files), so that a mesh may be larger than memory. The mesh's arrangement stores the source index
- * of each vertex and face. The result depends on the mesh alone, not on the number of threads. */
+ * Vertices without faces ("unreferenced") come after all other vertices. Faces are sorted by the
+ * least of their vertices' new indices. Sorting uses the mesh's workspace (arrays in memory or in
+ * temporary files), so that a mesh may be larger than memory. The mesh's arrangement stores the
+ * source index of each vertex and face. The result depends on the mesh alone, not on the number of
+ * threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* Computes winding numbers at the corners of cells. The winding number of a corner decides whether
- * the corner is inside the solid. The winding number of a cell without faces decides this for the
- * whole cell.
+ * the corner is inside the solid. The winding number of a cell without faces decides whether the
+ * whole cell is inside.
  *
  * In one cell, the winding numbers at two corners differ by the sum of the signed crossings of
  * faces along the cell's edges between the two corners. All corners are shifted by the same

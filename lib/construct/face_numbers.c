@@ -4,9 +4,9 @@
  * vertex gets the next index in the first face that uses it. So the new faces of a leaf (no earlier
  * leaf lists them) are one range in the file, and only the leaf's other faces need references. A
  * piece (a subtree that one thread builds) assigns indices to its *fresh* faces, which no earlier
- * piece lists. The first index of each piece is known before, so the pieces can be processed in any
- * order. Attributes move with their vertices and faces. format-spec/README.md describes the order.
- */
+ * piece lists. The first index of each piece is known in advance, so the pieces can be processed in
+ * any order. Attributes move with their vertices and faces. format-spec/README.md describes the
+ * order. */
 #include "core/strict_fp.h"
 
 #include "construct/construct_stages.h"

@@ -9,8 +9,8 @@
  * all faces of the component would be found. Instead, the pass finds the faces of the other
  * component whose boxes intersect the component's box; these faces suffice to find a contact. A
  * second pass compares the found faces with faces of other components. Both passes stop after a
- * number of steps that is proportional to the number of faces; then the components count as not
- * apart. `ebpo check` prints the counts; ebpo_measure uses ebpo_component_times. */
+ * number of steps that is proportional to the number of faces; in this case the components count as
+ * not apart. `ebpo check` prints the counts; ebpo_measure uses ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"

@@ -1,9 +1,8 @@
 /* Runs independent pieces of work on several threads, which take the pieces in ascending order. The
  * calling thread is one of these threads, and only the calling thread reports progress. Any thread
  * may run any piece, so results must not depend on the thread. If several pieces fail, the failure
- * of the piece with the lowest items is returned. This file starts all threads of the library, with
- * a fixed stack size. The threads compute with the default floating-point environment (fp_env.h).
- */
+ * of the first of these pieces is returned. This file starts all threads of the library, with a
+ * fixed stack size. The threads compute with the default floating-point environment (fp_env.h). */
 #include "core/parallel.h"
 
 #include <stdatomic.h>

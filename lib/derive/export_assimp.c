@@ -1,8 +1,8 @@
 /* Writes OBJ and STL through the exporters of the library assimp, which write float32 coordinates.
  * The blocks of a job (levels and the mesh, export_job.h) become one assimp scene. assimp may write
  * only one file, which has a temporary name until it is complete. If assimp opens another file for
- * writing, the export fails. A build without assimp does not compile this file, and the table in
- * export.c then has no function for these formats. */
+ * writing, the export fails. A build without assimp does not compile this file. In such a build,
+ * the table in export.c has no function for OBJ and STL. */
 #include "core/strict_fp.h"
 
 #include <assimp/cexport.h>

@@ -1,8 +1,9 @@
 /* Writes glTF 2.0, as one file (GLB) or as a text file with a .bin file beside it. Coordinates are
  * float32. If the model is far from the origin, its coordinates are relative to the middle of the
  * root cell, and this middle becomes the translation of the nodes. OBJ and STL are written by
- * assimp. Its glTF exporter is not used, because it joins vertices that are less than 1e-5 apart,
- * however small the model is. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4. */
+ * assimp. assimp's exporter for glTF is not used, because it joins vertices that are less than 1e-5
+ * apart, however small the model is. Source: Khronos, "glTF 2.0 Specification", sections 3 and
+ * 4. */
 #include "core/strict_fp.h"
 
 #include <float.h>

@@ -1,3 +1,8 @@
+/* Reads the colours of faces from a file's attributes. If vertices have colours, the corners of a
+ * face have the colours of its vertices. If only faces have colours, or if faces have colours and
+ * all vertices have the same colour, the corners have the colour of the face. The ranges of values
+ * that the file states show if all vertices have the same colour, so no values are read to find
+ * out. Source: format-spec/attributes.md. */
 #include "format/face_colours.h"
 
 #include <string.h>

@@ -1,3 +1,7 @@
+/* Reads the table of all patches of a simplified surface, and single patches when they are needed.
+ * A patch is the simplified surface of one node. The table is in memory; patches are read through a
+ * cache of chunks. The file is untrusted input, so every value is checked before it is used.
+ * Source: format-spec/surface.md. */
 #include "format/patch_table.h"
 
 #include <stdlib.h>

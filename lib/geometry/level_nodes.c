@@ -1,8 +1,8 @@
 /* Reads the nodes of an octree in memory: as levels, and as a table of children.
  *
- * Levels store node types in groups of eight siblings. A group is a word of 16 bits, two for each
- * sibling. A node is found by its rank: the number of preceding nodes of its type in its level.
- * Ranks are prefix sums of the counts in the groups, and are computed once for each level.
+ * Levels store node types in groups of eight siblings. A group is a word of 16 bits, with two bits
+ * for each sibling. A node is found by its rank: the number of preceding nodes of its type in its
+ * level. Ranks are prefix sums of the counts in the groups, and are computed once for each level.
  * Contradictory counts are rejected.
  *
  * The table of children stores four bytes for each node. A grid over its top levels replaces the

@@ -2,13 +2,13 @@
  *
  * A polygon is projected along the axis on which its normal is largest. A convex polygon becomes a
  * fan; every other polygon is cut ear by ear, with exact tests. The ear at a corner is the triangle
- * of this corner and its two neighbours. It may be cut off if no other corner blocks it, that is,
- * is in the way. A corner is tested again only when its neighbours have changed, or when the corner
- * that blocked its ear was cut off. A tree of boxes finds blocking corners. So an outline of n
- * corners is cut in about n log n steps, also for 100,000 corners and more. An outline that crosses
- * itself gets the triangles of least area in space. So does a chain, that is, the closed boundary
- * of a hole. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in
- * the boundary of a polyhedron", 1995. */
+ * of this corner and its two neighbours. The ear may be cut off if no other corner is in the way
+ * ("blocks" the ear). A corner is tested again only when its neighbours have changed, or when the
+ * corner that blocked its ear was cut off. A tree of boxes finds blocking corners. So an outline of
+ * n corners is cut in about n log n steps, also for 100,000 corners and more. An outline that
+ * crosses itself gets the triangles of least area in space. A closed chain, which is the boundary
+ * of a hole, also gets the triangles of least area. Sources: Meisters, "Polygons have ears", 1975;
+ * Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>

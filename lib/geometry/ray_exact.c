@@ -5,9 +5,9 @@
  * integers d in another unit. For the edge from corner j to corner k, opposite corner i, let s_i =
  * d . (e_j x e_k). The line intersects the plane at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2). The
  * line intersects the triangle if no s_i is positive or no s_i is negative. If the denominator is
- * 0, the line is parallel to the triangle, or the triangle has no area. Then the line and the
- * triangle can have common points only if all s_i are 0. In this case, the line and the triangle
- * are in one plane. */
+ * 0, the line is parallel to the triangle, or the triangle has no area. In both cases, the line and
+ * the triangle can have common points only if all s_i are 0. If all s_i are 0, the line and the
+ * triangle are in one plane. */
 #include "core/strict_fp.h"
 
 #include <float.h>

@@ -1,8 +1,8 @@
 /* Computes the relation of two faces: apart, touching, crossing or coplanar. The result is exact
  * for all finite doubles.
  *
- * If the planes of the faces intersect in a line, the corners of each face are reordered. Then the
- * first corner is alone on its side of the other plane. Each face intersects the line in an
+ * If the planes of the faces intersect in a line, the corners of each face are reordered so that
+ * the first corner is alone on its side of the other plane. Each face intersects the line in an
  * interval. Two orientation tests (ebpo_orient3d) compare the ends of the intervals (Devillers and
  * Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are projected
  * along an axis and compared in two dimensions. A face without area is the segment between its

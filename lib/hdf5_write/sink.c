@@ -2,9 +2,9 @@
  *
  * libhdf5 1.10 does not survive a failed write. After such a failure, it keeps unflushed data and
  * an id whose file is already released, and it fails when it uses this id at exit. So the driver
- * stores the first failure, and reports every write to libhdf5 as successful. libhdf5 then always
- * closes the file normally. ebpo_h5_sink_status and ebpo_h5_sink_close return the stored failure.
- */
+ * stores the first failure, and reports every write to libhdf5 as successful. In this way libhdf5
+ * always closes the file normally. ebpo_h5_sink_status and ebpo_h5_sink_close return the stored
+ * failure. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>

@@ -1,7 +1,7 @@
 /* Replaces all other files of lib/hdf5_write if the library is built without libhdf5
  * (-Dhdf5=disabled). The library then still reads files of this format. The functions in this file
- * fail, except the functions that close or finish a file or object: no file is ever open, so these
- * do nothing. */
+ * that close or finish a file or object do nothing, because no file is ever open. All other
+ * functions in this file fail. */
 #include <ebpo/rows.h>
 
 #include "core/error.h"

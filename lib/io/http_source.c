@@ -1,7 +1,7 @@
 /* Provides the source for a URL. Opening checks and copies the options; its first request returns
  * the file's size, version and first bytes (the head). Reads use the cache of ranges
- * (http_cache.c). If the server does not support ranges, it sends the whole file. Then the whole
- * file stays in memory; a file above a size limit is refused. */
+ * (http_cache.c). If the server does not support ranges, it sends the whole file. In this case the
+ * whole file stays in memory; a file above a size limit is refused. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -2,12 +2,12 @@
  *
  * The nodes are visited from the root down. Each node's envelope is cut from the parent's envelope
  * by the node's planes. A leaf's planes come from the file, or are derived from its faces
- * (construct/leaf_planes.c). If the file has neither, the leaf's envelope is the part of its
- * parent's envelope in its cell. First, one thread visits the nodes down to the split level. Then
- * all threads visit the independent subtrees below this level. The visit of such a part of the tree
- * is called a walk. The split level depends only on the tree, and the results of the walks are
- * joined in a fixed order (by level, then by octcode, the locational code). So the number of
- * threads does not change the result.
+ * (construct/leaf_planes.c). If the file has neither planes of leaves nor a mesh, the leaf's
+ * envelope is the intersection of the parent's envelope with the leaf's cell. First, one thread
+ * visits the nodes down to the split level. Then all threads visit the independent subtrees below
+ * this level. The visit of such a part of the tree is called a walk. The split level depends only
+ * on the tree, and the results of the walks are joined in a fixed order (by level, then by octcode,
+ * the locational code). So the number of threads does not change the result.
  *
  * Sections: polyhedra as triangles; the model, which a walk reads; leaves; colours of nodes; the
  * walk. */

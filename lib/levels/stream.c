@@ -1,7 +1,7 @@
 /* Delivers a file level by level, node by node in order of octcodes (locational codes), for
  * programs that show or process a model while it arrives.
  *
- * Of a completed level, only the node types and the colours stay in memory, and the planes if
+ * After a level is completed, only its node types and colours stay in memory, and its planes if
  * polygons are requested. These arrays are enough to find the nodes of the next level by a
  * depth-first walk from the root. The walk visits the groups (eight siblings) of a level, its nodes
  * of each type and its planes in the order in which the file stores them. So the position of an

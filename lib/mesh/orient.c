@@ -5,7 +5,7 @@
  * each closed patch outwards, or inwards if it bounds a cavity.)
  *
  * A face *runs against* another face of its patch if the orientations of the two faces are not
- * consistent. The root of a patch is its lowest face. */
+ * consistent. The root of a patch is its face with the lowest index. */
 #include "core/strict_fp.h"
 
 #include <math.h>

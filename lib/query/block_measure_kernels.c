@@ -1,8 +1,8 @@
 /* Measures blocks of floats for block_bounds.c, eight vertices at a time: the box of a block, and
  * how far its vertices extend along an axis and away from the axis.
  *
- * Compiled for several instruction sets (core/cpu.h), with the same operations in the same order.
- * Error bounds: docs/develop/bounds.md, "How bounding cylinders are measured". */
+ * This file is compiled for several instruction sets (core/cpu.h), with the same operations in the
+ * same order. Error bounds: docs/develop/bounds.md, "How bounding cylinders are measured". */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
-/* Kernels of the query "inside" (inside.c), for the faces that a leaf lists, eight faces at a time.
+/* Implements the kernels of the query "inside" (inside.c). They process the faces that a leaf
+ * lists, eight faces at a time.
  *
  * sum_crossings sums the crossings of the faces with a segment that is parallel to an axis. The
  * function uses single precision, or double precision in accels (acceleration structures of
@@ -11,8 +12,8 @@
  * called once for each leaf, during one of the first queries in this leaf. The comparisons of
  * find_reached_cell_faces are exact.
  *
- * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
- * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
+ * This file is compiled for several instruction sets with the same results (core/cpu.h). Error
+ * bounds: docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
 #include "core/strict_fp.h"
 
 #include <math.h>

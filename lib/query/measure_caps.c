@@ -1,6 +1,6 @@
-/* Bounds the volume of the convex hull of a loop (of border edges) by the volumes of two boxes. One
- * box is along the axes of coordinates. The other box is along the loop's vector area, and is thin
- * if the loop is nearly flat.
+/* Bounds the volume of the convex hull of a loop of border edges, by the volumes of two boxes that
+ * contain the loop. The sides of one box are parallel to the coordinate axes. One side of the other
+ * box is parallel to the loop's vector area, so this box is thin if the loop is nearly flat.
  *
  * Rounding. Points relative to the first point are at most `span` long. The axes are unit vectors
  * up to an error of 2^-50. So the products of these points with the axes have an error below 2^-49

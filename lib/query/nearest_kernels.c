@@ -1,12 +1,12 @@
-/* The kernel that finds the nearest face of one accel (acceleration structure of a subtree). The
- * kernel walks from node to node of the hierarchy over blocks of faces, eight children or eight
- * faces at a time, in single precision.
+/* Implements the kernel that finds the nearest face of one accel (acceleration structure of a
+ * subtree). The kernel walks from node to node of the hierarchy over blocks of faces, eight
+ * children or eight faces at a time, in single precision.
  *
  * The walk drops only nodes and faces that are certainly farther than the best upper bound. All
  * other faces become candidates, which nearest.c compares.
  *
- * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
- * docs/develop/bounds.md. */
+ * This file is compiled for several instruction sets with the same results (core/cpu.h). Error
+ * bounds: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>

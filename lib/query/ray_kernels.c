@@ -1,14 +1,14 @@
-/* The kernel that finds the hits of a ray. The kernel walks down the hierarchy over blocks of faces
- * of one accel (acceleration structure of a subtree, accel.h), and filters eight faces at a time,
- * in single precision.
+/* Implements the kernel that finds the hits of a ray. The kernel walks down the hierarchy over
+ * blocks of faces of one accel (acceleration structure of a subtree, accel.h), and filters eight
+ * faces at a time, in single precision.
  *
  * The kernel drops only faces that the ray certainly misses, or certainly hits beyond the limit of
  * t (a hit is at origin + t * direction). If the kernel reports a certain hit, the face is also hit
  * in exact arithmetic. All faces that are not dropped become candidates, which rays.c tests
  * exactly.
  *
- * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
- * docs/develop/bounds.md. */
+ * This file is compiled for several instruction sets with the same results (core/cpu.h). Error
+ * bounds: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>

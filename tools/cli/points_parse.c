@@ -1,4 +1,4 @@
-/* Parses the numbers of a block. */
+/* Parses the numbers of a block of input rows. */
 #include "cli/points_header.h"
 #include "cli/points_parse.h"
 

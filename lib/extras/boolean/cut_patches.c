@@ -2,11 +2,12 @@
  *
  * A patch is a set of triangles that are connected by edges of exactly two triangles. The two
  * triangles of such an edge separate the space around the edge into two sectors. So the winding
- * numbers of all operands are constant in front of a patch, and constant behind it. The same holds
- * for a component of whole faces (operand_mesh.h), so its listed faces are joined to one patch. The
- * winding numbers are computed exactly at an inner point of one triangle of the patch. The patch
- * bounds the result if the expression has different values on the two sides of the patch. This rule
- * covers coplanar faces, operands that touch, and operands that intersect themselves.
+ * numbers of all operands are constant in front of a patch, and constant behind it. The same is
+ * true for a connected component of whole faces, which no other face intersects (operand_mesh.h).
+ * So those faces of the component that are in the list of faces (face_list.h) are joined to one
+ * patch. The winding numbers are computed exactly at an inner point of one triangle of the patch.
+ * The patch bounds the result if the expression has different values on the two sides of the patch.
+ * This rule covers coplanar faces, operands that touch, and operands that intersect themselves.
  *
  * The boundary of a set is closed. So each edge occurs in the selected triangles equally often in
  * both directions. ebpo_cut_mesh_classify checks this property of the selected triangles. */

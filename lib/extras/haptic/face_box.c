@@ -1,6 +1,6 @@
-/* Loads the faces in a box around the proxy (the device's point, kept on the surface), with a tree
- * of boxes over the faces. A haptic step (one cycle of the force computation) reads no other
- * geometry.
+/* Loads the faces in a box around the proxy, with a tree of boxes over the faces. The proxy is the
+ * ball, point or tool that follows the device and stays outside the surface. A haptic step (one
+ * cycle of the force computation) reads no other geometry.
  *
  * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
  * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps

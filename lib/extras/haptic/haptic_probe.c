@@ -4,8 +4,8 @@
  * Certain bounds come from three sources: the faces of the current box, the exact result for a
  * recent position of the probe, and the first levels of the octree. The step returns the
  * intersection of these intervals. The side (EBPO_IN, EBPO_OUT) follows from the winding number,
- * which changes at each face that the probe crosses, by exact arithmetic. The side is EBPO_MAYBE if
- * the step reaches its limit of work before it finds the side. */
+ * which changes at each face that the probe crosses. Exact arithmetic finds these faces. The side
+ * is EBPO_MAYBE if the step reaches its limit of work before it finds the side. */
 #include "core/strict_fp.h"
 
 #include <math.h>

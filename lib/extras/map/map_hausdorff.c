@@ -5,9 +5,9 @@
  * middles of their edges. If a point moves, its distance from the model changes by at most the
  * length of the move. So the distance of each point of a triangle is at most the distance of a
  * corner plus the length of the longer edge at this corner. This sum is the triangle's bound. Faces
- * are searched in batches, and a batch in rounds. A round divides all triangles with great bounds.
- * The choice of these triangles does not depend on the number of threads, so the result does not
- * depend on this number, either. */
+ * are searched in batches, and a batch in rounds. A round divides all triangles whose bounds are
+ * large. The choice of these triangles does not depend on the number of threads, so the result does
+ * not depend on this number, either. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

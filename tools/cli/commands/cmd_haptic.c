@@ -1,5 +1,5 @@
-/* ebpo haptic: plays a haptic device at a steady rate, and measures the times of its haptic steps.
- */
+/* ebpo haptic: runs a recorded, simulated or real haptic device at a steady rate, and measures the
+ * times of the haptic steps. */
 #include <float.h>
 #include <math.h>
 #include <sched.h>

@@ -1,4 +1,4 @@
-/* ebpo recover: makes a new file from the readable parts of a damaged one. The tree is built again
+/* ebpo recover: makes a new file from the readable parts of a damaged file. The tree is built again
  * from a mesh, which is read from the file or from the source of the file. */
 #include <inttypes.h>
 #include <stdbool.h>

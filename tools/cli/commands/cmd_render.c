@@ -1,5 +1,5 @@
-/* ebpo render: draws a shaded picture of a level or of the model, or of several of these side by
- * side. */
+/* ebpo render: draws shaded pictures of levels or of the model, side by side if there are
+ * several. */
 #include "ebpo_config.h"
 
 #include <stddef.h>

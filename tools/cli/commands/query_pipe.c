@@ -1,5 +1,6 @@
-/* Threads take blocks of consecutive input rows, evaluate them, and write the results in the order
- * of the input. A slot holds a block in progress, and its results. */
+/* Evaluates queries by several threads: they take blocks of consecutive input rows, evaluate the
+ * rows, and write the results in the order of the input. A slot holds a block in progress, and its
+ * results. */
 #include "cli/commands/query_pipe.h"
 
 #include <fcntl.h>

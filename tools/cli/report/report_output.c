@@ -1,5 +1,5 @@
-/* Writes a report to a temporary folder, which then replaces `place`, the folder of the report. A
- * report is recognized by the names of its files. */
+/* Writes a report to a temporary folder. The complete folder replaces `place`, the folder of the
+ * report. An existing folder is replaced only if all its files have names of files of a report. */
 #include "cli/report/report_output.h"
 
 #include <dirent.h>

@@ -1,6 +1,6 @@
-/* Each connection has a thread and a slot. At most CONNECTIONS_MAX connections are open; others
- * wait in the queue of the socket. A client has HEAD_SECONDS for a request, and SEND_SECONDS for
- * each block of a response. */
+/* Runs an HTTP server. Each connection has a thread and a slot. At most CONNECTIONS_MAX connections
+ * are open; further connections wait in the queue of the socket. A client has HEAD_SECONDS for a
+ * request, and SEND_SECONDS for each block of a response. */
 #include "cli/serve/http_server.h"
 
 #include <arpa/inet.h>
