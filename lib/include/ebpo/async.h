@@ -16,7 +16,7 @@
  *     while ((status = ebpo_distance(context, p, NULL, &out, &error)) == EBPO_E_PENDING) {
  *         ebpo_async_needed(async, &range, &count, &error);
  *         for (size_t i = 0; i < count; i++)
- *             ...  fetch range[i], at the same time as the others; then:
+ *             ...  fetch range[i], at the same time as all other ranges, and then:
  *             ebpo_async_supply(async, range[i].offset, range[i].size, bytes, etag, &error);
  *     }
  *     ebpo_async_end(async, operation);

@@ -17,9 +17,9 @@
  * Results do not depend on the order of the models or on the machine. Results do not depend on
  * budgets either, with two exceptions: the pair of intersecting faces that ebpo_collide_first and
  * ebpo_collide_distance return, and distances within a tolerance. Every query supports partly
- * loaded models, of which only some subtrees are in memory, because of a budget or a cut level
- * (query.h). The envelope of a node is a convex polyhedron that contains the part of the solid in
- * the node's cell. docs/develop/collision.md explains the kinds of pairs.
+ * loaded models. A model is partly loaded if only some of its subtrees are in memory, because of a
+ * budget or a cut level (query.h). The envelope of a node is a convex polyhedron that contains the
+ * part of the solid in the node's cell. docs/develop/collision.md explains the kinds of pairs.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -556,9 +556,9 @@ typedef struct ebpo_level_result {
 /*
  * Computes guaranteed results from levels alone, without faces. Envelopes give a lower bound of the
  * distance, and nodes with faces give an upper bound. Solids intersect if a cell that is inside one
- * solid contains a point of the other. Reads no data, so it also works for models with only a few
- * levels in memory (a cut level). The search stops with the results known so far at the deadline,
- * or when the pairs of nodes need more memory than the collider's options allow.
+ * solid contains a point of the other solid. Reads no data, so it also works for models with only a
+ * few levels in memory (a cut level). The search stops with the results known so far at the
+ * deadline, or when the pairs of nodes need more memory than the collider's options allow.
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check).
  *

@@ -92,7 +92,7 @@ typedef struct ebpo_error_bound {
  * `hi` is a bound for the decoded half-spaces and includes all rounding errors. Therefore `hi`
  * exceeds the true value by at least about 1e-6 of a node's cell, or a few ulp of the coordinates.
  * The tolerance is not reached if the error bound is smaller than this excess, or if a node has
- * reached its limit of 65,536 distances. The bounds are then wider, but still certain.
+ * reached its limit of 65,536 distances. In these cases the bounds are wider, but still certain.
  *
  * The level's surface, for `mean` and `rms`, is the part of the envelopes' polygons that is in no
  * other envelope.

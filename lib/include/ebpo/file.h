@@ -843,7 +843,7 @@ typedef struct ebpo_attribute_facts {
     /* 1: each row is a list. 0: each row has one value for each column. */
     uint64_t list;
 
-    /* 1: the file has the range of the values. 0: it does not. */
+    /* 1: the file has the range of the values. 0: the file does not have the range. */
     uint64_t has_range;
 
     /* Minimum and maximum of all values, if has_range is 1. */
@@ -939,7 +939,8 @@ typedef struct ebpo_read_options {
 
     /*
      * 1: ebpo_file_read_mesh and ebpo_file_read_source_mesh also read attributes if the file has
-     * attributes. 0: they do not. Functions that read whole trees always read attributes.
+     * attributes. 0: these functions do not read attributes. Functions that read whole trees always
+     * read attributes.
      */
     uint64_t attributes;
 } ebpo_read_options;

@@ -1066,12 +1066,13 @@ typedef struct ebpo_mass {
     double integral_error, centroid_error;
 
     /*
-     * A surface with EBPO_PART_BORDER is measured with the caps that format-spec/border.md defines:
-     * one cap for each loop of the border. Other caps would change `integral` and the centroid of
-     * the winding number by at most these members (INFINITY: no bound). This holds if each other
-     * cap satisfies two conditions. First, it is in the convex hull of its loop. Second, it forms a
-     * closed mesh with the reversed cap of border.md, and the winding numbers of this mesh are -w,
-     * 0 or w, where w is the weight of the loop (border.md). 0 if the file has no EBPO_PART_BORDER.
+     * A surface with EBPO_PART_BORDER is measured with the caps that format-spec/border.md defines
+     * for each loop of the border. Other caps would change `integral` and the centroid of the
+     * winding number by at most these members (INFINITY: no bound). This is true if the other caps
+     * of each loop satisfy two conditions. First, they are in the convex hull of the loop. Second,
+     * they form a closed mesh with the reversed caps of border.md. All winding numbers of this mesh
+     * are -w, 0 or w, where w is the weight of the loop (border.md). 0 if the file has no
+     * EBPO_PART_BORDER.
      */
     double caps_integral, caps_centroid;
 } ebpo_mass;
