@@ -11,7 +11,7 @@
  * For a ray, the models whose boxes the ray may intersect are queried in the order of the
  * catalogue, each only up to the nearest hit so far. A hit is at the point origin + t direction. If
  * t overflows for several hits, t is computed again with the direction multiplied by a power of
- * two, which is exact. Then the hit with the smallest new t is the first one. */
+ * two, which is exact. The hit with the smallest new t is the first hit. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -6,9 +6,9 @@
  * (corner_windings.c). The nodes are visited depth first. Each visit returns the cell's corner
  * differences: the winding numbers at its corners minus the winding number at its lowest corner.
  * For a leaf, these differences are sums of the signed crossings of faces and caps with the edges
- * of the cell. The lowest corner of a child is also a corner of an earlier sibling (or the lowest
- * corner of the parent), so its winding number is known before the child is visited. Source:
- * format-spec/border.md. */
+ * of the cell. The lowest corner of a child is also a corner of an earlier sibling, or the lowest
+ * corner of the parent. So the winding number of this corner is known before the child is visited.
+ * Source: format-spec/border.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -9,9 +9,9 @@
  * number at its corner 0, the lowest corner. The corner differences of a gray node are computed
  * from the corner differences of its children: they are added along the children's edges. The
  * root's lowest corner is outside the model: its winding number is 0. This method replaces the
- * special cases of BP 2008, 3.4.1.1. If two paths to a corner give different winding numbers, the
- * mesh does not balance (some edge is not used equally often in both directions), so it does not
- * bound a solid. */
+ * special cases of BP 2008, 3.4.1.1. If two paths to a corner give different winding numbers, some
+ * edge of the mesh is not used equally often in both directions. Such a mesh does not bound a
+ * solid. */
 #include "core/strict_fp.h"
 
 #include <string.h>

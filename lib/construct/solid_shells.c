@@ -1,16 +1,17 @@
 /* Finds out if the closed components of a mesh are apart, and which of them bound the solid. A
  * shell is a closed component with a volume.
  *
- * Two components are apart if their faces have no common point. Then each component is completely
- * inside or outside the other one, and the winding numbers on both sides of its faces follow from
- * the nesting of components (which component is inside which). Faces are compared only if the boxes
- * of components intersect. A first pass finds, for each component, the faces whose boxes intersect
- * the box of another component. A larger box that contains the component's box is skipped, because
- * all faces of the component would be found. Instead, the pass finds the faces of the other
- * component whose boxes intersect the component's box; these faces suffice to find a contact. A
- * second pass compares the found faces with faces of other components. Both passes stop after a
- * number of steps that is proportional to the number of faces; in this case the components count as
- * not apart. `ebpo check` prints the counts; ebpo_measure uses ebpo_component_times. */
+ * Two components are apart if their faces have no common point. If all components are apart, each
+ * component is completely inside or outside each other component. The nesting of components (which
+ * component is inside which) then gives the winding numbers on both sides of all faces. Faces are
+ * compared only if the boxes of components intersect. A first pass finds, for each component, the
+ * faces whose boxes intersect the box of another component. A larger box that contains the
+ * component's box is skipped, because all faces of the component would be found. Instead, the pass
+ * finds the faces of the other component whose boxes intersect the component's box; these faces
+ * suffice to find a contact. A second pass compares the found faces with faces of other components.
+ * Both passes stop after a number of steps that is proportional to the number of faces; in this
+ * case the components count as not apart. `ebpo check` prints the counts; ebpo_measure uses
+ * ebpo_component_times. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"

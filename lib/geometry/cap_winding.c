@@ -3,7 +3,7 @@
  *
  * Bounds of w in doubles are refined until the rule gives the same result for all values between
  * the bounds. Doubles do not suffice if w equals a boundary s of the rule, or nearly so; s is an
- * even integer plus or minus the threshold t. Then the sign of w - s is found without any
+ * even integer plus or minus the threshold t. In this case, the sign of w - s is found without any
  * arctangent. Half angles are arguments of complex numbers (geometry/solid_angle.h). So the product
  * z of these numbers, each to the power of its weight, has the argument 2 pi (w - k) up to whole
  * turns. Because w is close to s,

@@ -9,9 +9,9 @@
  * positions are needed.
  *
  * Half-spaces and polygons are converted from cell coordinates to model coordinates. The offset of
- * a half-space is enlarged by a bound of the rounding errors, so each point of the cell in the
- * half-space of a plane's code is also in the delivered half-space. Points on cell faces get the
- * faces' exact coordinates, so that neighbours agree to the last bit. */
+ * a half-space is enlarged by a bound of the rounding errors. So each point of the cell that is in
+ * the exact half-space (of the plane code) is also in the delivered half-space. Points on cell
+ * faces get the faces' exact coordinates, so that neighbours agree to the last bit. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

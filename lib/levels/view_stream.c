@@ -1,12 +1,13 @@
 /* Delivers a view: one group of siblings after the other, in the order of the view's priority,
  * until the view's limits are reached.
  *
- * The cut of the view is the set of the delivered nodes without delivered children. The frontier is
- * the set of gray nodes of the cut, in the order in which they are refined, that is, replaced by
- * their children (view_cut.h). Each step takes the first node of the frontier and reads the group
- * of its children. If faces are requested, it also reads the faces of the leaves among them. Then
- * it returns these siblings one by one. After the last sibling, the siblings replace their parent
- * in the cut. When the observer changes, the frontier is sorted again; delivered nodes stay.
+ * The cut of the view is the set of the delivered nodes without delivered children. To refine a
+ * node is to replace it by its children. The frontier is the set of gray nodes of the cut, in the
+ * order in which they are refined (view_cut.h). Each step takes the first node of the frontier and
+ * reads the group of its children. If faces are requested, it also reads the faces of the leaves
+ * among them. Then it returns these siblings one by one. After the last sibling, the siblings
+ * replace their parent in the cut. When the observer changes, the frontier is sorted again;
+ * delivered nodes stay.
  *
  * For remote files, the chunks that a group needs are requested in one batch. If the memory for
  * chunks is sufficient, the batch also has the chunks of the groups that follow. */

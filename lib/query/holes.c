@@ -9,12 +9,12 @@
  *
  * The functions here first compute bounds of w_D that are valid for all points of a cell. These
  * bounds often decide for the whole cell. If the error of these bounds is small, no cap touches the
- * cell, so k changes in the cell at faces only. If |w_D| is also below t and below 1 - t, the rule
- * for w_S gives the same result as the rule for k, in this cell and in all cells below it. If |w_D|
- * may be greater in a white node (a cell without faces), the whole cell still has one result if the
- * bounds of k + w_D are on one side of the rule's boundary. Near a cap, the value of w_S at the
- * cell's centre and a bound of its variation in the cell decide. Points of the remaining cells are
- * decided one by one (cap_winding.c).
+ * cell, so k changes in the cell at faces only. If |w_D| is also below t and below 1 - t, the rules
+ * for w_S and for k give the same result in this cell and in all cells below it. In a white node (a
+ * cell without faces), |w_D| may be greater. The whole cell still has one result if the bounds of k
+ * + w_D are on one side of the rule's boundary. Near a cap, the value of w_S at the cell's centre
+ * and a bound of its variation in the cell decide. Points of the remaining cells are decided one by
+ * one (cap_winding.c).
  *
  * If a disc is far from a cell, the angle at which the disc appears is bounded once for the cell
  * and all cells below it. The other discs are near. Each cell has a list of its near discs, which

@@ -7,14 +7,14 @@
  *
  * Proof that the planes of some leaves decide: a point is below a plane if n . xi < d (leaf_plane).
  * Let P be the set of points of the cell below all planes of the leaf's faces. Suppose that every
- * face is in the closure of P (no corner of a face is above a plane). Then each face is on the
- * boundary of P, so the winding number is constant within P's interior. The winding number is also
- * constant in each component of the cell outside P's closure. Every such component contains a
- * corner of the cell, because a point above plane i can move to the corner that is farthest along
- * that plane's normal. On the whole way, the point is above plane i. So if all corners of the cell
- * outside P's closure have the same winding number, and the winding number at one point of P's
- * interior is known, the planes decide. The same is true with "above" in place of "below"
- * (concave). */
+ * face is in the closure of P (no corner of a face is above a plane). Under this assumption, each
+ * face is on the boundary of P, so the winding number is constant within P's interior. The winding
+ * number is also constant in each component of the cell outside P's closure. Every such component
+ * contains a corner of the cell, because a point above plane i can move to the corner that is
+ * farthest along that plane's normal. On the whole way, the point is above plane i. So if all
+ * corners of the cell outside P's closure have the same winding number, and the winding number at
+ * one point of P's interior is known, the planes decide. The same is true with "above" in place of
+ * "below" (concave). */
 #include "core/strict_fp.h"
 
 #include <math.h>

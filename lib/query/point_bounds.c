@@ -2,9 +2,9 @@
  * the hierarchy over faces.
  *
  * If the point is at least 16 sizes of the model's box away (a far point), doubles hardly
- * distinguish distances. Then the bounds are bounds of keys, which have the same order as distances
- * (point_bounds.h). Variables are named as in point_bounds.h: y, h (half), u (toward). Rounding:
- * docs/develop/bounds.md, "Points far away". */
+ * distinguish distances. For a far point, keys replace distances, and the bounds are bounds of
+ * keys. Keys have the same order as distances (point_bounds.h). Variables are named as in
+ * point_bounds.h: y, h (half), u (toward). Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>

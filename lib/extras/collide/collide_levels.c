@@ -4,9 +4,10 @@
  * Pairs of nodes are visited in the order of the gaps of their envelopes, the least first
  * (subtree_search.h). The gap of a pair is a lower bound of the distance of the models. If both
  * nodes have faces, the pair also gives an upper bound. A black cell belongs entirely to the
- * interior of its solid. So the models certainly have a common point if a black cell of one model
- * contains a point of a black cell of the other model, or contains all of a cell that has faces of
- * the other model. A search runs in one thread. */
+ * interior of its solid. So each of two conditions shows that the models certainly have a common
+ * point. First, a black cell of one model and a black cell of the other model have a common point.
+ * Second, a black cell of one model contains a whole cell of the other model, and this cell has
+ * faces. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
