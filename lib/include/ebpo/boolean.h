@@ -94,7 +94,7 @@ typedef struct ebpo_boolean ebpo_boolean;
  * Several nodes may refer to the same node or operand. Both arrays are copied; the models must
  * outlive the expression.
  *
- * EBPO_E_ARGUMENT: an index is out of range, or a node refers to a node that is not before it; an
+ * EBPO_E_ARGUMENT: an index is out of range; a node refers to itself or to a later node; an
  * operation, box, plane or pose (ebpo_pose_check) is not valid; or there is a complement, but no
  * box. EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
  * surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or
@@ -313,8 +313,8 @@ typedef struct ebpo_boolean_mesh_options {
     ebpo_progress progress;
 
     /*
-     * True: coordinates of the mesh are doubles. False: coordinates are floats if the coordinates
-     * of all operands are floats and the result is in the range of floats; else they are doubles.
+     * True: coordinates of the mesh are doubles. False: coordinates are floats if all operands have
+     * floats and the result is in the range of floats. Otherwise they are doubles.
      */
     bool doubles;
 
