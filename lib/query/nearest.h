@@ -98,12 +98,15 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  * that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep bounds
  * are read together, after queries have spent about as much time on loading subtrees without need
  * as reading deep bounds takes. So they delay neither opening a model nor queries along a path.
- * They are used for local files only, because for remote files the additional request would cost as
- * much as it saves. Their memory counts towards the quota of skeletons. */
+ * For a remote file, a query reads them before it loads many subtrees: as soon as they have a small
+ * part of the bytes of the subtrees that may have the nearest face. For 12 points deep inside a
+ * model of 4.3 million faces, a query takes 302 requests and 7.40 MB without deep bounds, 106
+ * requests and 2.69 MB with them. Their memory counts towards the quota of skeletons. */
 
 /* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
- * levels below the cut level. Reports no error: if the file cannot be read, later queries fail. */
-void ebpo_deep_bounds_make(ebpo_model *model);
+ * levels below the cut level. Fails only if bytes are not available yet (EBPO_E_PENDING); if the
+ * file cannot be read, later queries fail. */
+EBPO_MUST_USE ebpo_status ebpo_deep_bounds_make(ebpo_model *model, ebpo_error *error);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
  * bounds when enough such subtrees have been loaded. Any thread. */
