@@ -93,19 +93,21 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
 
 /* --- deep bounds ---
  *
- * Deep bounds are nodes of the first levels below the cut level, at which the roots of subtrees
- * are. These nodes have envelopes but no faces, so each takes a few bytes. For a subtree that was
- * never loaded, deep bounds give a better bound than the envelope of the subtree's root. (For a
- * subtree that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep
- * bounds are read together. The deep bounds are read when queries have loaded many subtrees without
- * need: so many that these loads took at least as long as reading the deep bounds takes. So deep
- * bounds delay neither opening a model nor queries along a path. Deep bounds are used for local
- * files only, because for remote files the additional request would cost as much as it saves. The
- * memory of deep bounds counts towards the quota of skeletons. */
+ * Deep bounds are nodes of the first levels below the cut level (at which the roots of subtrees
+ * are), with their envelopes but without faces: a few bytes for each node. For a subtree that was
+ * never loaded, they give a better bound than the envelope of the subtree's root. (For a subtree
+ * that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep bounds
+ * are read together, after queries have spent about as much time on loading subtrees without need
+ * as reading deep bounds takes. So they delay neither opening a model nor queries along a path.
+ * For a remote file, a query reads them before it loads many subtrees: as soon as they have a small
+ * part of the bytes of the subtrees that may have the nearest face. For 12 points deep inside a
+ * model of 4.3 million faces, a query takes 302 requests and 7.40 MB without deep bounds, 106
+ * requests and 2.69 MB with them. Their memory counts towards the quota of skeletons. */
 
 /* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
- * levels below the cut level. Reports no error: if the file cannot be read, later queries fail. */
-void ebpo_deep_bounds_make(ebpo_model *model);
+ * levels below the cut level. Fails only if bytes are not available yet (EBPO_E_PENDING); if the
+ * file cannot be read, later queries fail. */
+EBPO_MUST_USE ebpo_status ebpo_deep_bounds_make(ebpo_model *model, ebpo_error *error);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
  * bounds when enough such subtrees have been loaded. Any thread may call this function. */

@@ -5,10 +5,10 @@
  * lower bounds of their distance. The search ends when the next bound is beyond the best face. So a
  * subtree is loaded only if its bound is at most the result. This is true whichever subtrees are in
  * memory. If a subtree was loaded before, its bound comes from its skeleton (upper nodes of its
- * hierarchy over faces, skeleton.c). If a subtree was never loaded, its bound comes from the
- * envelopes of the first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are
- * read after queries have loaded many subtrees that they would not have needed with better bounds.
- */
+ * hierarchy over faces, skeleton.c). If it never was, its bound comes from the envelopes of the
+ * first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are read after queries
+ * have loaded many subtrees that they would not have needed with better bounds. For a remote file,
+ * they are read before a query loads many subtrees. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -66,30 +66,40 @@ enum { NEW_NEEDED = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
-/* Reads the deep bounds of the levels down to `level`. Returns false if the quota of skeletons is
- * too small. */
-static bool read_levels(ebpo_model *m, int level)
+/* Returns the last level of deep bounds. */
+static int last_deep_level(const ebpo_model *m)
+{
+    int level = m->top->cut_level + DEEP_LEVELS, last = m->info->level_count - 1;
+    return level < last ? level : last;
+}
+
+/* Reads the deep bounds of the levels down to `level`. Returns EBPO_E_LIMIT if the quota of
+ * skeletons is too small. */
+static ebpo_status read_levels(ebpo_model *m, int level, ebpo_error *error)
 {
     uint64_t estimate = ebpo_top_envelopes_estimate(m->info, level);
     ebpo_top *deep = NULL;
     if (!ebpo_skeletons_take(m->skeletons, estimate))
-        return false;
-    if (ebpo_top_read_envelopes(&deep, m->file, level, m->options.threads, NULL) != EBPO_OK)
+        return EBPO_E_LIMIT;
+    ebpo_status status = ebpo_top_read_envelopes(&deep, m->file, level, m->options.threads, error);
+    if (status != EBPO_OK)
         deep = NULL;
     ebpo_skeletons_give_back(m->skeletons, estimate - (deep ? deep->bytes : 0));
     atomic_store_explicit(&m->deep, deep, memory_order_release);
-    return true;
+    return status == EBPO_E_LIMIT ? EBPO_OK : status;
 }
 
-void ebpo_deep_bounds_make(ebpo_model *m)
+ebpo_status ebpo_deep_bounds_make(ebpo_model *m, ebpo_error *error)
 {
-    int cut = m->top->cut_level, level = cut + DEEP_LEVELS;
-    if (level > m->info->level_count - 1)
-        level = m->info->level_count - 1;
+    ebpo_status status = EBPO_E_LIMIT;
     if (!m->skeletons || atomic_exchange(&m->deep_begun, true))
-        return;
-    while (level > cut && !read_levels(m, level))
-        level--;
+        return EBPO_OK;
+    for (int level = last_deep_level(m); level > m->top->cut_level && status == EBPO_E_LIMIT;
+         level--)
+        status = read_levels(m, level, error);
+    if (status == EBPO_E_PENDING)
+        m->deep_begun = false;
+    return status == EBPO_E_PENDING ? status : EBPO_OK;
 }
 
 void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
@@ -98,7 +108,7 @@ void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
         return;
     uint64_t more = loaded - NEW_NEEDED;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
-        ebpo_deep_bounds_make(m);
+        (void)!ebpo_deep_bounds_make(m, NULL); /* of a local file: never pending */
 }
 
 /* A search for the least lower bound among the deepest nodes of the deep bounds. */
@@ -250,29 +260,57 @@ static bool is_in_memory(const ebpo_context *c, uint32_t below)
            ebpo_cache_has(c->model->cache, ebpo_context_key(c, below));
 }
 
-/* Before a subtree of a remote file is entered, sends prefetch hints for this subtree and for other
- * new subtrees that the search probably needs, so that one round trip fetches all of them. The
- * distance that the search will find is between the bound of this subtree and the limit. The
- * subtrees with bounds in the first 3/16 of this interval are requested. For 60 points anywhere in
- * the box of a model of 4.3 million faces, a query takes 11.5 round trips and 999 kB without these
- * hints. With hints for 3/16 of the interval, a query takes 6.9 round trips and 1,040 kB; with
- * hints for 1/2, a query takes 6.0 round trips and 1,103 kB. For far points, whose bounds are keys
- * (point_bounds.h), no hints are sent. */
+/* Returns the root node of the subtree top->below[below]. */
+static ebpo_node node_below(const ebpo_model *m, uint32_t below)
+{
+    ebpo_node node = m->top->below[below];
+    node.entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, below);
+    return node;
+}
+
+/* Returns true if a subtree is new, was not searched by this query, and may have a face within
+ * `limit`. */
+static bool is_needed(const searching *g, uint32_t below, double limit)
+{
+    const ebpo_model *m = g->c->model;
+    ebpo_node node = node_below(m, below);
+    return !is_searched(g->c, below) && !ebpo_skeletons_find(m->skeletons, below) &&
+           bound_below_cut(&g->ranking, &node, 0, limit) <= limit;
+}
+
+/* Lists the new subtrees other than `below` that this query has not searched and that may have a
+ * face within `limit`. Returns their number. *all: false if there may be more of them. */
+static unsigned list_needed(const searching *g, uint32_t below, double limit,
+                            uint32_t out[EBPO_CACHE_AHEAD], bool *all)
+{
+    uint64_t near[EBPO_CACHE_AHEAD];
+    unsigned found = ebpo_subtrees_near(g->c->model, g->n->p, limit, near), count = 0;
+    for (unsigned i = 0; i < found; i++)
+        if (near[i] != below && is_needed(g, (uint32_t)near[i], limit))
+            out[count++] = (uint32_t)near[i];
+    *all = found < EBPO_CACHE_AHEAD;
+    return count;
+}
+
+/* Before a subtree of a remote file is entered, sends prefetch hints for it and for other new
+ * subtrees that the search probably needs, so that one round trip fetches all of them. The result
+ * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
+ * first 3/16 of this interval are requested (in the first half, if there are deep bounds). For 60
+ * points anywhere in the box of a model of 4.3 million faces, a query takes 11.5 round trips and
+ * 999 kB without these hints, 6.9 and 1,040 kB with 3/16, 6.0 and 1,103 kB with 1/2. For far
+ * points, whose bounds are keys (point_bounds.h), no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
-    double limit = g->n->found ? lower + (g->n->limit - lower) * 0.1875 : lower;
+    double share = c->model->deep ? 0.5 : 0.1875;
+    double limit = g->n->found ? lower + (g->n->limit - lower) * share : lower;
     if (g->ranking.far || limit <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
         is_in_memory(c, below))
         return;
-    uint64_t near[EBPO_CACHE_AHEAD];
     uint32_t hinted[EBPO_CACHE_AHEAD + 1] = { below };
-    unsigned found = ebpo_subtrees_near(c->model, g->n->p, limit, near), count = 1;
-    for (unsigned i = 0; i < found; i++)
-        if (near[i] != below && !is_searched(c, (uint32_t)near[i]) &&
-            !ebpo_skeletons_find(c->model->skeletons, (uint32_t)near[i]))
-            hinted[count++] = (uint32_t)near[i];
-    g->hinted = found < EBPO_CACHE_AHEAD ? limit : lower;
+    bool all;
+    unsigned count = 1 + list_needed(g, below, limit, hinted + 1, &all);
+    g->hinted = all ? limit : lower;
     ebpo_context_hint(c, hinted, count);
 }
 
@@ -323,14 +361,6 @@ static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skele
 {
     return g->ranking.far ? ebpo_skeleton_far_bounds(k, g->ranking.far, g->n->key_limit)
                           : ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
-}
-
-/* Returns the root node of the subtree top->below[below]. */
-static ebpo_node node_below(const ebpo_model *m, uint32_t below)
-{
-    ebpo_node node = m->top->below[below];
-    node.entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, below);
-    return node;
 }
 
 /* Adds the owned faces of a subtree to the queue, unless this query has already done that. `lower`:
@@ -450,11 +480,38 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
     return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
+/* Returns true if the deep bounds have less than a quarter of the bytes of the subtrees that this
+ * search may have to load without them. (With deep bounds, it loads about a third.) */
+static bool deep_bounds_pay(const searching *g)
+{
+    uint32_t needed[EBPO_CACHE_AHEAD];
+    const ebpo_model *m = g->c->model;
+    bool all;
+    unsigned subtrees = list_needed(g, UINT32_MAX, g->n->limit, needed, &all);
+    ebpo_hints levels = EBPO_HINTS_INIT(m->file);
+    for (int level = last_deep_level(m); level > m->top->cut_level; level--)
+        ebpo_hint_level(&levels, level, EBPO_PART_MESH);
+    double subtree_bytes = (double)m->file->in.source.size / (double)m->top->below_count;
+    return (double)ebpo_hints_bytes(&levels) < 0.25 * subtree_bytes * (double)subtrees;
+}
+
+/* For a remote file, reads deep bounds as soon as they pay. */
+static ebpo_status improve_bounds(searching *g, ebpo_error *error)
+{
+    ebpo_model *m = g->c->model;
+    bool wanted = g->n->found && !g->ranking.far && !m->deep_begun && m->skeletons &&
+                  ebpo_input_prefetches(&m->file->in);
+    return wanted && deep_bounds_pay(g) ? ebpo_deep_bounds_make(m, error) : EBPO_OK;
+}
+
 /* Handles a subtree without skeleton that leaves the queue for the first time. If deep bounds
  * increase the subtree's bound, the subtree goes back to the queue. Otherwise the subtree is
  * searched. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
+    ebpo_status status = improve_bounds(g, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
     if (all.lower > ebpo_nearest_limit(g->n))
         return EBPO_OK;

@@ -98,6 +98,45 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
     return isnan(best) ? 0 : best;
 }
 
+/* Shortens [t[0], t[1]] to the part that is not certainly outside the half-space a + b t <= 0. `a`
+ * and `b` were reduced by their errors. */
+static void clip_interval(double a, double b, double t[2])
+{
+    double end = -a / b;
+    if (!isfinite(a) || !isfinite(b) || isnan(end))
+        return;
+    if (b > 0)
+        t[1] = fmin(t[1], end + fabs(end) * 0x1p-50);
+    else if (b < 0)
+        t[0] = fmax(t[0], end - fabs(end) * 0x1p-50);
+    else if (a > 0)
+        t[1] = -INFINITY;
+}
+
+bool ebpo_ray_may_enter(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
+                        const double origin[3], const double direction[3], double begin, double end)
+{
+    /* smaller slopes may have lost accuracy by underflow */
+    static const double least_slope = 0x1p-900;
+    double low[3], size[3], xi[3], step[3], t[2] = { begin, end };
+    cell_size(box, cell, low, size);
+    for (int k = 0; k < 3; k++) {
+        xi[k] = (origin[k] - low[k]) / size[k];
+        step[k] = direction[k] / size[k];
+    }
+    for (uint32_t i = 0; i < count && t[0] <= t[1]; i++) {
+        int32_t n[3];
+        double error, value = plane_value(xi, codes[i], n, &error), slope = 0, greatest = 0;
+        for (int k = 0; k < 3; k++) {
+            slope += 4096.0 * n[k] * step[k];
+            greatest += fabs(4096.0 * n[k] * step[k]);
+        }
+        if (greatest >= least_slope)
+            clip_interval(value - error, slope - greatest * 0x1p-48, t);
+    }
+    return t[0] <= t[1];
+}
+
 double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
 {
     double low[3], size[3], d[3];

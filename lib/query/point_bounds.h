@@ -19,6 +19,12 @@ bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *co
  * (`count` plane codes). Once a bound is beyond `enough`, no better bound is searched for. */
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
                               uint32_t count, const double p[3], double enough);
+/* Returns false if the points origin + t direction with `begin` <= t <= `end` are certainly not in
+ * the part of the cell in all half-spaces (`count` plane codes). 0 <= `begin`. The points must be
+ * in the cell, except for rounding. */
+bool ebpo_ray_may_enter(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
+                        const double origin[3], const double direction[3], double begin,
+                        double end);
 /* Returns an upper bound of the distance of p to the farthest point of the cell, and to any face
  * that the cell's node lists. (Such a face has a point that is at most 1/256 of the cell's size
  * outside the cell: format-spec, section 7.) */

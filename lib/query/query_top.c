@@ -200,6 +200,15 @@ static void shrink_all(reading *r)
     shrink_array(&t->below_planes, &r->below_planes_capacity, r->below, sizeof *t->below_planes);
 }
 
+/* Sends prefetch hints for levels 0 to `last`, without the arrays of omitted parts. */
+static void hint_levels(const ebpo_file *file, int last, uint32_t omitted_parts)
+{
+    ebpo_hints hints = EBPO_HINTS_INIT(file);
+    for (int level = 0; level <= last; level++)
+        ebpo_hint_level(&hints, level, omitted_parts);
+    ebpo_hint_all(&hints);
+}
+
 static ebpo_status read_top(ebpo_top **out, const ebpo_file *file, int cut_level, unsigned threads,
                             bool envelopes, ebpo_error *error)
 {
@@ -213,8 +222,9 @@ static ebpo_status read_top(ebpo_top **out, const ebpo_file *file, int cut_level
     };
     ebpo_status status = EBPO_OK;
     ebpo_read_options read = ebpo_read_threads(threads);
+    read.omitted_parts = envelopes ? r.info->parts & EBPO_PART_MESH : 0;
     ebpo_hint_top(file);
-    ebpo_file_prefetch_levels(file, 0, cut_level);
+    hint_levels(file, cut_level, (uint32_t)read.omitted_parts);
     for (int number = 0; number <= cut_level && status == EBPO_OK; number++) {
         ebpo_level level;
         status = ebpo_file_read_level(file, number, &read, &level, error);

@@ -34,6 +34,25 @@ struct ebpo_ray_found {
     ebpo_ray_intersection intersection;
 };
 
+/* Maximum number of subtrees that a round requests: some megabytes of data. */
+enum { MISSING_MAX = 128 };
+
+/* State of a subtree in rounds. MISSING: the next hint requests it. PENDING: its bytes were
+ * requested and are not available yet. */
+typedef enum subtree_state {
+    SUBTREE_UNKNOWN,
+    SUBTREE_MISSING,
+    SUBTREE_REQUESTED,
+    SUBTREE_PENDING
+} subtree_state;
+
+/* The subtrees of a remote file that rays request together, round by round (cast_in_rounds). */
+typedef struct ray_rounds {
+    uint8_t *state; /* [top->below_count] */
+    uint32_t missing[MISSING_MAX];
+    unsigned missing_count;
+} ray_rounds;
+
 /* A query with one ray. */
 typedef struct casting {
     ebpo_context *context; /* EBPO_WANTS_ALL: the hits are in context->unsorted_hits */
@@ -42,6 +61,8 @@ typedef struct casting {
     ebpo_ray_sides sides; /* only hits of these sides of faces count */
     double limit;         /* hits with a greater t are not needed; decreases during the search */
     bool done;            /* the search is complete */
+    ray_rounds *rounds;   /* the rounds of rays through a remote file; or NULL */
+    bool waits;           /* the ray waits for the next round */
     bool no_memory;
     uint64_t count;       /* number of hits that are kept */
     ebpo_ray_found first; /* EBPO_WANTS_FIRST: the first hit so far, if count > 0 */
@@ -57,7 +78,8 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
     c->ray.t_max = c->limit = t_max;
     c->wants = wants;
     c->sides = sides;
-    c->done = c->no_memory = false;
+    c->done = c->waits = c->no_memory = false;
+    c->rounds = NULL;
     c->count = 0;
 }
 
@@ -346,9 +368,10 @@ static inline const char *ray_fault(const ebpo_segment *ray)
 }
 
 /* Returns false if the ray misses the box [low, high], enlarged by `slack`, for all t in 0 ..
- * limit. *enter: t where the ray enters the box. */
+ * limit. *enter, *leave: t where the ray enters and leaves the box; *leave is at most `limit`. */
 static bool intersects_box(const double origin[3], const double direction[3], double limit,
-                           const double low[3], const double high[3], double slack, double *enter)
+                           const double low[3], const double high[3], double slack, double *enter,
+                           double *leave)
 {
     double from = 0, to = limit;
     for (int k = 0; k < 3; k++) {
@@ -363,6 +386,7 @@ static bool intersects_box(const double origin[3], const double direction[3], do
         to = fmin(to, fmax(t0, t1) + fabs(fmax(t0, t1)) * 0x1p-50);
     }
     *enter = from;
+    *leave = to;
     return from <= to;
 }
 
@@ -400,34 +424,71 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     }
 }
 
-/* Returns false only if the ray certainly does not enter the node's cell at a t of 0 to the limit.
- */
-static bool intersects_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
+/* Returns true if the ray may enter the node's cell before its limit (conservative). *enter,
+ * *leave: values of t at the cell's boundary. */
+static bool intersects_cell(const casting *c, const ebpo_box *box, const ebpo_node *node,
+                            double *enter, double *leave)
 {
-    double low[3], high[3], slack = 0, enter;
+    double low[3], high[3], slack = 0;
     ebpo_cell_bounds(box, node->cell, low, high);
     for (int k = 0; k < 3; k++)
         slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
-    return intersects_box(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
+    return intersects_box(c->ray.origin, c->ray.direction, c->limit, low, high, slack, enter,
+                          leave);
 }
 
 /* Returns true if a hit may be in the node's cell (ebpo_matters_fn). */
 static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
-    return intersects_cell(user, box, node);
+    double enter, leave;
+    return intersects_cell(user, box, node, &enter, &leave);
+}
+
+/* Returns true if a hit may be in the node's envelope. */
+static bool intersects_envelope(const casting *c, const ebpo_box *box, const ebpo_node *node)
+{
+    uint32_t count;
+    double enter, leave;
+    const uint32_t *codes = ebpo_model_planes(c->context->model, node, &count);
+    return intersects_cell(c, box, node, &enter, &leave) &&
+           ebpo_ray_may_enter(box, node->cell, codes, count, c->ray.origin, c->ray.direction, enter,
+                              leave);
+}
+
+/* Returns true if the ray may search a subtree now. In a round (cast_in_rounds), a subtree that is
+ * neither in memory nor requested yet is marked, and the ray goes on in the next round. */
+static bool may_search(casting *c, uint32_t below)
+{
+    const ebpo_model *m = c->context->model;
+    ray_rounds *r = c->rounds;
+    if (!r || r->state[below] == SUBTREE_REQUESTED || ebpo_context_has_pinned(c->context, below) ||
+        ebpo_cache_has(m->cache, ebpo_context_key(c->context, below)))
+        return true;
+    if (r->state[below] == SUBTREE_UNKNOWN && r->missing_count < MISSING_MAX) {
+        r->state[below] = SUBTREE_MISSING;
+        r->missing[r->missing_count++] = below;
+    }
+    c->waits = true;
+    c->done = c->wants != EBPO_WANTS_ALL; /* for all hits, marks all subtrees on the ray's way */
+    return false;
 }
 
 /* Searches all subtrees at or below a node. */
 static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
-    if (c->done || ebpo_node_is_uniform(&node) || !intersects_cell(c, box, &node) ||
+    if (c->done || ebpo_node_is_uniform(&node) || !intersects_envelope(c, box, &node) ||
         node.pruned) /* ray_walk checks pruned nodes at the end */
         return EBPO_OK;
     if (ebpo_node_is_subtree_root(&node)) {
+        uint32_t below = ebpo_entry_value(node.entry);
+        if (!may_search(c, below))
+            return EBPO_OK;
         ebpo_status status = ebpo_model_enter(c->context, &node, error);
         if (status == EBPO_OK)
             cast_subtree(c, node.subtree);
+        if (status == EBPO_E_PENDING && c->rounds)
+            c->rounds->state[below] = SUBTREE_PENDING;
         return status;
     }
     /* Visits the children in the order in which the ray enters their cells. */
@@ -451,7 +512,7 @@ static ebpo_status ray_walk(casting *c, ebpo_error *error)
         ebpo_box box = ebpo_model_box(c->context->model);
         status = cast_node(c, &box, ebpo_model_root(c->context->model), error);
     }
-    if (status == EBPO_OK && !c->done && c->context->model->info->pruned)
+    if (status == EBPO_OK && !c->done && !c->waits && c->context->model->info->pruned)
         status = ebpo_check_pruned(c->context, ray_matters, c, error);
     if (status == EBPO_OK && c->no_memory)
         status = ebpo_fail_memory(error, c->count * sizeof(ebpo_ray_found));
@@ -535,8 +596,6 @@ typedef struct batch {
     unsigned threads;
     ebpo_context **context; /* [threads] the first context is the caller's */
     uint64_t *hit_count;    /* [threads] EBPO_WANTS_ALL: number of hits in each context */
-    double *entry;          /* [work][3] points where rays enter the model's box, in the order of
-                             * work */
     uint64_t work;          /* number of rays to evaluate */
     uint64_t *order;        /* [work] indices of rays in the order of work; NULL: the given order */
     /* [count] results; `wants` decides which of the three arrays is used */
@@ -547,15 +606,19 @@ typedef struct batch {
 
 /* --- a ray of many --- */
 
-/* Evaluates ray i, and stores its result. */
-static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
+/* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
+ * the ray must go on in the next round; then it has no result. */
+static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *rounds, bool *waits,
+                            ebpo_error *error)
 {
     casting c;
     const ebpo_ray *r = &b->rays[i];
     casting_begin(&c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
                   b->options.sides);
+    c.rounds = rounds;
     ebpo_status status = ray_walk(&c, error);
-    if (status != EBPO_OK)
+    *waits = c.waits;
+    if (status != EBPO_OK || c.waits)
         return status;
     if (b->wants == EBPO_WANTS_FIRST)
         b->first[i] = c.count ? hit_of(&c.first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
@@ -567,7 +630,101 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ebpo_error *e
         b->hit_count[worker] = f.end;
         b->all[i] = f;
     }
+    if (status == EBPO_OK && b->options.done)
+        b->options.done[i] = true;
     return status;
+}
+
+/* Evaluates the rays begin .. end - 1 in the order of work. */
+static ebpo_status cast_in_order(batch *b, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    ebpo_batch along = { .context = b->context[worker], .count = end - begin, .as_given = true };
+    ebpo_batch_begin(&along);
+    for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++) {
+        bool waits;
+        uint64_t k = begin + i, ray = b->order ? b->order[k] : k;
+        if (b->options.done && b->options.done[ray])
+            continue;
+        status = cast_one(b, ray, worker, NULL, &waits, error);
+        status = ebpo_batch_note(&along, i, k, status, error);
+    }
+    return ebpo_batch_end(&along, status, error);
+}
+
+/* The rays of a range that have no result yet, in the order of work. */
+typedef struct waiting {
+    uint64_t *ray; /* [count] */
+    uint64_t count;
+    ray_rounds rounds;
+    unsigned requested; /* number of requested subtrees */
+    bool pending;       /* bytes for some rays are not available yet: `error` has the first error */
+    ebpo_error error;
+} waiting;
+
+/* Requests the missing subtrees. Returns false if there are none. Also returns false if there are
+ * too many together with those whose bytes are not available yet. */
+static bool request_missing(waiting *w, const ebpo_context *c)
+{
+    ray_rounds *r = &w->rounds;
+    unsigned count = r->missing_count;
+    w->requested += count;
+    if (count == 0 || (w->pending && w->requested > MISSING_MAX))
+        return false;
+    for (unsigned i = 0; i < count; i++)
+        r->state[r->missing[i]] = SUBTREE_REQUESTED;
+    ebpo_context_hint(c, r->missing, count);
+    r->missing_count = 0;
+    return true;
+}
+
+/* Evaluates the waiting rays as far as they need only subtrees that are in memory or requested. */
+static ebpo_status cast_round(batch *b, waiting *w, unsigned worker, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
+        bool waits;
+        status = cast_one(b, w->ray[i], worker, &w->rounds, &waits, error);
+        if (status == EBPO_E_PENDING) {
+            if (!w->pending)
+                w->error = error ? *error : (ebpo_error){ .status = status, .offset = -1 };
+            w->pending = true;
+            status = EBPO_OK;
+        } else if (waits) {
+            w->ray[kept++] = w->ray[i];
+        }
+    }
+    w->count = kept;
+    return status;
+}
+
+/* Evaluates the rays begin .. end - 1 of a remote file in rounds. In each round, a ray goes on
+ * until it needs a subtree that is neither in memory nor requested. Then one round trip fetches the
+ * subtrees that all rays need next. */
+static ebpo_status cast_in_rounds(batch *b, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
+{
+    ebpo_context *c = b->context[worker];
+    waiting w = { .count = 0 };
+    uint64_t subtrees = c->model->top->below_count;
+    w.ray = ebpo_alloc(end - begin, sizeof *w.ray);
+    w.rounds.state = ebpo_alloc_zero(subtrees, 1);
+    ebpo_status status = w.ray && w.rounds.state
+                             ? EBPO_OK
+                             : ebpo_fail_memory(error, (end - begin) * sizeof *w.ray + subtrees);
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        uint64_t ray = b->order ? b->order[i] : i;
+        if (!b->options.done || !b->options.done[ray])
+            w.ray[w.count++] = ray;
+    }
+    do
+        status = status == EBPO_OK ? cast_round(b, &w, worker, error) : status;
+    while (status == EBPO_OK && request_missing(&w, c));
+    free(w.ray);
+    free(w.rounds.state);
+    return status == EBPO_OK && w.pending ? ebpo_fail_with(error, &w.error) : status;
 }
 
 /* Evaluates the rays begin .. end - 1 in the order of work. */
@@ -575,22 +732,10 @@ static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned
                               ebpo_error *error)
 {
     batch *b = user;
-    ebpo_status status = EBPO_OK;
-    ebpo_batch along = { .context = b->context[worker],
-                         .points = b->order ? b->entry + 3 * begin : NULL,
-                         .count = end - begin,
-                         .as_given = !b->order };
-    ebpo_batch_begin(&along);
-    for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++) {
-        uint64_t k = begin + ebpo_batch_next(&along, i), ray = b->order ? b->order[k] : k;
-        if (b->options.done && b->options.done[ray])
-            continue;
-        status = cast_one(b, ray, worker, error);
-        if (status == EBPO_OK && b->options.done)
-            b->options.done[ray] = true;
-        status = ebpo_batch_note(&along, i, k, status, error);
-    }
-    return ebpo_batch_end(&along, status, error);
+    const ebpo_model *m = b->context[worker]->model;
+    return m->whole || m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
+               ? cast_in_order(b, begin, end, worker, error)
+               : cast_in_rounds(b, begin, end, worker, error);
 }
 
 /* --- the order of work --- */
@@ -611,25 +756,20 @@ static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
     }
 }
 
-/* Sorts the uncompleted rays along the Morton curve. If there is no memory for this, the rays are
- * evaluated in the given order. */
+/* Sorts the uncompleted rays along the Morton curve of the points where they enter the box. If
+ * there is no memory for this, the rays are evaluated in the given order. */
 static void put_in_order(batch *b, const ebpo_model *m)
 {
     ebpo_box box = ebpo_model_box(m);
     uint64_t kept = 0;
     double *entry = ebpo_alloc(b->count, 3 * sizeof *entry);
-    b->entry = ebpo_alloc(b->count, 3 * sizeof *entry);
     for (uint64_t i = 0; entry && i < b->count; i++)
         entry_of(&box, &b->rays[i], entry + 3 * i);
-    if (entry && b->entry)
+    if (entry)
         b->order = ebpo_curve_order(&box, entry, b->count);
-    for (uint64_t i = 0; b->order && i < b->count; i++) {
-        uint64_t ray = b->order[i];
-        if (b->options.done && b->options.done[ray])
-            continue;
-        memcpy(b->entry + 3 * kept, entry + 3 * ray, 3 * sizeof *entry);
-        b->order[kept++] = ray;
-    }
+    for (uint64_t i = 0; b->order && i < b->count; i++)
+        if (!b->options.done || !b->options.done[b->order[i]])
+            b->order[kept++] = b->order[i];
     b->work = b->order ? kept : b->count;
     free(entry);
 }
@@ -675,7 +815,6 @@ static void clear_batch(batch *b)
         ebpo_context_free(b->context[i]);
     free(b->context);
     free(b->hit_count);
-    free(b->entry);
     free(b->order);
     free(b->all);
 }

@@ -1,5 +1,6 @@
 /* Counts the sequential round trips of queries to a remote file. */
 #include <hdf5.h>
+#include <math.h>
 #include <stdlib.h>
 
 #include <ebpo/query.h>
@@ -94,6 +95,65 @@ START_TEST(test_remote_deep_query_round_trips)
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
     ck_assert_msg(c.requested < c.size / 3, "%d of %d bytes", (int)c.requested, (int)c.size);
     ck_assert(a.distance == b.distance);
+}
+END_TEST
+
+/* A query at almost equal distances from many subtrees reads deep bounds, and then few subtrees. */
+START_TEST(test_remote_axis_query_bytes)
+{
+    enum { WAVES = 6 }; /* 26 without deep bounds */
+    static const double p[3] = { 0.05, 0.02, 0.01 };
+    counted_source c;
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    result a = run_query(far, &c, p, false), b = run_query(l.without, NULL, p, false);
+    counted_close(&c, far);
+    ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
+    ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
+    ck_assert(a.distance == b.distance);
+}
+END_TEST
+
+/* --- rays --- */
+
+enum { RAYS = 100 };
+
+/* Finds the first hits of rays that fill a square in front of an eye. */
+static void cast_rays(const ebpo_file *file, ebpo_ray_hit hit[RAYS])
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_ray rays[RAYS];
+    options.threads = 1;
+    options.memory = 64 << 20;
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (ebpo_ray){ { 0.3, -8, 3 },
+                              { 0.1 * (i % 10 - 4.5), 3, -1.2 + 0.1 * (double)(i / 10) },
+                              INFINITY };
+    ck_assert(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert(ebpo_ray_first_many(context, rays, RAYS, NULL, hit, NULL) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+}
+
+/* The subtrees that all rays need next are requested together; a subtree whose envelope the rays
+ * miss is not requested. */
+START_TEST(test_remote_rays_round_trips)
+{
+    enum { WAVES = 4 }; /* 55 when each ray requests its subtrees alone */
+    counted_source c;
+    ebpo_ray_hit a[RAYS], b[RAYS];
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone;
+    cast_rays(far, a);
+    cast_rays(l.without, b);
+    opened = c.batches + c.alone - opened;
+    counted_close(&c, far);
+    ck_assert_msg(opened <= WAVES, "%d waves", (int)opened);
+    ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
+    for (int i = 0; i < RAYS; i++)
+        ck_assert(a[i].t == b[i].t && a[i].face == b[i].face && a[i].side == b[i].side);
 }
 END_TEST
 
@@ -288,6 +348,8 @@ TEST_SUITE(round_trips)
     tcase_set_timeout(large, 900);
     tcase_add_unchecked_fixture(large, make_large, free_large);
     tcase_add_test(large, test_remote_deep_query_round_trips);
+    tcase_add_test(large, test_remote_axis_query_bytes);
+    tcase_add_test(large, test_remote_rays_round_trips);
     tcase_add_test(large, test_remote_radius_query_round_trips);
     tcase_add_test(large, test_remote_box_query_round_trips);
     tcase_add_loop_test(large, test_remote_view_round_trips, 0, 3);
