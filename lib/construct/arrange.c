@@ -332,9 +332,10 @@ static ebpo_status translate_corners(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* Replaces old by new indices of vertices in all faces, in passes. Each pass handles the old
- * indices of one window, whose table `rank` fits into memory, and reads all faces. So all arrays
- * except this table are accessed in order. */
+/* Replaces the old vertex indices in all faces by the new indices. A window is a range of old
+ * indices, so short that the table `rank` of its new indices fits into memory. For each window, one
+ * pass fills this table and a second pass reads all faces. So all arrays except this table are
+ * accessed in order. */
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;

@@ -57,8 +57,8 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
 }
 
 /* Sets order[i] to the vertex that gets the final index i, and final[v] to the final index of
- * vertex v. face_at[i]: the face that has the final index i. All vertices and faces are indices
- * along the curve. */
+ * vertex v. face_at[i]: the face that has the final index i. Vertices and faces are indices in
+ * `mesh`, which is sorted along the Morton curve (arrange.h). */
 static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
                            uint32_t *order, uint32_t *final)
 {
@@ -83,7 +83,7 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
 /* Input and output of the parallel tasks that move the mesh's data into the final order. */
 typedef struct moving {
     const ebpo_builder *b;
-    const ebpo_mesh *mesh; /* in the order along the curve */
+    const ebpo_mesh *mesh; /* sorted along the Morton curve */
     const uint32_t *final; /* [vertex] final index */
     uint32_t *face_at;     /* [final index] face of `mesh` */
     /* result; out->vertex_source first contains vertices of `mesh`, which move_vertices replaces by

@@ -1,7 +1,9 @@
 /* Writes a surface as GLB. Vertices are numbered in the order of their first use, and vertices
- * without triangles are omitted. Each array is a buffer view. The view also states the position of
- * the decoded array in a second buffer, which is not stored in the file. Sources: Khronos, "glTF
- * 2.0 Specification" and the extensions KHR_mesh_quantization and EXT_meshopt_compression. */
+ * without triangles are omitted. The arrays are compressed. The buffer view of an array states the
+ * position of the compressed array in the file's buffer. As EXT_meshopt_compression requires, it
+ * also states the position of the decoded array in a second buffer, which is not stored. Sources:
+ * Khronos, "glTF 2.0 Specification" and the extensions KHR_mesh_quantization and
+ * EXT_meshopt_compression. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -138,8 +140,9 @@ static ebpo_status fill_positions(gltf_writer *w, uint8_t *to, ebpo_error *error
     return EBPO_OK;
 }
 
-/* Stores normals as signed bytes. If the node scales positions by the steps, normals are multiplied
- * by the steps here, because readers divide them by the steps. */
+/* Stores normals as signed bytes. If positions are stored as numbers of steps, the glTF node scales
+ * positions by the steps, and readers divide normals by the steps. Therefore this function
+ * multiplies normals by the steps. */
 static void fill_normals(const gltf_writer *w, uint8_t *to)
 {
     for (uint64_t i = 0; i < w->out->vertices; i++, to += 4) {
@@ -171,7 +174,7 @@ static void fill_colours(const gltf_writer *w, uint8_t *to)
 
 /* --- encoding --- */
 
-/* Sets the positions of an array in both buffers, after the previous arrays. */
+/* Places an array after the previous arrays in both buffers. */
 static void place_array(gltf_writer *w, gltf_array *a)
 {
     a->first = w->bytes;

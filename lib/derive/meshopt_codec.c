@@ -14,7 +14,8 @@ enum {
     GROUP = 16,
     BLOCK_MAX = 256,    /* maximum number of elements of a block */
     BLOCK_BYTES = 8192, /* maximum number of bytes of a block's elements */
-    TAIL_BYTES = 32     /* minimum number of bytes of the end, which has the first element */
+    /* the data end with the first element, preceded by zeros if it has fewer bytes than this */
+    TAIL_BYTES = 32
 };
 
 /* Returns the number of elements of a full block. */
@@ -31,9 +32,9 @@ uint64_t ebpo_meshopt_attributes_bound(uint64_t count, unsigned stride)
            (stride < TAIL_BYTES ? TAIL_BYTES : stride);
 }
 
-/* Stores 16 differences in `bits` bits each, followed by bytes. If a difference is at least the
- * largest value of these bits, this value is stored for it, and the difference itself is one of the
- * bytes. */
+/* Stores 16 differences: first `bits` bits for each difference, then whole bytes for large
+ * differences. A difference is large if it is at least 2^bits - 1. Its bits are then all 1, and the
+ * difference itself is stored as a whole byte. */
 static uint8_t *pack_group(const uint8_t *difference, unsigned bits, uint8_t *out)
 {
     unsigned each = 8 / bits;
@@ -157,8 +158,9 @@ static void push_vertex(triangle_encoder *e, uint32_t v)
     e->vertices = (e->vertices + 1) % RECENT;
 }
 
-/* Returns the number of the latest edge in the list that is an edge of the triangle, and sets
- * *corner to the edge's first corner. Returns EDGES_USED if there is none. */
+/* Searches the list of recent edges, latest edge first, for an edge of the triangle. Returns the
+ * number of the edge (0: the latest), and sets *corner to the edge's first corner. Returns
+ * EDGES_USED if no edge is found. */
 static unsigned find_edge(const triangle_encoder *e, const uint32_t *t, unsigned *corner)
 {
     for (unsigned i = 0; i < EDGES_USED; i++) {
@@ -170,7 +172,8 @@ static unsigned find_edge(const triangle_encoder *e, const uint32_t *t, unsigned
     return EDGES_USED;
 }
 
-/* Returns the number of a vertex in the list, latest first; RECENT: it is not in the list. */
+/* Returns the number of a vertex in the list of recent vertices (0: the latest vertex), or RECENT
+ * if the vertex is not in the list. */
 static unsigned find_recent(const triangle_encoder *e, uint32_t v)
 {
     unsigned i = 0;

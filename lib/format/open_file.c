@@ -1,9 +1,10 @@
 /* Opens a file: reads the header, and checks that every array is present in the shape that the
- * counts in the header require. head_facts.c checks each count before memory of this size is
- * allocated. The decoded size of the arrays is limited relative to the file size. The second part
- * opens files that other programs have rewritten with another HDF5 layout. In a separate process,
- * libhdf5 copies such a file, with limits of memory, time and bytes written. The copy is opened
- * like any other file. Source: format-spec/README.md, sections 4 and 5; docs/develop/threats.md. */
+ * counts in the header require. Before memory is allocated for the number of items that a count
+ * states, head_facts.c checks the count. The decoded size of the arrays is limited relative to the
+ * file size. The second part opens files that other programs have rewritten with another HDF5
+ * layout. In a separate process, libhdf5 copies such a file, with limits of memory, time and bytes
+ * written. The copy is opened like any other file. Source: format-spec/README.md, sections 4 and 5;
+ * docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -56,8 +57,9 @@ static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
     return fits;
 }
 
-/* Returns the number of rows of a full chunk, if the format fixes this number: in files with
- * subtrees, for some arrays. Otherwise returns 0. */
+/* Returns the number of rows of a full chunk that the format requires. Returns 0 if the format does
+ * not require a number: for all arrays of files without subtrees, and for most arrays of other
+ * files. */
 static uint32_t block_rows(const ebpo_info *info, ebpo_array_id id)
 {
     if (!info->subtree_level)
@@ -85,7 +87,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
         snprintf(a->path, sizeof a->path, "%s", ebpo_schema_former(id));
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
-    /* in remote files and files with a chunk directory, several chunks are located later */
+    /* If the file is remote or has a chunk directory, the chunks of an array with more than one
+     * chunk are located later, when they are needed. */
     uint64_t max_chunks = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
@@ -180,8 +183,9 @@ static bool states_size(const ebpo_file *file, ebpo_head *head, const char *path
            bytes == file->info.file_bytes;
 }
 
-/* Opens a list of all chunks. *valid: false if the list does not state the file's size and its own
- * offset. Another program has then rewritten the file, and the list describes other chunks. */
+/* Opens a list of all chunks. The list states the size of the file, and the list's own offset in
+ * the file. *valid: true if both numbers are correct. If a number is wrong or missing, another
+ * program has rewritten the file, and the list does not describe the present chunks. */
 static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *valid,
                              ebpo_error *error)
 {
@@ -202,9 +206,9 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
     return EBPO_OK;
 }
 
-/* Opens the list of chunk checksums. Ignores the list in files without HDF5 filters, because the
- * last bytes of their chunks are not a checksum. Also ignores a list that does not state the size
- * of the file, even if the list is damaged, because another program has then rewritten the file. */
+/* Opens the list of chunk checksums. Ignores the list if its chunks have no HDF5 filters, because
+ * then the last bytes of chunks are not checksums. Also ignores a damaged list that does not state
+ * the present size of the file, because another program has rewritten such a file. */
 static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
@@ -298,8 +302,8 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns true if the file begins like HDF5 (byte 0x89) or another known type. The error that
- * opening has reported then already names this type. */
+/* Returns true if the first bytes identify HDF5 (byte 0x89), or another type that
+ * ebpo_wrong_kind_of_file knows. In this case, the error of opening already names the type. */
 static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
     return (size && begin[0] == 0x89) || ebpo_wrong_kind_of_file(begin, size);
@@ -329,7 +333,8 @@ static const char *other_kind(const uint8_t *begin, uint64_t size)
                : NULL;
 }
 
-/* If the file is of another known type, replaces the error by an error that names this type. */
+/* If opening has failed and the file is of another known type, replaces the error by an error that
+ * names this type. */
 static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
 {
     enum { BEGIN = 4096 };

@@ -327,9 +327,10 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
     return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);
 }
 
-/* Decodes a chunk of gates, a coding of faces relative to edges of preceding faces, to high-water
- * codes, the other coding of faces (hdf5_read/coding.h). Sets the padding to 0. The gates are first
- * in coder->scratch, which is free because single bytes are not shuffled. */
+/* Decodes a chunk of faces that is stored as gates: relative to edges of preceding faces. The
+ * result has the other coding of faces, high-water codes (hdf5_read/coding.h). The rows after the
+ * last face are set to 0. The gates are unpacked to coder->scratch. This memory is free, because it
+ * is used only to unshuffle elements of several bytes. */
 static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
                                 ebpo_error *error)

@@ -252,7 +252,8 @@ static void attributes_add_arrays(ebpo_plan *plan, ebpo_pipeline pipeline)
         add_one(plan, i, pipeline);
 }
 
-/* Returns true if an array of /attributes, not the header, contains floating-point numbers. */
+/* Returns true if an array of /attributes contains floating-point numbers. `array` is not the
+ * header. */
 static bool floats_in(const ebpo_plan *plan, const ebpo_array_out *array)
 {
     const ebpo_attribute *a = &plan->attributes->array[(array->level - 1) / 2];
@@ -355,8 +356,9 @@ static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint6
     }
 }
 
-/* Returns the block of EBPO_INDEX_ROWS leaves that contains reference number `ref`: the last block
- * that has at most `ref` references before its first leaf, by leaf_index. */
+/* Returns the block of EBPO_INDEX_ROWS leaves that contains reference `ref` of the level. This is
+ * the last block with at most `ref` references in the leaves before the block. leaf_index has this
+ * number for each block. */
 static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t ref)
 {
     uint64_t low = 0, high = (leaves - 1) / EBPO_INDEX_ROWS;

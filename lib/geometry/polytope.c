@@ -131,10 +131,12 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
     return volume * (1 - remaining * remaining * remaining);
 }
 
-/* The part of a polytope beyond a plane. Its volume is the sum of pyramids whose tip is the
- * farthest vertex. The bases are the cut, and the parts of the faces beyond the plane. The base of
- * a face is a fan of triangles; a face with the farthest vertex has a pyramid of no volume. The cut
- * is a polygon, whose area is computed from its edges in any order. */
+/* The part of a polytope beyond a plane. Its volume is computed as a sum of pyramids. All pyramids
+ * have the same tip: the vertex farthest from the plane. One base is the cut, the polygon in which
+ * the plane intersects the polytope. The area of the cut is computed from its edges, in any order.
+ * The other bases are the parts of the polytope's faces beyond the plane. Each of these bases is
+ * divided into a fan of triangles. A face with the farthest vertex is omitted, because its pyramid
+ * has no volume. */
 typedef struct beyond {
     const ebpo_polytope *p;
     double dist[EBPO_POLYTOPE_VERTICES]; /* signed distance of each vertex; positive: beyond */
@@ -167,9 +169,9 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
         c->area[k] += n[k];
 }
 
-/* Takes the part of a face beyond the plane, and adds a corner of this part to its fan of
- * triangles. *kept: number of corners so far. first, last: the first and the latest corner,
- * relative to the farthest vertex. */
+/* Adds corner x to the fan of triangles of the part of a face beyond the plane. *kept: number of
+ * corners of the fan so far. first, last: the first and the latest corner of the fan, relative to
+ * the farthest vertex. */
 static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
 {
     double v[3], n[3];
@@ -359,9 +361,10 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Adds the face on the cutting plane, the cap. A rim edge is an edge of a kept face on this plane.
- * A rim edge that occurs in both directions is between two kept faces. The other rim edges, in
- * reverse direction, bound the cap. Returns false if these edges do not form one closed loop. */
+/* Adds the face on the cutting plane, the cap. A rim edge is an edge of a kept face that is on this
+ * plane. If a rim edge occurs in both directions, the faces on both sides are kept, so this edge
+ * does not bound the cap. The other rim edges, in reverse direction, bound the cap. Returns false
+ * if the edges of the cap do not form one closed loop. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];
@@ -482,7 +485,7 @@ void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VER
             sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
 }
 
-/* --- envelopes: cut by plane codes, as half-spaces, and by level --- */
+/* --- envelopes --- */
 
 void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)
 {

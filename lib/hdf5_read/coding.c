@@ -2,8 +2,8 @@
  * kinds. The first kind stores differences to the previous value (modulo 2^32 or 2^64), in zigzag
  * code: 0, -1, 1, -2 become 0, 1, 2, 3. The second kind stores corners of faces relative to the
  * number of vertices that were used so far. The third kind stores integers with fewer bytes.
- * Encoding and decoding are exact inverses for every bit pattern. Floats are coded as integers of
- * the same order. Files are little-endian. */
+ * Encoding and decoding are exact inverses for every bit pattern. Floats are first converted to
+ * integers, so that a greater float becomes a greater integer. Files are little-endian. */
 #include "hdf5_read/coding.h"
 
 #include <string.h>
@@ -164,9 +164,8 @@ static void store_integer(uint8_t *file, size_t size, uint64_t value)
     }
 }
 
-/* Converts the bits of a float (size 4) or double (size 8) to an integer of the same order, or
- * back.
- */
+/* Converts the bits of a float (size 4) or double (size 8) to an integer, or back. A greater number
+ * becomes a greater integer. */
 static uint64_t sortable_bits(uint64_t bits, size_t size)
 {
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);

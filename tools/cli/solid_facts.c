@@ -15,13 +15,12 @@ static double cell_volume(const ebpo_info *info, int level)
 
 double facts_volume(const ebpo_info *info, int level)
 {
-    /* Volumes of cells are beyond the range of doubles, so the volumes in the file are not valid.
-     */
+    /* If doubles cannot represent the volume of a cell, the volumes in the file are not valid. */
     if (!isnormal(cell_volume(info, level)))
         return NAN;
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
-        /* a cell's volume may be infinite; then 0 times this volume would be NAN */
+        /* the volume of a coarser cell may be infinite, and 0 * INFINITY would be NAN */
         sum +=
             info->level[i].leaf_volume +
             (info->level[i].black_count ? (double)info->level[i].black_count * cell_volume(info, i)

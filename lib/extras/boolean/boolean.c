@@ -66,9 +66,9 @@ static void cut_expression(ebpo_expression *e, uint32_t operand)
 }
 
 /* Copies the caller's nodes. If there is a box, node 0 is the box, and the result is cut to it.
- * Inside the box, a complement is equal to the difference of the box and its operand, so each
- * complement is replaced by such a difference. Fails with EBPO_E_LIMIT and EBPO_E_ARGUMENT, as
- * documented at ebpo_boolean_new. */
+ * Inside the box, the complement of a solid is equal to the box minus the solid. So each complement
+ * node is replaced by a difference node: node 0 minus the node `left`. Fails with EBPO_E_LIMIT and
+ * EBPO_E_ARGUMENT, as documented at ebpo_boolean_new. */
 static ebpo_status make_expression(ebpo_boolean *b, const ebpo_boolean_node *nodes, uint32_t count,
                                    bool has_box, ebpo_error *error)
 {

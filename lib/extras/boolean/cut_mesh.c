@@ -1,8 +1,8 @@
-/* Cuts the listed faces of all operands, and gives equal points one number.
+/* Cuts the listed faces of all operands. Equal points become one vertex.
  *
  * Threads cut faces separately. The pieces of a face are its triangles and points (face_cut.h).
- * Then points are numbered in the order of the faces, so the result does not depend on the number
- * of threads. */
+ * Then points get vertex indices in the order of the faces, so the result does not depend on the
+ * number of threads. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/cut_mesh.h"
@@ -19,8 +19,9 @@ static const char stage[] = "cut faces";
 
 enum { FACES_AT_ONCE = 1 << 14, GRAIN = 16 };
 
-/* Marks a vertex number as an index in ebpo_cut_mesh.set. number_vertices replaces such a number
- * when the number of corners, which precede the points of the set, is known. */
+/* Bit of a provisional vertex index: the other bits are the index of a new point in
+ * ebpo_cut_mesh.set. The final indices of new points follow those of the faces' corners. So
+ * number_vertices replaces provisional indices when all corners have been counted. */
 #define NEW_POINT (UINT32_C(1) << 31)
 
 typedef struct cutting {

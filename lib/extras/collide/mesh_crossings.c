@@ -40,8 +40,8 @@ typedef struct crossings {
 
 /* --- the model --- */
 
-/* Builds the tree of the mesh, as the tree of a surface: the report for ebpo_build states that the
- * mesh is not closed. */
+/* Builds the tree of the mesh. ebpo_build gets a changed copy of the report, in which the mesh is
+ * not closed, so that it builds a surface also from a closed mesh. */
 static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                ebpo_error *error)
 {

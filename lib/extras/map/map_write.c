@@ -26,9 +26,9 @@
 #include "io/publish.h"
 #include "mesh/sum.h"
 
-/* The values are divided by their sizes into three bins of small, ordinary and large values, whose
- * limits are 2^-400 and 2^400 (see add_to). The units of values in bins 0, 1 and 2 are
- * 2^-MAP_BIN_UNIT, 1 and 2^MAP_BIN_UNIT. In the unit of its bin, every value except 0 has an
+/* Each value is added to one of three bins, for small, ordinary and large absolute values. The
+ * limits between the bins are 2^-400 and 2^400 (see add_to). The units of values in bins 0, 1 and 2
+ * are 2^-MAP_BIN_UNIT, 1 and 2^MAP_BIN_UNIT. In the unit of its bin, every value except 0 has an
  * absolute value between 2^-474 and 2^424, so that its square is a normal number. */
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
@@ -149,8 +149,8 @@ static int compare_values(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Sorts values and computes their percentiles: the p-th percentile is the smallest value that at
- * least p percent of the values do not exceed. */
+/* Sorts values and computes their percentiles. The p-th percentile is the smallest of the values
+ * for which at least p percent of all values are less or equal. */
 static void pick_percentiles(double *values, uint64_t count, double out[EBPO_MAP_PERCENTILES])
 {
     qsort(values, count, sizeof *values, compare_values);

@@ -29,9 +29,9 @@
  * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
  * range or not initialized with its macro. A function with a progress callback can return
  * EBPO_E_CANCELLED. "The errors of reading" are EBPO_E_IO and EBPO_E_FORMAT, and EBPO_E_PENDING for
- * files with a source of async.h. "Also if ..." after a status adds a case in which the function
- * returns this status. The cases that ebpo_status gives, and the cases of functions to which the
- * comment refers, still apply.
+ * files with a source of async.h. The comment of ebpo_status gives the general meaning of each
+ * status. "Also if ..." after a status adds a case to this meaning. If a comment refers to the
+ * errors of another function, the errors of that function are also possible.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
  * on this number. Member `progress`: callback that reports progress; by default none. Parameter

@@ -13,9 +13,10 @@
  * evaluated by queries of the models, without a mesh of the result. Decisions are exact for posed
  * coordinates (pose.h), as if they were computed without rounding.
  *
- * The result is *regularised*: an operand is the closure of the points that are inside by its rule,
- * and the result is the closure of its interior. So the union of two boxes with a common side is
- * one box, and a box minus an equal box is empty.
+ * The result is *regularised*. An operand is the closure of the points that the rule of its model
+ * classifies as inside. The result is the closure of the interior of the set that the expression
+ * describes. So the union of two boxes with a common side is one box, and a box minus an equal box
+ * is empty.
  */
 #ifndef EBPO_BOOLEAN_H
 #define EBPO_BOOLEAN_H
@@ -74,12 +75,12 @@ typedef struct ebpo_boolean_options {
     const double *box;
 
     /*
-     * [plane_count][4] half-spaces to which the result is cut. A half-space contains the points p
-     * with row[0] p[0] + row[1] p[1] + row[2] p[2] <= row[3]. The half-spaces are additional
-     * operands after the box. Each of these operands is a tetrahedron that contains the part of the
-     * result in the half-space. One face of the tetrahedron is in the plane; its three corners are
-     * rounded to doubles, which moves the plane slightly. For an axis-parallel plane, only row[3] /
-     * row[k] is rounded.
+     * [plane_count][4] half-spaces to which the result is cut. The half-space of a row contains the
+     * points p with row[0] * p[0] + row[1] * p[1] + row[2] * p[2] <= row[3]. The half-spaces are
+     * additional operands after the box. Each of these operands is a tetrahedron that contains the
+     * part of the result in the half-space. One face of the tetrahedron is in the plane; its three
+     * corners are rounded to doubles, which moves the plane slightly. For a plane perpendicular to
+     * axis k, only row[3] / row[k] is rounded.
      */
     const double *planes;
 } ebpo_boolean_options;
@@ -241,8 +242,9 @@ typedef struct ebpo_exact_volume {
      * Volume of the result, in the cube of the world's unit.
      *
      * Kind EBPO_VALUE_EXACT: lo and hi are the double nearest to the exact volume for posed
-     * coordinates, ties to even; INFINITY or 0 if the volume is out of the range of doubles. The
-     * result is empty if `scaled` is 0.
+     * coordinates, ties to even. If the volume is out of the range of doubles, lo and hi are
+     * INFINITY or 0. So a result with lo and hi 0 may have a tiny volume; it is empty only if the
+     * member `scaled` below is 0.
      *
      * Kind EBPO_VALUE_BOUND: lo is 0, and hi is the volume of a box around the result;
      * ebpo_boolean_cells_volume gives better bounds.
@@ -271,7 +273,10 @@ typedef struct ebpo_exact_volume {
      */
     uint64_t patches, bounding;
 
-    /* The two faces of `file_face`, with indices as face_a and face_b of ebpo_face_pair. */
+    /*
+     * The two faces of `file_face`, as source indices. If a file has no source indices: as indices
+     * in the file.
+     */
     uint64_t face[2];
 
     /*
@@ -478,8 +483,9 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
  * Makes the cells. Each operand is tested in a ball around the cell. White and black nodes of the
  * operand's tree are tested first. For a cell that is larger than the operand's leaves, these nodes
  * usually give the result of the test. Otherwise the operand's faces are tested. An operand that
- * cannot change the result in a cell is not tested in the cell's children. An operand that is used
- * twice counts as two operands, so cells at its boundary are mixed.
+ * cannot change the result in a cell is not tested in the cell's children. If the expression uses
+ * an operand twice, the two uses are evaluated as two operands. Therefore cells at the boundary of
+ * this operand are mixed, even if the boundary of the result is not there.
  *
  * The cells stay valid after the expression is freed.
  *

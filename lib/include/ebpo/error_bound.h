@@ -17,9 +17,10 @@ typedef struct ebpo_error_bound_options {
     size_t struct_size;
 
     /*
-     * Bounds are refined until hi <= (1 + tolerance) lo. Refining ends earlier if `queries`
-     * distances have been computed, or 65,536 distances for each node that determines the bounds.
-     * The tolerance is above 0.
+     * The bounds lo and hi of the result are refined until hi <= (1 + tolerance) * lo. Refining
+     * ends earlier if `queries` distances have been computed. It also ends earlier if all nodes
+     * that determine the bounds have reached their limit of 65,536 distances. The tolerance is
+     * above 0.
      */
     double tolerance;
 
@@ -42,9 +43,9 @@ typedef struct ebpo_error_bound_options {
 
     /*
      * `hi` of a coarser level of the same file. Envelopes are nested, so this value also bounds
-     * this level. 0: unknown. If this value is unknown, coarser levels may also be computed, each
-     * with as many distances as this level. This happens if the search reaches `queries`, or the
-     * maximum for one node, before it reaches the tolerance.
+     * this level. 0: unknown. In this case, the function may also compute bounds of coarser levels,
+     * each with as many distances as for this level. This happens if the search reaches a limit of
+     * distances (see `queries`) before it reaches the tolerance.
      */
     double at_most;
 } ebpo_error_bound_options;
@@ -85,28 +86,30 @@ typedef struct ebpo_error_bound {
 /*
  * Computes the maximum distance of a point of a level's envelopes from the model.
  *
- * The envelopes are those of ebpo_lod_level including their interior, so a cavity covered by an
- * envelope counts. The model is the closed solid with all its faces, so the distance is 0 inside
- * the solid. For a surface, the model is its faces.
+ * The envelopes are those of ebpo_lod_level, including their interior. So if an envelope covers a
+ * cavity of the solid, the points of the cavity are points of the envelope. The model is the closed
+ * solid with all its faces, so the distance is 0 inside the solid. For a surface, the model is its
+ * faces.
  *
- * `hi` is a bound for the decoded half-spaces and includes all rounding errors. Therefore `hi`
- * exceeds the true value by at least about 1e-6 of a node's cell, or a few ulp of the coordinates.
- * The tolerance is not reached if the error bound is smaller than this excess, or if a node has
- * reached its limit of 65,536 distances. In these cases the bounds are wider, but still certain.
+ * `hi` is a bound for the envelopes of the decoded planes and includes all rounding errors.
+ * Therefore `hi` exceeds the true value by at least about the greater of two lengths: 1e-6 of the
+ * size of a node's cell, and a few ulp of the coordinates. The tolerance is not reached if the
+ * error bound is smaller than this excess, or if a node has reached its limit of 65,536 distances.
+ * In these cases the bounds are wider, but still certain.
  *
  * The level's surface, for `mean` and `rms`, is the part of the envelopes' polygons that is in no
  * other envelope.
  *
- * model    model of `file`; in this case `file` must have a mesh. If `file` is a subset of any
- *          kind, `model` may also be the model of the file from which the subset was made
+ * model    model of `file`, which must then have a mesh. If `file` is a subset, `model` may instead
+ *          be the model of the file from which the subset was made
  *
  * Memory, in addition to the memory of `model`: the entire tree and mesh, and 80 bytes for each
  * node of the level.
  *
  * EBPO_E_ABSENT: the model has no mesh, or is itself a subset. EBPO_E_ARGUMENT: the level is not
- * valid, the tolerance is 0, at_most is below 0, or `file` is not the model's file or a subset of
- * it. `file` and the model's file must have equal root cells. Their digests must agree, or their
- * sources and build options must be equal. Also the errors of reading (base.h).
+ * valid, the tolerance is 0, at_most is below 0, or `file` is neither the model's file nor a subset
+ * of the model's file. `file` and the model's file must have equal root cells. Their digests must
+ * agree, or their sources and build options must be equal. Also the errors of reading (base.h).
  *
  * Threads: any.
  */

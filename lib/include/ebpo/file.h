@@ -237,7 +237,10 @@ typedef struct ebpo_level_summary {
     /* Number of new faces of this level's leaves, as in ebpo_level. */
     uint64_t new_count;
 
-    /* Number of faces in this level's leaves that an earlier leaf also has, as in ebpo_level. */
+    /*
+     * Number of references of this level's leaves, as in ebpo_level. A reference is a face of a
+     * leaf that also intersects an earlier leaf.
+     */
     uint64_t ref_count;
 
     /* As in ebpo_level. */
@@ -534,10 +537,10 @@ typedef struct ebpo_write_options {
     ebpo_progress progress;
 
     /*
-     * Least mean number of faces of a subtree. The roots of subtrees (format-spec/subtrees.md) are
-     * the gray nodes of the deepest level whose gray nodes have, on average, at least this number
-     * of faces. If there is no such level, they are the gray nodes of level 1. The data of a
-     * subtree is contiguous, so that one read loads it.
+     * Minimum for the mean number of faces of the subtrees (format-spec/subtrees.md). All gray
+     * nodes of one level are the roots of the subtrees. This is the deepest level whose gray nodes
+     * have, on average, at least this number of faces. If there is no such level, it is level 1.
+     * The data of a subtree is contiguous, so that one read loads it.
      *
      * 0 (default): the number is 1,024. With this default, the file has no table of subtrees if no
      * level reaches this number, or if the mesh has fewer than 131,072 faces.
@@ -605,17 +608,18 @@ typedef struct ebpo_source {
     void (*close)(void *user);
 
     /*
-     * Prefetch hint: each of these ranges will soon be read, about once. A remote source fetches
-     * them together and in advance. The function must return immediately. Results do not depend on
-     * it. May be NULL.
+     * Hint that the library will soon read these ranges, most of them once. A remote source fetches
+     * the ranges together and in advance. The function must return immediately. Results do not
+     * depend on this function. May be NULL.
      */
     void (*prefetch)(void *user, const ebpo_range *ranges, size_t count);
 
     /*
-     * Number of bytes at the beginning of the file that are already available, if `prefetch` is not
-     * NULL. If this number is more than 0 and less than `size`, opening reads only these bytes.
-     * Later, the chunk offsets of arrays with several chunks are read when they are needed, or by
-     * ebpo_file_locate. If this number is 0 or `size`, opening also reads all chunk offsets.
+     * Used only if `prefetch` is not NULL. Number of bytes at the beginning of the file that are
+     * already available. If this number is more than 0 and less than `size`, opening reads only
+     * these bytes. Later, the chunk offsets of arrays with several chunks are read when they are
+     * needed, or by ebpo_file_locate. If this number is 0 or `size`, opening also reads all chunk
+     * offsets.
      */
     uint64_t prefetched;
 } ebpo_source;
@@ -642,8 +646,9 @@ typedef struct ebpo_file ebpo_file;
  * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
  * exchanged chunks. For files without this list, ebpo_file_check_content detects exchanged chunks.
  *
- * If another program has copied a file, its chunks may have no checksums. Opening such a file reads
- * the whole file and compares content_sha256. Later changes of such a file are not detected.
+ * If an HDF5 program, such as h5repack, has rewritten a file, the chunks may have no checksums.
+ * Opening such a file reads the whole file and compares content_sha256. Later changes of such a
+ * file are not detected.
  *
  * EBPO_E_IO. EBPO_E_FORMAT: the file is not an .ebpo.h5 file, or is damaged. EBPO_E_VERSION: the
  * file has another major version, or a part that this library does not know. EBPO_E_UNSUPPORTED:
@@ -1151,13 +1156,9 @@ typedef struct ebpo_patch {
     double error;
     uint64_t vertex_count, triangle_count;
 
-    /*
-     * [vertex_count][3] coordinates; unit normals; red, green and blue. colours: NULL if the patch
-     * has no colours
-     */
-    double *xyz;
-    float *normals;
-    uint8_t *colours;
+    double *xyz;      /* [vertex_count][3] coordinates */
+    float *normals;   /* [vertex_count][3] unit normals */
+    uint8_t *colours; /* [vertex_count][3] red, green and blue; NULL: the patch has no colours */
 
     /* [triangle_count][3] vertex indices, counter-clockwise seen from outside */
     uint32_t *triangles;

@@ -27,9 +27,9 @@
  * The model is never changed.
  *
  * An ebpo_paint is entirely in memory: 48 bytes per point. An ebpo_paint keeps a descriptor of its
- * file open. Queries of the model use the memory of the model's budget, and the memory that each
- * function states. Texts and arrays that functions return are valid until the paint is changed or
- * freed.
+ * file open. Functions that query the model use memory within the model's budget (ebpo_model_new),
+ * and in addition the memory that their comments state. Texts and arrays that functions return are
+ * valid until the paint is changed or freed.
  *
  * Application: EBP 2017, section 4.5 (painting by a haptic device).
  */
@@ -194,8 +194,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *pain
  * Checks that every point and note is on its face. Points whose faces or surroundings are missing
  * in a subset are not checked. The checksums of the file do not ensure that points are on their
  * faces, because the program that wrote the file may have stored wrong positions. Functions that
- * query the model at a point also check that point. Use this function before you use stored points
- * without such a query.
+ * query the model at a stored point check this point themselves. If your program uses stored points
+ * in another way, call this function first.
  *
  * context    context of a matching model (ebpo_paint_check_model)
  * progress   callback, which is called with the stage "checking"; may be NULL
@@ -222,7 +222,8 @@ typedef struct ebpo_paint_layer {
 
     /*
      * Maximum sizes in bytes: title 255, author 255, date 31, description 4,095. The date is "" or
-     * valid for ebpo_is_date. A date that was read from a file may be any text, and may be kept.
+     * valid for ebpo_is_date. A date that was read from a file may be any text.
+     * ebpo_paint_set_layer accepts this text if it is the layer's current date.
      */
     const char *title, *author, *date, *description;
 
@@ -472,7 +473,7 @@ typedef struct ebpo_paint_pen {
 
     /*
      * Length of a step: distance along the path between two positions at which points are made. In
-     * the model's unit, at least 2^-200. 0: half of the radius, or of `spread` if that is larger.
+     * the model's unit, at least 2^-200. 0: half of the larger of `radius` and `spread`.
      */
     double step;
 
@@ -599,10 +600,11 @@ typedef struct ebpo_paint_face {
 typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*
- * Passes the faces that intersect the balls of a stroke's points, and their covered corners, to
- * `take`. Each face is passed once, in the order of the file. This function, ebpo_paint_bake and
- * ebpo_paint_measure take 110 bytes per face, and 300 bytes for each face that intersects the box
- * around one point.
+ * Passes to `take` each face that intersects the ball of a point of the stroke, and states which
+ * corners of the face are covered. Each face is passed once, in the order of the file. Memory of
+ * this function, ebpo_paint_bake and ebpo_paint_measure: 110 bytes for each such face. While the
+ * ball of a point is processed, also 300 bytes for each face that intersects the box around this
+ * ball.
  *
  * context                 context of a matching model (ebpo_paint_check_model)
  * points_outside_subset   receives the number of points whose faces are missing in the subset; may

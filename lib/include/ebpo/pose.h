@@ -3,9 +3,9 @@
  *
  * A pose transforms each vertex to the world in doubles, with one rounding per operation in a
  * defined order (docs/develop/collision.md, "Posed coordinates"). The results are the *posed
- * coordinates*. Decisions of queries are exact for posed coordinates: they are the same as if the
- * files contained the posed coordinates, and were computed without rounding. Lengths are in the
- * unit of the world: the model's unit times the scale.
+ * coordinates*. Decisions of queries are exact for posed coordinates: a decision is the one that a
+ * computation without rounding gives for these coordinates. Lengths are in the unit of the world:
+ * the model's unit times the scale.
  */
 #ifndef EBPO_POSE_H
 #define EBPO_POSE_H
@@ -17,10 +17,9 @@ extern "C" {
 #endif
 
 /*
- * Transforms a point x of the model to rotation (scale x) + translation. All values are finite;
- * `scale` is from 2^-300 to 2^300. Coordinate i of the result is the sum of rotation[i][k] scale
- * x_k over k, plus translation[i]. So the rows of `rotation` are the axes of the world in model
- * coordinates.
+ * Transforms a point x of the model to a point y of the world. y[i] is translation[i] plus the sum
+ * of rotation[i][k] * scale * x[k] for k = 0, 1, 2. So the rows of `rotation` are the axes of the
+ * world in model coordinates. All values are finite; `scale` is from 2^-300 to 2^300.
  */
 typedef struct ebpo_pose {
     double rotation[3][3];

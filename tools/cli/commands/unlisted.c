@@ -1,4 +1,6 @@
-/* Reads a file as if it were one byte longer, so that the library ignores the lists of chunks. */
+/* Opens a file without its lists of chunks. The lists state the length of their file, and the
+ * library ignores them in a file of another length. So the file is read as if it were one byte
+ * longer. */
 #include "cli/commands/unlisted.h"
 
 #include <errno.h>
