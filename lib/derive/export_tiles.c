@@ -1,11 +1,12 @@
 /* Exports the simplified surface, and the model's faces, as 3D Tiles 1.1.
  *
- * Each patch is a tile. The patches of the node's children are the tile's children. Viewers replace
- * the tile by its children (REPLACE). If the mesh is exported, a patch without patches below has
- * one child: a tile with the model's faces that the patch simplifies. Tiles are written one after
- * the other, and then tileset.json. The table of patches, the bounds of all tiles, and one tile are
- * in memory. A tile's geometricError is the greatest of the certified errors of this tile and the
- * tiles below, because readers expect that children have no greater error.
+ * A patch simplifies the faces below one node of the octree, and becomes a tile. The patches of the
+ * node's children become the tile's children. Viewers replace the tile by its children (REPLACE).
+ * If the mesh is exported, a patch without patches below has one child: a tile with the model's
+ * faces that the patch simplifies. Tiles are written one after the other, and then tileset.json.
+ * The table of patches, the bounds of all tiles, and one tile are in memory. A tile's
+ * geometricError is the greatest of the certified errors of this tile and the tiles below, because
+ * readers expect that children have no greater error.
  *
  * Coordinates are relative to an origin, which is the translation of the root tile. In glTF, y
  * points upwards, and readers of 3D Tiles turn y to z. So the glTF nodes of tiles first turn z to
@@ -51,7 +52,7 @@ typedef struct tiler {
     ebpo_chunks *chunks;
     ebpo_patch_table table;
     tile *patch; /* [table.count] tiles of the patches */
-    tile *faces; /* [table.count] tiles of the faces of patches without patches below */
+    tile *faces; /* [table.count] for patches without patches below: tiles of faces */
     double origin[3];
     char *folder;   /* path of the temporary folder */
     uint64_t files; /* number of tile files that may exist */
@@ -69,7 +70,8 @@ static ebpo_status name_file(const tiler *t, const char *name, char out[PATH_MAX
                           "the path is too long; write to a folder with a shorter path");
 }
 
-/* Makes a file in the folder. Sets *file to the descriptor, which fclose of the result closes. */
+/* Creates a file in the folder, and returns it as a stream. Sets *file to the stream's descriptor;
+ * fclose closes the stream and the descriptor. */
 static FILE *begin_file(const tiler *t, const char *name, int *file, ebpo_error *error)
 {
     char path[PATH_MAX];
@@ -96,7 +98,8 @@ static ebpo_status end_file(const tiler *t, FILE *f, int file, ebpo_error *error
 }
 
 /* Writes a tile with the geometry and colours of `patch`, and with the grid and name of `surface`.
- * Sets the bounds of the tile, and adds the greatest rounding error of a vertex to its error. */
+ * Sets the bounds of the tile. Adds the greatest rounding error of a vertex to the error of the
+ * tile. */
 static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_patch *patch,
                               tile *out, ebpo_error *error)
 {
@@ -140,7 +143,7 @@ static ebpo_status write_patch(tiler *t, uint64_t i, ebpo_error *error)
     ebpo_status status = ebpo_patch_read(&t->table, t->chunks, i, &patch, error);
     if (status != EBPO_OK)
         return status;
-    for (int k = 0; k < 3; k++) { /* the grid of the patch, so that vertices do not move */
+    for (int k = 0; k < 3; k++) { /* uses the grid of the patch, so that no vertex moves */
         surface.step[k] = ldexp(t->info->box_size[k], -patch.level - EBPO_PATCH_GRID);
         surface.grid[k] = t->info->box_origin[k];
     }
@@ -182,8 +185,8 @@ static void include_tile(tile *upper, const tile *below)
     upper->error = fmax(upper->error, below->error);
 }
 
-/* Extends the bounds of each tile to the bounds of the tiles below, and raises its error to the
- * greatest of their errors. */
+/* Extends the bounds of each tile, so that they contain the tiles below. Raises the error of each
+ * tile to the greatest error of the tiles below, if that is greater. */
 static void include_children(tiler *t)
 {
     for (uint64_t i = t->table.count; i-- > 0;) {

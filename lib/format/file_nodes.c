@@ -36,8 +36,8 @@ ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *n
     return EBPO_OK;
 }
 
-/* Returns EBPO_OK if the node can exist and is of `type`, which is EBPO_GRAY; otherwise
- * EBPO_E_ARGUMENT. `what`: the requested data, in the plural. */
+/* Fails with EBPO_E_ARGUMENT if the node is not of `type`, or if the level has no node of this
+ * rank. `what`: name of the requested data for messages, in the plural. */
 static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_node *node, ebpo_node_type type,
                               const char *what, ebpo_error *error)
 {
@@ -55,7 +55,8 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     uint64_t counts[4];
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
     if (status == EBPO_OK && gray->cell.level + 1 == chunks->file->info.level_count) {
-        /* pruned: ebpo_facts_check rejects files with other gray nodes on the last level */
+        /* the node is pruned: ebpo_facts_check rejects files with other gray nodes on the last
+         * level */
         *types = 0;
         memset(ranks, 0, 4 * sizeof *ranks);
         return EBPO_OK;
@@ -71,7 +72,7 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     return ebpo_ranks_check(chunks, gray->cell.level + 1, ranks, counts, error);
 }
 
-/* The arrays with a node's planes: planes that a gray node adds, or stored planes of a leaf. */
+/* The arrays of a level that have the planes of gray nodes or of leaves. */
 typedef struct plane_list {
     ebpo_array_id counts, codes;
     uint32_t part;
@@ -201,8 +202,8 @@ static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_
 
 const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };
 
-/* Returns the first item of the block that contains an item. An index array has a row of sums for
- * every EBPO_INDEX_ROWS-th item; a block is the items from one of these items to the next. */
+/* Returns the index of the first item of the block that contains `item`. A block is EBPO_INDEX_ROWS
+ * consecutive items. An index array has one row of sums for each block. */
 static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
 
 /* Reads the types and ranks of a group, and counts its nodes by type. */
@@ -368,10 +369,11 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
 
 /* --- chunks of a group that are not in memory --- */
 
-/* Adds to `keys` the missing chunks that are needed to read the counts of the items [item, item +
- * items), and to sum the counts before `item`. These chunks contain the preceding row of the array
- * `index` (or of the table of subtrees), and the array `counts` from this row on. Returns true if
- * chunks are missing. */
+/* The array `counts` has a count for each item of the level, such as the number of planes of each
+ * node. Adds to `keys` the missing chunks that are needed to read the counts of the items [item,
+ * item + items), and to sum all counts before `item`. The last row of the array `index` (or of the
+ * table of subtrees) before `item` has a part of this sum. The counts after this row give the
+ * remaining part. Returns true if chunks are missing. */
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
@@ -402,7 +404,7 @@ static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_
     return ebpo_chunks_missing(chunks, codes, level, first, sum, keys);
 }
 
-/* Returns the number of chunks of an array that may be absent. */
+/* Returns the number of chunks of an array; 0 if the array is absent. */
 static uint64_t chunks_of(const ebpo_array_in *array)
 {
     return array->present ? ebpo_shape_chunks(&array->shape) : 0;
@@ -488,9 +490,11 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
                              unsigned wanted, ebpo_error *error)
 {
     enum {
-        STAGES = 4, /* chunks of each stage locate those of the next: rows of the table of subtrees;
-                       types; counts of planes; planes */
-        FIRST_BYTES = 32 << 10 /* bytes of the next levels that are fetched with level 0 */
+        /* The chunks of a stage locate the chunks of the next stage. The stages are: rows of the
+         * table of subtrees; types; counts of planes; planes. */
+        STAGES = 4,
+        /* Small arrays of the next levels are fetched with level 0, up to about this size. */
+        FIRST_BYTES = 32 << 10
     };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {

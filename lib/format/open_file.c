@@ -207,8 +207,9 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
 }
 
 /* Opens the list of chunk checksums. Ignores the list if its chunks have no HDF5 filters, because
- * then the last bytes of chunks are not checksums. Also ignores a damaged list that does not state
- * the present size of the file, because another program has rewritten such a file. */
+ * then the last bytes of chunks are not checksums. Also ignores a list that does not state the
+ * present size of the file, because another program has then rewritten the file. In this case, a
+ * damaged list is not an error. */
 static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];

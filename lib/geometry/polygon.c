@@ -1,14 +1,16 @@
-/* Cuts polygons in space and closed chains into triangles between their own corners.
+/* Divides polygons in space, and closed chains of edges, into triangles. Each corner of a triangle
+ * is a corner of the polygon or chain.
  *
  * A polygon is projected along the axis on which its normal is largest. A convex polygon becomes a
- * fan; every other polygon is cut ear by ear, with exact tests. The ear at a corner is the triangle
- * of this corner and its two neighbours. The ear may be cut off if no other corner is in the way
- * ("blocks" the ear). A corner is tested again only when its neighbours have changed, or when the
- * corner that blocked its ear was cut off. A tree of boxes finds blocking corners. So an outline of
- * n corners is cut in about n log n steps, also for 100,000 corners and more. An outline that
- * crosses itself gets the triangles of least area in space. A closed chain, which is the boundary
- * of a hole, also gets the triangles of least area. Sources: Meisters, "Polygons have ears", 1975;
- * Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
+ * fan; every other polygon is cut ear by ear, with exact tests. Its projection is called the
+ * outline. The ear at a corner is the triangle of this corner and its two neighbours. The ear may
+ * be cut off if no other corner is in the way ("blocks" the ear). A corner is tested again only
+ * when its neighbours have changed, or when the corner that blocked its ear was cut off. A tree of
+ * boxes finds blocking corners. Because few ears are tested again and the tree makes tests fast, an
+ * outline of n corners takes about n log n steps. An outline that crosses itself gets the triangles
+ * of least area in space. A closed chain, which is the boundary of a hole, also gets the triangles
+ * of least area. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps
+ * in the boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -227,10 +229,10 @@ typedef enum ear_rule {
     EBPO_EARS_CLOSED,
 
     /* For outlines that touch themselves (slits, bridges to holes, pinched corners). A corner
-     * blocks the ear if it is within the triangle or on the side that cutting would add to the
-     * outline. A corner on one of the two other sides blocks the ear if an edge of the outline
-     * leads from this corner into the triangle. If no ear is left, spikes without area are cut off.
-     */
+     * blocks the ear if it is inside the triangle, or on the side of the triangle that would become
+     * an edge of the outline. A corner on one of the two other sides blocks the ear if an edge of
+     * the outline leads from this corner into the triangle. If no ear is left, spikes without area
+     * are cut off. */
     EBPO_EARS_TOUCHING
 } ear_rule;
 
@@ -267,13 +269,14 @@ typedef struct outline {
     uint64_t words[LEVELS];
     int levels;
 
-    /* for each corner, the corner that blocks its ear, or NONE; and the list of the corners whose
-     * ears it blocks */
+    /* [n] each. blocker: for each corner, the corner that blocks its ear, or NONE. first_blocked:
+     * for each corner x, the first corner whose ear x blocks, or NONE. next_blocked and
+     * previous_blocked link this corner to the other corners whose ears x blocks. */
     uint32_t *blocker, *first_blocked, *next_blocked, *previous_blocked;
 
-    /* [2 * leaves] A tree of boxes around runs of corners. The root has the index 1; the children
-     * of box i have the indices 2 * i and 2 * i + 1. corners: number of corners in each box that
-     * are not cut off */
+    /* [2 * leaves] A tree of boxes around runs of consecutive corners. The root has the index 1;
+     * the children of box i have the indices 2 * i and 2 * i + 1. corners: number of corners in
+     * each box that are not cut off */
     box *boxes;
     uint32_t *corners;
     uint32_t leaves; /* a power of two; 0: no tree */
@@ -284,7 +287,7 @@ typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
-    bool along_a, along_c; /* true: another edge runs from b's position towards a (towards c) */
+    bool along_a, along_c; /* true: another edge runs from b's position towards a (or c) */
 } tested_ear;
 
 /* Returns 1 if the corners a, b, c turn counter-clockwise, -1 if clockwise, otherwise 0. */
@@ -362,7 +365,8 @@ static void block_ear(outline *o, uint32_t b, uint32_t x)
         o->previous_blocked[after] = b;
 }
 
-/* Marks the ears that corner x blocks as ears to be tested. */
+/* Marks the ears that corner x blocks, so that they are tested again. Empties the list of these
+ * ears. */
 static void test_blocked_again(outline *o, uint32_t x)
 {
     for (uint32_t b; (b = o->first_blocked[x]) != NONE; unblock_ear(o, b))
@@ -532,7 +536,7 @@ static tested_ear ear_at(const outline *o, uint32_t b)
     return e;
 }
 
-/* ---- the side of the outline that an ear is on ---- */
+/* ---- ears outside the outline ---- */
 
 /* Computes a point within the ear. Returns false if the rounded point is not within the ear. */
 static bool point_within(const tested_ear *e, double out[2])
@@ -562,8 +566,8 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
     return winding;
 }
 
-/* Returns true if the ear is not inside the outline. Such an ear occurs where a passage without
- * width bends: there, two parts of the outline run along each other. */
+/* Returns true if the ear is outside the outline. This happens at bends of a passage without width,
+ * in which two parts of the outline run along each other. */
 static bool is_outside(outline *o, const tested_ear *e)
 {
     double q[2];
@@ -663,12 +667,12 @@ static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 
 /* ---- scratch ---- */
 
-/* Returns the bytes of scratch memory for n corners. The memory needs the alignment of malloc.
- * Returns 0 when the number does not fit into 64 bits. */
+/* Returns the bytes of scratch memory for n corners. The memory must be aligned like memory from
+ * malloc. Returns 0 if the number of bytes does not fit into 64 bits. */
 static uint64_t ears_scratch_bytes(uint64_t n)
 {
-    /* Each corner needs six numbers, at most 4 / BLOCK boxes and counts, and less than one byte of
-     * bits. */
+    /* Each corner needs six values of 32 bits, less than one byte of `bits`, and at most 4 / BLOCK
+     * boxes of the tree, each with its count `corners`. */
     const uint64_t corner_bytes =
         6 * sizeof(uint32_t) + 4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
     uint64_t bytes;
@@ -785,8 +789,8 @@ static bool find_scale(polygon *p)
     return true;
 }
 
-/* Computes the normal by Newell's sum. Its components are half of the areas of the projections
- * along the axes. Coordinates are relative to the first corner, so that fewer digits are lost. */
+/* Computes the normal by Newell's sum. Component k is half of the area of the polygon's projection
+ * along axis k. Coordinates are relative to the first corner, so that fewer digits are lost. */
 static void newell_normal(const polygon *p, double normal[3])
 {
     normal[0] = normal[1] = normal[2] = 0;
@@ -836,8 +840,9 @@ static bool is_ascending(const double a[2], const double b[2])
     return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
 }
 
-/* Classifies the polygon. A polygon with only left turns need not be convex (a pentagram is an
- * example). It is convex if also its direction along x changes only twice. */
+/* Classifies the polygon. A polygon with only left turns is convex if, in addition, the direction
+ * of its edges along x changes only twice. (A pentagram also has only left turns, but is not
+ * convex.) */
 static ebpo_polygon_kind classify_polygon(const polygon *p)
 {
     bool straight = false;

@@ -1,13 +1,14 @@
 /* Joins patches of the simplified surface to one mesh without cracks. A patch approximates the
  * faces below a node (format/surface_patches.h).
  *
- * On its border, a patch has at most one vertex in each "border cell". The border cells are the
- * cells EBPO_PATCH_CELLS levels below the patch's node. Patches are joined from coarse to fine. For
- * each vertex on the border of a finer patch, the border cells that contain this vertex are
- * searched, from coarse to fine. The search ends at the first cell that has a vertex. This vertex
- * replaces the vertex of the finer patch. Each vertex of the model on the border is in a border
- * cell with a vertex, so both sides of a border get the same vertices. Vertices of the model's
- * faces are replaced in the same way. Source: format-spec/surface.md. */
+ * The border cells of a patch are the cells of the octree that are EBPO_PATCH_CELLS levels deeper
+ * than the patch's node. On its border, a patch has at most one vertex in each border cell. Patches
+ * are joined from coarse to fine. For each vertex on the border of a finer patch, the border cells
+ * of the coarser patches that contain this vertex are searched, from coarse to fine. If a cell has
+ * a vertex of a coarser patch, the search ends, and the cell's vertex replaces the vertex of the
+ * finer patch. On a common border, the coarser patch has a vertex in each border cell that contains
+ * a vertex of the model. So both patches get the same vertices. Vertices of the model's faces are
+ * replaced in the same way. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -68,7 +69,7 @@ static uint32_t add_vertex(joiner *j, const ebpo_patch *patch, uint64_t v)
     return to;
 }
 
-/* Searches the border cells that contain the point p, for patches of level 0 to `levels` - 1, from
+/* Searches the border cells of patches of levels 0 to `levels` - 1 that contain the point p, from
  * coarse to fine. Returns the vertex of the first cell that has a vertex, or NONE. */
 static uint32_t find_vertex(const joiner *j, const double p[3], int levels)
 {

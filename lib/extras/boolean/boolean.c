@@ -330,8 +330,8 @@ void ebpo_boolean_free(ebpo_boolean *b)
 
 /* --- points --- */
 
-/* States of the operands at a point. If the point is on a face of an operand, the operand may have
- * two states: above and below the plane of the face. */
+/* States of the operands at a point. If the point is on a face, each operand has one state just
+ * above the plane of the face and one state just below it. */
 typedef struct operand_states {
     uint64_t known;     /* a bit for each operand that has the same state on both sides */
     uint64_t above;     /* a bit for each operand that contains the points just above the plane */
