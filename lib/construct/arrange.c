@@ -373,8 +373,8 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
 }
 
 typedef struct face_record {
-    /* least vertex << 32 | index of the face in the source. With the source index, the result does
-     * not depend on the old order */
+    /* Upper 32 bits: the least vertex index of the face. Lower 32 bits: the face's index in the
+     * source, so that the result does not depend on the old order. */
     uint64_t key;
     uint32_t corner[3], unused; /* corner: new indices of the vertices */
 } face_record;

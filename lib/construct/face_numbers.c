@@ -1,4 +1,4 @@
-/* Assigns final indices to faces and vertices, and puts the mesh into their order.
+/* Assigns final indices to faces and vertices, and sorts the mesh by these indices.
  *
  * Leaves are visited depth first. A face gets the next index in the first leaf that lists it, and a
  * vertex gets the next index in the first face that uses it. So the new faces of a leaf (no earlier

@@ -151,7 +151,7 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
                               "a gray node has no winding number; query its children");
     ebpo_array_id id = arrays[node->type];
     if (!ebpo_reader_array(chunks->file, id, node->cell.level)->present)
-        return EBPO_OK; /* the default value; leaves always have the array */
+        return EBPO_OK; /* the array is absent: every number has the default value */
     status = ebpo_chunks_integers(chunks, id, node->cell.level, node->rank, 1, winding,
                                   sizeof *winding, error);
     if (status == EBPO_OK && info->solid && node->type != EBPO_LEAF &&

@@ -605,7 +605,8 @@ static ebpo_status find_from(const char *path, const ebpo_http_options *http, co
     return status;
 }
 
-/* Opens the copy by its descriptor `to`, which stays open, and checks its content checksum. */
+/* Opens the copy by its descriptor `to`, and checks its content checksum. The descriptor stays
+ * open. */
 static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_options *o,
                              ebpo_file **out, ebpo_error *error)
 {

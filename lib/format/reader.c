@@ -20,7 +20,7 @@
 
 enum {
     IDLE_MAX = 4,        /* maximum number of idle readers of a file */
-    STORED_MAX = 1 << 18 /* maximum bytes of an idle reader's buffer for stored chunks */
+    STORED_MAX = 1 << 18 /* maximum size, in bytes, of an idle reader's buffer */
 };
 
 void ebpo_idle_readers_make(ebpo_idle_readers *readers)
@@ -235,8 +235,8 @@ void ebpo_hint_top(const ebpo_file *file)
         !is_plausible_top(info))
         return;
     const ebpo_chunk_location *directory = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
-    /* the chunk directory, the checksums, and the top bytes without HDF5's chunk indexes, which a
-     * reader of the directory does not need */
+    /* the chunk directory, the list of checksums, and the top bytes before and after HDF5's chunk
+     * indexes, which are not needed with the chunk directory */
     ebpo_range range[4] = { { directory->address, directory->bytes } };
     size_t count = 1;
     if (wants_checksums(file))

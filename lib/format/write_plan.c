@@ -145,8 +145,9 @@ static bool columns_are_less(ebpo_chunk_coder *coder, const uint8_t *values, siz
     return columns < plain;
 }
 
-/* Chooses the codings of an attribute array: of the values, and of the items of lists. The ends of
- * lists ascend, so they are always stored as differences. */
+/* Chooses if an attribute array is stored as columns of differences or as plain values. Lists of
+ * different lengths are stored as two arrays, the ends and the items of the lists. Ends ascend, so
+ * they are always stored as differences. */
 static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
                            ebpo_chunk_coder *coder)
 {

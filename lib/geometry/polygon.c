@@ -623,8 +623,8 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
         o->corners[node]--;
 }
 
-/* Returns true if the ear at b may be cut. If not, the ear will be tested again when the result of
- * the test may have changed. */
+/* Returns true if the ear at b may be cut off. If the result is false, the ear will be tested again
+ * as soon as the result may be different. */
 static bool is_ear(outline *o, uint32_t b)
 {
     tested_ear e = ear_at(o, b);
@@ -638,7 +638,7 @@ static bool is_ear(outline *o, uint32_t b)
     return x == NONE && !is_outside(o, &e);
 }
 
-/* Walks around the outline and cuts every ear, skipping one corner after each cut, so that no long
+/* Walks around the outline and cuts off every ear. Skips one corner after each cut, so that no long
  * fans of thin triangles result. */
 static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 {

@@ -102,8 +102,9 @@ static unsigned may_not(unsigned may)
     return (may & EBPO_MAY_IN ? EBPO_MAY_OUT : 0u) | (may & EBPO_MAY_OUT ? EBPO_MAY_IN : 0u);
 }
 
-/* Returns the possible states of an intersection of two operands. The intersection may be in if
- * both operands may be in. It may be out if at least one operand may be out. */
+/* Returns the possible states of an intersection of two operands. The state "in" is possible if it
+ * is possible for both operands. The state "out" is possible if it is possible for at least one
+ * operand. */
 static unsigned may_in_both(unsigned a, unsigned b)
 {
     return (a & b & EBPO_MAY_IN) | ((a | b) & EBPO_MAY_OUT);

@@ -71,8 +71,8 @@ static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *err
     return ebpo_tree_store(&c->tree, folder, "ebpo-crossings", &options, &c->file, error);
 }
 
-/* Least memory budget of the model in bytes. A quarter of the workspace's memory is less than this
- * only in tests. */
+/* Minimum memory budget of the model in bytes. It has an effect only in tests, in which a quarter
+ * of the available memory may be less. */
 enum { LEAST_MODEL = 1 << 20 };
 
 /* Makes the model and its collider. memory: number of bytes that the workspace, the model and the

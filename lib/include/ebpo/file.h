@@ -238,8 +238,8 @@ typedef struct ebpo_level_summary {
     uint64_t new_count;
 
     /*
-     * Number of references of this level's leaves, as in ebpo_level. A reference is a face of a
-     * leaf that also intersects an earlier leaf.
+     * Number of references of this level's leaves, ref_count of ebpo_level. A reference is a face
+     * of a leaf that also intersects an earlier leaf.
      */
     uint64_t ref_count;
 
@@ -340,8 +340,8 @@ typedef struct ebpo_info {
 
     /*
      * Byte offset and size of HDF5's chunk indexes, for prefetching. The chunk indexes are stored
-     * after the data of the first levels. Arrays of one chunk have no chunk index. Both are 0 if
-     * the file has no chunk indexes, or does not record their location.
+     * after the data of the first levels. Arrays of one chunk have no chunk index. Both members are
+     * 0 if the file has no chunk indexes, or does not record their location.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
@@ -405,18 +405,20 @@ typedef struct ebpo_info {
     bool gates;
 
     /*
-     * For files with EBPO_PART_BORDER: number of loops of the border, number of points in all
-     * loops, number of points in the longest loop; area of the triangles that close the loops, in
-     * square units of the model; checksum of the border.
+     * For files with EBPO_PART_BORDER. border_loops: number of loops of the border. border_points:
+     * number of points in all loops. border_longest: number of points in the longest loop.
+     * border_area: area of the triangles that close the loops, in square units of the model.
+     * border_sha256: checksum of the border.
      */
     uint64_t border_loops, border_points, border_longest;
     double border_area;
     uint8_t border_sha256[32];
 
     /*
-     * For files with EBPO_PART_SURFACE, the simplified surface: number of patches, of triangles and
-     * of vertices; number of bytes of the triangle codes; number of vertices with colours, which is
-     * 0 or the number of vertices; checksum of the simplified surface.
+     * For files with EBPO_PART_SURFACE. surface_patches, surface_triangles, surface_vertices:
+     * number of patches, triangles and vertices of the simplified surface. surface_code_bytes:
+     * number of bytes of the triangle codes. surface_colours: number of vertices with colours,
+     * which is 0 or surface_vertices. surface_sha256: checksum of the simplified surface.
      */
     uint64_t surface_patches, surface_triangles, surface_vertices, surface_code_bytes,
         surface_colours;
@@ -464,8 +466,8 @@ typedef struct ebpo_surface {
 
 /*
  * A whole model in memory: ebpo_build makes it and ebpo_tree_write writes it. Faces are in the
- * order of the first leaf that they intersect, depth first by octcode. Vertices are in the order of
- * first use, unreferenced vertices last.
+ * order of the first leaf that they intersect. The order of leaves is depth first, with siblings in
+ * the order of their octants. Vertices are in the order of first use, unreferenced vertices last.
  */
 typedef struct ebpo_tree {
     ebpo_info info;
@@ -643,8 +645,9 @@ typedef struct ebpo_file ebpo_file;
  * give wrong results. ebpo_verify checks that the parts of a file are consistent.
  *
  * If another program truncates or damages an open file, reading returns EBPO_E_IO or EBPO_E_FORMAT.
- * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
- * exchanged chunks. For files without this list, ebpo_file_check_content detects exchanged chunks.
+ * The checksum of a chunk detects changed bytes. The list of chunk checksums (ebpo_chunk_checksums)
+ * also detects that a chunk was replaced by another valid chunk. For files without this list,
+ * ebpo_file_check_content detects such a replacement.
  *
  * If an HDF5 program, such as h5repack, has rewritten a file, the chunks may have no checksums.
  * Opening such a file reads the whole file and compares content_sha256. Later changes of such a
@@ -912,7 +915,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_
                                                     ebpo_error *error);
 
 /*
- * Prefetch hint: levels `first` to `last` will be read; `last` may be beyond the last level. A
+ * Hint that the levels `first` to `last` will soon be read. `last` may be beyond the last level. A
  * remote source fetches these levels with as few requests as possible. The function may wait for
  * the chunk directory (ebpo_file_locate), but not for levels. Errors are reported by later reads.
  *
@@ -1150,8 +1153,8 @@ typedef struct ebpo_patch {
     uint64_t first_face, face_count;
 
     /*
-     * Upper bound of two distances, in the model's unit: of each point of the patch from the
-     * replaced faces, and of each point of the replaced faces from the patch.
+     * Upper bound of the distance of each point of the patch from the replaced faces, and of each
+     * point of the replaced faces from the patch. In the model's unit.
      */
     double error;
     uint64_t vertex_count, triangle_count;
