@@ -50,7 +50,7 @@ configure_sanitized() { # compiler, build, sanitizers, meson options...
     CC=$compiler configure "$folder" -Db_sanitize="$sanitizers" -Db_lundef=false \
         --buildtype=debugoptimized -Dc_args="$flags" -Dcpp_args="$flags" "$@"
 }
-run() { # build
+configure_build() { # build
     case $1 in
     gcc | clang) CC=$1 configure "$1" ;;
     sanitize) configure_sanitized gcc "$1" address,undefined -Doptimization=1 ;;
@@ -64,6 +64,8 @@ run() { # build
             -Dqhull=disabled -Doptimization=0
         ;;
     esac
+}
+run() { # build
     read -r share left_out <<EOF
 $(plan "$1")
 EOF
@@ -107,12 +109,29 @@ can_hold_tests() {
 if [ -z "${TMPDIR:-}" ] && can_hold_tests; then
     export TMPDIR="$memory"
 fi
-times=
-for build in "$@"; do
-    echo "=== $tier: $build ==="
+times= ahead=
+# Ends the compilation that runs ahead; meson test continues it.
+end_ahead() {
+    [ -z "$ahead" ] || kill "$ahead" 2>/dev/null || true
+    wait
+}
+trap end_ahead EXIT
+trap 'exit 1' INT TERM
+configure_build "$1"
+while [ $# -gt 0 ]; do
+    echo "=== $tier: $1 ==="
     began=$(date +%s)
-    run "$build"
-    times="$times $build:$began:$(date +%s)"
+    end_ahead
+    ahead=
+    # Tests leave cores idle while they wait. The next build is compiled meanwhile.
+    if [ $# -gt 1 ]; then
+        configure_build "$2"
+        nice -n 19 ninja -C "build-$2" >/dev/null 2>&1 &
+        ahead=$!
+    fi
+    run "$1"
+    times="$times $1:$began:$(date +%s)"
+    shift
 done
 # shellcheck disable=SC2086
 python3 tests/summary.py $times
