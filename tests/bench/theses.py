@@ -99,9 +99,9 @@ def summary(runs):
 def not_run(page, runs):
     missing = [name for name in STEPS if not runs.result(name)]
     seconds = sum(runs.result(name)["step_seconds"] for name in STEPS if runs.result(name))
-    page.text("## Cost of the script, and rows that were not run", "",
+    page.text("## Cost of the script", "",
               f"The {len(STEPS) - len(missing)} steps on this page took {seconds / 3600:.1f} hours on the busy machine, "
-              "0.8 GB of disk without temporary files, and 4.0 GB of memory. All steps need about 2 hours of one core.")
+              "0.8 GB of disk without temporary files, and 4.0 GB of memory.")
     if missing:
         few = ", ".join(f"`{name}` ({MINUTES.get(name, 'unknown')})" for name in missing)
         page.text(f"Not run, with the expected minutes of one core: {few}.")

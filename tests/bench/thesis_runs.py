@@ -206,7 +206,7 @@ def large_selection(select, percent):
     def step(runs):
         name = f"lucy_x256_{select}_{percent}"
         out = runs.convert(name, runs.model("lucy_x256"), "--memory", "1GiB", "--select", select,
-                           "--percent", percent, "--leaf-faces", 0, "--profile", "full")
+                           "--percent", percent, "--leaf-faces", 0, "--parts=+leaf-planes")
         os.remove(runs.file(name))
         return out
     return step
