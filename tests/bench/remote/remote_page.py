@@ -116,7 +116,7 @@ def goal_table(page, found, note):
     if note:
         page.text(note)
     rows = list(goal_rows(found))
-    page.table(["missed or not measured", "measured", "goal"], [row[:3] for row in rows if row[3] != "yes"])
+    page.table(["missed or not measured", "measured (goal)"], joined(row for row in rows if row[3] != "yes"))
     page.table(["met", "measured (goal)"], joined(row for row in rows if row[3] == "yes"))
 
 
