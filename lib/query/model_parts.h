@@ -100,16 +100,18 @@ enum { EBPO_SKELETON_NODES = 64 };
 void ebpo_skeleton_grow(ebpo_skeleton *skeleton, const ebpo_accel *subtree, const double p[3],
                         double limit, bool (*take)(void *user, uint64_t bytes), void *user);
 
-/* A box around some shared faces, in the model's unit. */
-typedef struct ebpo_shared_box {
+/* A box around some faces, in the model's unit. */
+typedef struct ebpo_faces_box {
     double low[3], high[3];
-} ebpo_shared_box;
+} ebpo_faces_box;
+/* Writes boxes that together contain all faces of the subtree; returns their number. */
+unsigned ebpo_skeleton_boxes(const ebpo_skeleton *skeleton, ebpo_faces_box out[8]);
 /* Maximum number of boxes of a skeleton. */
 enum { EBPO_SHARED_BOXES = 64 };
 /* Writes boxes that contain all shared faces that may be within `limit` of p; returns the number of
  * boxes. */
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double p[3], double limit,
-                                    ebpo_shared_box out[EBPO_SHARED_BOXES]);
+                                    ebpo_faces_box out[EBPO_SHARED_BOXES]);
 
 /* The skeletons of a model's subtrees. `number`: index of a subtree in top->below. Any thread may
  * use the skeletons. */

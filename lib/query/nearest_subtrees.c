@@ -382,11 +382,11 @@ static ebpo_status add_owned(searching *g, uint32_t below, double lower, ebpo_er
  * box around these faces, and which precede S, depth first. */
 typedef struct owners {
     searching *g;
-    uint64_t code;                 /* octcode of S */
-    int level;                     /* level of S's root */
-    double lower;                  /* bound with which S left the queue */
-    const ebpo_shared_box *shared; /* box around some shared faces of S */
-    /* Called for each owner. The walk ends if `visit` returns false. */
+    uint64_t code;                /* octcode of S */
+    int level;                    /* level of S's root */
+    double lower;                 /* bound with which S left the queue */
+    const ebpo_faces_box *shared; /* box around some shared faces of S */
+    /* Called for each owner. The walk ends if it returns false. */
     bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
     ebpo_status status;
 } owners;
@@ -443,8 +443,8 @@ static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *
     return true;
 }
 
-/* Visits the owners of the faces in all boxes. Returns false as soon as o->visit returns false. */
-static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, ebpo_error *error)
+/* Visits the owners of the faces in all boxes. Returns false as soon as o->visit does. */
+static bool visit_all(owners *o, const ebpo_faces_box *boxes, unsigned count, ebpo_error *error)
 {
     for (unsigned i = 0; i < count; i++) {
         o->shared = &boxes[i];
@@ -459,7 +459,7 @@ static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, e
 static bool add_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
                        ebpo_status *status, ebpo_error *error)
 {
-    ebpo_shared_box box[EBPO_SHARED_BOXES];
+    ebpo_faces_box box[EBPO_SHARED_BOXES];
     unsigned count = ebpo_skeleton_shared_boxes(k, g->n->p, g->n->limit, box);
     owners o = { .g = g,
                  .code = ebpo_octcode_of_cell(r->node.cell),

@@ -381,9 +381,9 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
     }
 }
 
-static ebpo_shared_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int lane)
+static ebpo_faces_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int lane)
 {
-    ebpo_shared_box out;
+    ebpo_faces_box out;
     for (int i = 0; i < 3; i++) {
         ebpo_bound_sides side = ebpo_bound_side(b, lane, i);
         double low = k->centre[i] + side.low / k->scale, high = k->centre[i] + side.high / k->scale;
@@ -397,7 +397,7 @@ static ebpo_shared_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int l
 /* Writes the boxes of all children, at or below the children `lanes` of a node, that may be within
  * the limit and whose nodes are not in the skeleton. Returns their number. */
 static unsigned boxes_of(const ebpo_skeleton *k, uint32_t index, unsigned lanes, const double p[3],
-                         double limit2, ebpo_shared_box out[])
+                         double limit2, ebpo_faces_box out[])
 {
     unsigned count = 0;
     double lower2[8];
@@ -415,8 +415,16 @@ static unsigned boxes_of(const ebpo_skeleton *k, uint32_t index, unsigned lanes,
     return count;
 }
 
+unsigned ebpo_skeleton_boxes(const ebpo_skeleton *k, ebpo_faces_box out[8])
+{
+    const ebpo_bound *top = &node_at(k, 0)->bound;
+    for (int lane = 0; lane < top->count; lane++)
+        out[lane] = box_of(k, top, lane);
+    return top->count;
+}
+
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *k, const double point[3], double limit,
-                                    ebpo_shared_box out[EBPO_SHARED_BOXES])
+                                    ebpo_faces_box out[EBPO_SHARED_BOXES])
 {
     double p[3];
     bool near = to_frame(k, point, p);

@@ -521,6 +521,56 @@ START_TEST(test_collision_shares_one_budget)
 }
 END_TEST
 
+/* Returns the number of visited pairs of subtrees since `before`. */
+static uint64_t pairs_since(const ebpo_collider *c, ebpo_collider_stats before)
+{
+    return stats_of(c).subtree_pairs - before.subtree_pairs;
+}
+
+/* A first contact visits few pairs of subtrees. If subtrees were loaded before, pairs whose faces
+ * are in boxes that are apart are not visited again. */
+START_TEST(test_collision_visits_few_subtrees)
+{
+    enum { FIRST_MAX = 20, CUT = 4 };
+    query_model m[2];
+    ebpo_model *part[2];
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_face_pair pair;
+    int32_t found = 0;
+    options.pose_b.translation[0] = 0.31;
+    options.pose_b.translation[2] = 0.17;
+    for (int i = 0; i < 2; i++) {
+        ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+        query_model_make(&m[i], "fine torus", ebpo_test_torus(2, 0.7 + 0.01 * i, 256, 128),
+                         &query_variants[0]);
+        how.cut_level = CUT;
+        ASSERT_OK(ebpo_model_new(m[i].file, &how, &part[i], error));
+    }
+    ebpo_collider *parts = meet(part[0], part[1]);
+    ebpo_collider_stats before = stats_of(parts);
+    ASSERT_OK(ebpo_collide_first(parts, &options, &pair, &found, error));
+    uint64_t first = pairs_since(parts, before);
+    ck_assert_int_eq(found, 1);
+    before = stats_of(parts);
+    reported want = query_pairs(parts, &options.pose_b);
+    uint64_t all = pairs_since(parts, before);
+    before = stats_of(parts);
+    reported again = query_pairs(parts, &options.pose_b);
+    ck_assert_uint_eq(want.count, again.count);
+    ck_assert(memcmp(want.bytes, again.bytes, want.count) == 0);
+    ck_assert_msg(first <= FIRST_MAX, "%d of %d pairs of subtrees", (int)first, (int)all);
+    ck_assert_msg(2 * pairs_since(parts, before) < all, "%d pairs of subtrees, then %d", (int)all,
+                  (int)pairs_since(parts, before));
+    ebpo_collider_free(parts);
+    for (int i = 0; i < 2; i++) {
+        ebpo_model_free(part[i]);
+        query_model_free(&m[i]);
+    }
+    free(want.bytes);
+    free(again.bytes);
+}
+END_TEST
+
 /* A model that takes up to half of the budget is loaded completely; its memory is returned
  * afterwards. */
 START_TEST(test_small_models_load_whole)
@@ -553,6 +603,7 @@ TEST_SUITE(collide_parts)
     tcase_set_timeout(tests, 900);
     tcase_add_loop_test(tests, test_partly_loaded_collision_matches_whole, 0, NAMES * NAMES);
     tcase_add_test(tests, test_collision_shares_one_budget);
+    tcase_add_test(tests, test_collision_visits_few_subtrees);
     tcase_add_test(tests, test_small_models_load_whole);
     Suite *suite = suite_create("collide_parts");
     suite_add_tcase(suite, tests);

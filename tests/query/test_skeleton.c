@@ -105,7 +105,7 @@ static void check_bounds(const ebpo_accel *s, const double *points, uint64_t cou
         ebpo_skeleton_free(few[i]);
 }
 
-static bool holds(const ebpo_shared_box *box, const double t[3][3])
+static bool holds(const ebpo_faces_box *box, const double t[3][3])
 {
     bool in = true;
     for (int i = 0; i < 9; i++)
@@ -116,7 +116,7 @@ static bool holds(const ebpo_shared_box *box, const double t[3][3])
 /* Checks exactly that every shared face within the limit is in some box. */
 static void check_shared_boxes(const ebpo_accel *s, const double p[3], double limit)
 {
-    ebpo_shared_box box[EBPO_SHARED_BOXES];
+    ebpo_faces_box box[EBPO_SHARED_BOXES];
     ebpo_skeleton *k = s->shared_count ? ebpo_skeleton_make(s, 8) : NULL;
     unsigned count = k ? ebpo_skeleton_shared_boxes(k, p, limit, box) : 0;
     slots all = slots_of(s);

@@ -209,6 +209,47 @@ void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8]
     }
 }
 
+void ebpo_posed_ends(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[3])
+{
+    ebpo_box box = ebpo_model_box(s->model);
+    double low[3], high[3], end[2][3];
+    ebpo_cell_bounds(&box, cell, low, high);
+    ebpo_posing_apply(&s->posing, low, end[0]);
+    ebpo_posing_apply(&s->posing, high, end[1]);
+    for (int k = 0; k < 3; k++)
+        out[k] = end[0][k] + end[1][k];
+}
+
+/* Sets *out to the box around a posed box. */
+static void pose_box(const ebpo_posing *p, const ebpo_faces_box *box, ebpo_faces_box *out)
+{
+    double middle[3], half[3], posed[3];
+    for (int k = 0; k < 3; k++) {
+        middle[k] = box->low[k] + (box->high[k] - box->low[k]) / 2;
+        half[k] = (box->high[k] - box->low[k]) / 2;
+    }
+    ebpo_posing_apply(p, middle, posed);
+    for (int i = 0; i < 3; i++) {
+        double reach = 0;
+        for (int k = 0; k < 3; k++)
+            reach += fabs(p->matrix[i][k]) * half[k];
+        out->low[i] = posed[i] - reach;
+        out->high[i] = posed[i] + reach;
+    }
+}
+
+unsigned ebpo_posed_face_boxes(const ebpo_posed_subtrees *s, uint32_t number, ebpo_faces_box out[8])
+{
+    const ebpo_skeleton *skeleton =
+        s->model->skeletons ? ebpo_skeletons_find(s->model->skeletons, number) : NULL;
+    unsigned count = skeleton ? ebpo_skeleton_boxes(skeleton, out) : 0;
+    for (unsigned i = 0; i < count; i++) {
+        ebpo_faces_box box = out[i];
+        pose_box(&s->posing, &box, &out[i]);
+    }
+    return count;
+}
+
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate)
 {
     double side = 0;

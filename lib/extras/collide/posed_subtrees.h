@@ -65,6 +65,13 @@ ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_
 /* Computes the posed corners of a cell. If bit k of a corner's index is 1, the corner has the
  * cell's upper coordinate on axis k. */
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3]);
+/* Computes the sum of the first and the last posed corner of a cell: twice the cell's middle. */
+void ebpo_posed_ends(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[3]);
+/* Writes boxes in the world that together contain all posed faces of a subtree, except for errors
+ * up to ebpo_posed_slack. Returns their number; 0 if they are not known, because the subtree was
+ * never loaded. */
+unsigned ebpo_posed_face_boxes(const ebpo_posed_subtrees *s, uint32_t number,
+                               ebpo_faces_box out[8]);
 /* Returns a bound of the errors that posing and cutting cause in the corners of the envelope of a
  * cell. max_coordinate: upper bound of the absolute values of posed coordinates. */
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate);

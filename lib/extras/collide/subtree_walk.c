@@ -2,11 +2,13 @@
  * that are entirely in memory (whole models).
  *
  * Two faces with a common point are listed by subtrees whose cells contain this point. So only
- * pairs of subtrees whose envelopes may have a common point must be searched. These pairs of
- * subtrees are found before any subtree is loaded, and are sorted so that a loaded subtree is used
- * again soon. Several threads search pairs of subtrees. A pair of faces is found more than once if
- * several subtrees list one of its faces. So the pairs of faces are stored, sorted and made unique
- * before they are returned.
+ * pairs of subtrees whose envelopes may have a common point must be searched. If both subtrees were
+ * loaded before, boxes around their faces, from their skeletons, must also intersect. For all pairs
+ * of faces, these pairs of subtrees are found before any subtree is loaded, and are sorted so that
+ * a loaded subtree is used again soon. For a first contact, they are found one by one, the nearest
+ * first, because nearly all of them are never needed. Several threads search pairs of subtrees. A
+ * pair of faces is found more than once if several subtrees list one of its faces. So the pairs of
+ * faces are stored, sorted and made unique before they are returned.
  *
  * If the collider's memory is too small for all pairs of faces, the search has several rounds. A
  * round that finds too many pairs drops the pairs of the last faces of the first model, and the
@@ -21,6 +23,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/sort.h"
 #include "extras/collide/collider.h"
 #include "extras/collide/subtree_walk.h"
 #include "extras/collide/posed_subtrees.h"
@@ -89,16 +92,34 @@ static bool cells_apart(const subtree_pair_search *f, const ebpo_posed_node node
     return ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
 }
 
+/* Returns the sum of the diagonals of two nodes' cells. */
+static double diagonals_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
+{
+    return ebpo_posed_diagonal(f->side[0], node[0].cell) +
+           ebpo_posed_diagonal(f->side[1], node[1].cell);
+}
+
 /* Returns subtree_pair.apart of two nodes. */
 static double apart_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
-    double corner[2][8][3], d[3];
+    double middle[2][3], d[3]; /* middle: twice the cells' middles */
     for (int i = 0; i < 2; i++)
-        ebpo_posed_cell(f->side[i], node[i].cell, corner[i]);
+        ebpo_posed_ends(f->side[i], node[i].cell, middle[i]);
     for (int k = 0; k < 3; k++)
-        d[k] = (corner[0][0][k] + corner[0][7][k]) - (corner[1][0][k] + corner[1][7][k]);
-    return ebpo_vec3_scaled_length(d) / (ebpo_posed_diagonal(f->side[0], node[0].cell) +
-                                         ebpo_posed_diagonal(f->side[1], node[1].cell));
+        d[k] = middle[0][k] - middle[1][k];
+    return ebpo_vec3_scaled_length(d) / diagonals_of(f, node);
+}
+
+/* Returns a lower bound of subtree_pair.apart of all pairs of subtrees below two nodes. apart, sum:
+ * of the nodes. least: sum of the diagonals of the smallest cells of subtrees. A cell's middle is
+ * at most half the difference of the diagonals away from the middle of a cell that contains it. So,
+ * if d is the sum of the diagonals of the subtrees, (apart of the subtrees) * d is at least
+ * apart * sum - (sum - d). */
+static double apart_bound(const subtree_pair_search *f, double apart, double sum, double least)
+{
+    double bound = apart < 1 ? 1 + (apart - 1) * (sum / least) : apart,
+           error = 0x1p-40 * sum / least + 0x1p-44 * f->max_coordinate / least;
+    return fmax(bound - error, 0);
 }
 
 /* Returns true if a subtree is pruned: its faces are not in this file. */
@@ -107,22 +128,63 @@ static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
     return !s->model->whole && s->model->top->below[number].pruned;
 }
 
-/* Adds the pair of subtrees whose roots are the two nodes. Omits the pair if the envelopes are
- * certainly apart. */
-static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
+/* Returns the pair of subtrees whose roots are the two nodes. */
+static subtree_pair pair_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
+    return (subtree_pair){ a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
+}
+
+/* Returns true if the faces of two subtrees, which were loaded before, are certainly apart. */
+static bool faces_apart(const subtree_pair_search *f, const ebpo_posed_node node[2], double slack)
+{
+    ebpo_faces_box box[2][8];
+    unsigned count[2];
+    for (int i = 0; i < 2; i++) {
+        count[i] = ebpo_posed_face_boxes(f->side[i], ebpo_entry_value(node[i].entry), box[i]);
+        if (count[i] == 0)
+            return false;
+    }
+    for (unsigned i = 0; i < count[0]; i++)
+        for (unsigned j = 0; j < count[1]; j++) {
+            bool apart = false;
+            for (int k = 0; k < 3; k++)
+                apart = apart || box[0][i].low[k] - slack > box[1][j].high[k] ||
+                        box[1][j].low[k] - slack > box[0][i].high[k];
+            if (!apart)
+                return false;
+        }
+    return true;
+}
+
+/* Sets *apart to true if a subtree of the pair is pruned, or the faces or envelopes of the
+ * subtrees, whose roots are the two nodes, are certainly apart. */
+static ebpo_status envelopes_apart(const subtree_pair_search *f, const ebpo_posed_node node[2],
+                                   bool *apart)
+{
     ebpo_convex convex[2];
     double slack = slack_of(f, node);
-    if (is_pruned(f->side[0], a) || is_pruned(f->side[1], b))
-        return EBPO_OK;
-    subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
-    if (f->self && pair.rank_a > pair.rank_b)
+    *apart = is_pruned(f->side[0], ebpo_entry_value(node[0].entry)) ||
+             is_pruned(f->side[1], ebpo_entry_value(node[1].entry)) || faces_apart(f, node, slack);
+    if (*apart)
         return EBPO_OK;
     ebpo_status status = ebpo_posed_envelope(f->side[0], node[0].cell, &convex[0], f->error);
     if (status == EBPO_OK)
         status = ebpo_posed_envelope(f->side[1], node[1].cell, &convex[1], f->error);
-    if (status != EBPO_OK || ebpo_convex_gap(&convex[0], &convex[1], slack) > slack)
+    *apart = status == EBPO_OK && ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
+    return status;
+}
+
+/* Adds the pair of subtrees whose roots are the two nodes, unless their envelopes are certainly
+ * apart. */
+static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
+{
+    subtree_pair pair = pair_of(f, node);
+    bool apart;
+    if (f->self && pair.rank_a > pair.rank_b)
+        return EBPO_OK;
+    ebpo_status status = envelopes_apart(f, node, &apart);
+    if (status != EBPO_OK || apart)
         return status;
     subtree_pairs *out = f->out;
     if (!ebpo_grow(&out->pair, &out->capacity, out->count + 1, sizeof *out->pair))
@@ -132,6 +194,16 @@ static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_pos
 }
 
 /* --- the descent --- */
+
+/* Returns the index of the node of a pair that is divided: the larger one, but never the root of a
+ * subtree. */
+static int divided_of(const subtree_pair_search *f, const ebpo_posed_node node[2],
+                      const bool is_root[2])
+{
+    bool first_is_larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
+                           ebpo_posed_diagonal(f->side[1], node[1].cell);
+    return is_root[0] ? 1 : is_root[1] ? 0 : first_is_larger ? 0 : 1;
+}
 
 /* Finds the pairs of subtrees below two nodes whose envelopes may have a common point. */
 static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
@@ -146,9 +218,7 @@ static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_n
         return EBPO_OK;
     if (is_root[0] && is_root[1])
         return add_subtree_pair(f, node);
-    bool first_is_larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
-                           ebpo_posed_diagonal(f->side[1], node[1].cell);
-    int divided = is_root[0] ? 1 : is_root[1] ? 0 : first_is_larger ? 0 : 1;
+    int divided = divided_of(f, node, is_root);
     ebpo_posed_node part[2] = { node[0], node[1] };
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
@@ -227,20 +297,113 @@ static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a
     return count_second_subtrees(out, b->count, error);
 }
 
-/* Compares two pairs by `apart`, then by their ranks, for qsort. */
-static int by_nearness(const void *x, const void *y)
+/* --- the nearest pairs --- */
+
+/* A pair of nodes. */
+typedef struct waiting_nodes {
+    double apart; /* of the nodes, as subtree_pair.apart */
+    double bound; /* lower bound of subtree_pair.apart of all pairs of subtrees below the nodes */
+    ebpo_posed_node node[2];
+    uint32_t rank[2]; /* if both nodes are roots of subtrees: ranks of the subtrees */
+    bool ends;        /* both nodes are roots of subtrees */
+} waiting_nodes;
+
+/* Returns true if x leaves the heap before y. Pairs of subtrees leave it by `apart`, then by their
+ * ranks. */
+static bool comes_before(const waiting_nodes *x, const waiting_nodes *y)
 {
-    const subtree_pair *p = x, *q = y;
-    if (p->apart != q->apart)
-        return p->apart < q->apart ? -1 : 1;
-    return by_rank(x, y);
+    if (x->bound != y->bound)
+        return x->bound < y->bound;
+    if (!x->ends || !y->ends)
+        return !x->ends && y->ends;
+    return x->rank[0] != y->rank[0] ? x->rank[0] < y->rank[0] : x->rank[1] < y->rank[1];
 }
 
-/* Sorts pairs by `apart`, the least first. */
-static void sort_nearest_first(subtree_pairs *p)
+EBPO_HEAP(nearest, waiting_nodes, comes_before)
+
+/* The pairs of subtrees that may have intersecting faces, which are found one by one in the order
+ * of `apart`, then of their ranks. Most pairs are never needed, and their envelopes are not
+ * computed. */
+typedef struct nearest_pairs {
+    subtree_pair_search search;
+    double least; /* as in apart_bound */
+    waiting_nodes *heap;
+    uint64_t count, capacity;
+} nearest_pairs;
+
+/* Returns the length of the diagonal of a model's smallest subtrees. */
+static double least_diagonal(const ebpo_posed_subtrees *s)
 {
-    if (p->count)
-        qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
+    int level = s->model->whole ? 0 : s->model->top->cut_level;
+    return ebpo_posed_diagonal(s, (ebpo_cell){ .level = level });
+}
+
+/* Adds a pair of nodes to the heap, unless their cells are in balls that are certainly apart.
+ * bound: bound of the nodes that contain them. */
+static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], double bound)
+{
+    const subtree_pair_search *f = &p->search;
+    waiting_nodes added = { .ends = true, .node = { node[0], node[1] } };
+    for (int i = 0; i < 2; i++) {
+        if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
+            return EBPO_OK;
+        added.ends = added.ends && ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
+    }
+    double sum = diagonals_of(f, node);
+    added.apart = apart_of(f, node);
+    if ((added.apart - 1) * sum > 0x1p-40 * sum + 4 * slack_of(f, node))
+        return EBPO_OK;
+    for (int i = 0; added.ends && i < 2; i++)
+        added.rank[i] = f->side[i]->rank[ebpo_entry_value(node[i].entry)];
+    added.bound =
+        added.ends ? added.apart : fmax(bound, apart_bound(f, added.apart, sum, p->least));
+    if (!ebpo_grow(&p->heap, &p->capacity, p->count + 1, sizeof *p->heap))
+        return ebpo_fail_memory(f->error, (p->count + 1) * sizeof *p->heap);
+    nearest_add(p->heap, p->count++, &added);
+    return EBPO_OK;
+}
+
+/* Begins with the roots of both trees. The caller frees p->heap, even after a failure. */
+static ebpo_status begin_nearest(nearest_pairs *p, ebpo_posed_subtrees *a, ebpo_posed_subtrees *b,
+                                 double max_coordinate, ebpo_error *error)
+{
+    ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
+    *p = (nearest_pairs){ .search = { NULL, { a, b }, max_coordinate, false, error },
+                          .least = least_diagonal(a) + least_diagonal(b) };
+    return push_nodes(p, root, 0);
+}
+
+/* Finds the next pair of subtrees. *more: false if there are no more pairs. */
+static ebpo_status next_nearest(nearest_pairs *p, subtree_pair *out, bool *more)
+{
+    /* the cells of nodes with a smaller value of `apart` are not tested, as they nearly always
+     * have a common point */
+    static const double tested = 0.5;
+    const subtree_pair_search *f = &p->search;
+    ebpo_status status = EBPO_OK;
+    while (status == EBPO_OK && p->count) {
+        waiting_nodes next = nearest_take(p->heap, p->count--);
+        bool is_root[2], apart = next.apart >= tested && cells_apart(f, next.node);
+        if (!apart && next.ends)
+            status = envelopes_apart(f, next.node, &apart);
+        if (status != EBPO_OK || apart)
+            continue;
+        if (next.ends) {
+            *out = pair_of(f, next.node);
+            *more = true;
+            return EBPO_OK;
+        }
+        for (int i = 0; i < 2; i++)
+            is_root[i] = ebpo_entry_kind_of(next.node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
+        int divided = divided_of(f, next.node, is_root);
+        ebpo_posed_node part[2] = { next.node[0], next.node[1] };
+        for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+            part[divided] = ebpo_posed_child(f->side[divided], &next.node[divided], octant);
+            status = push_nodes(p, part, next.bound);
+        }
+    }
+    *more = false;
+    return status;
 }
 
 /* --- the walk of a thread --- */
@@ -577,8 +740,8 @@ static ebpo_status search_in_rounds(gathering_parts *g, ebpo_pairs_fn take, void
 
 /* --- both queries --- */
 
-/* Prepares the search of `threads` threads, and finds the pairs of subtrees. */
-static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
+/* Prepares the search of `threads` threads. */
+static ebpo_status begin_threads(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
     const ebpo_collision *q = g->collision;
     ebpo_status status = EBPO_OK;
@@ -592,6 +755,14 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
             ebpo_posed_subtrees_make(&g->subtrees[i], q->model[i], &q->posing[i].posing, error);
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
         status = subtree_walk_begin(&g->walk[i], q, g->self, error);
+    return status;
+}
+
+/* Prepares the search of `threads` threads, and finds the pairs of subtrees. */
+static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
+{
+    const ebpo_collision *q = g->collision;
+    ebpo_status status = begin_threads(g, threads, error);
     if (status == EBPO_OK)
         status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->max_coordinate,
                                     g->self, error);
@@ -633,15 +804,30 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     return status;
 }
 
+/* Counts a pair of subtrees, and the subtrees that are in no earlier pair. */
+static void count_pair(const gathering_parts *g, const subtree_pair *pair, bool *visited[2])
+{
+    ebpo_collider *c = g->collision->collider;
+    c->subtree_pairs++;
+    c->subtrees += !visited[0][pair->a] + !visited[1][pair->b];
+    visited[0][pair->a] = visited[1][pair->b] = true;
+}
+
 /* Finds the first pair of subtrees that has intersecting faces. Sets *out to the first intersecting
  * pair of its faces, in the order of the files. *found: as for ebpo_collide_first. */
-static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
-                                      ebpo_error *error)
+static ebpo_status search_first_parts(gathering_parts *g, nearest_pairs *pairs, bool *visited[2],
+                                      ebpo_face_pair *out, int32_t *found, ebpo_error *error)
 {
     const ebpo_collision *q = g->collision;
     subtree_walk *w = &g->walk[0];
-    for (uint64_t i = 0; i < g->pairs.count; i++) {
-        ebpo_status status = subtree_walk_pair(w, &g->pairs.pair[i], error);
+    for (uint64_t i = 0;; i++) {
+        subtree_pair pair;
+        bool more;
+        ebpo_status status = next_nearest(pairs, &pair, &more);
+        if (status != EBPO_OK || !more)
+            return status;
+        count_pair(g, &pair, visited);
+        status = subtree_walk_pair(w, &pair, error);
         if (status != EBPO_OK)
             return status;
         *found = w->late || ebpo_collision_is_late(q) ? -1 : w->count > 0;
@@ -652,22 +838,31 @@ static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, i
             *out = face_pair_of(q, &w->stored[0]);
             return EBPO_OK;
         }
-        if (!ebpo_progress_step(&q->options.progress, stage, i, g->pairs.count, error))
+        if (!ebpo_progress_step(&q->options.progress, stage, i, 0, error))
             return EBPO_E_CANCELLED;
     }
-    return EBPO_OK;
 }
 
 ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, int32_t *found,
                                 ebpo_error *error)
 {
     gathering_parts g = { .collision = q };
+    nearest_pairs pairs = { .count = 0 };
+    bool *visited[2] = { NULL, NULL };
     (void)pthread_mutex_init(&g.lock, NULL);
-    ebpo_status status = begin_gathering(&g, 1, error);
-    if (status == EBPO_OK) {
-        sort_nearest_first(&g.pairs);
-        status = search_first_parts(&g, out, found, error);
+    ebpo_status status = begin_threads(&g, 1, error);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        visited[i] = ebpo_alloc_zero(g.subtrees[i].count, sizeof *visited[i]);
+        if (!visited[i])
+            status = ebpo_fail_memory(error, g.subtrees[i].count);
     }
+    if (status == EBPO_OK)
+        status = begin_nearest(&pairs, &g.subtrees[0], &g.subtrees[1], q->max_coordinate, error);
+    if (status == EBPO_OK)
+        status = search_first_parts(&g, &pairs, visited, out, found, error);
+    free(pairs.heap);
+    free(visited[0]);
+    free(visited[1]);
     end_gathering(&g);
     return status;
 }

@@ -49,7 +49,8 @@ class Places:
         self.work, self.side, self.file = work, side, side.files[which]
         info = json.loads(side.run("info", "--json", self.file))
         self.diagonal = math.dist([0, 0, 0], info["box_size"])
-        self.centre = [o + s / 2 for o, s in zip(info["box_origin"], info["box_size"])]
+        self.size = info["box_size"]
+        self.centre = [o + s / 2 for o, s in zip(info["box_origin"], self.size)]
         dice, rays = random.Random(1), []
         for _ in range(16 * count):
             d, a, r = unit(dice), unit(dice), self.diagonal / 2
@@ -73,6 +74,26 @@ class Places:
                      for x in unit(random.Random(i))]
             lines.append(numbers(*(p + s for p, s in zip(self.found[i][0], shift))) + "\n")
         path.write_text("".join(lines))
+        return path
+
+    def deep(self, count):
+        """Write a file for each of the points with the greatest distance inside, of 1,000 random points in the box."""
+        dice, path = random.Random(3), self.work / "deep.txt"
+        points = [[c + (dice.random() - 0.5) * s for c, s in zip(self.centre, self.size)] for _ in range(1000)]
+        path.write_text("".join(numbers(*p) + "\n" for p in points))
+        found = [json.loads(line)["distance"] for line in self.side.run(
+            "distance", "--json", "--memory", "2G", self.file, path).splitlines()]
+        paths = [self.work / f"deep_{i}.txt" for i in range(count)]
+        for out, i in zip(paths, sorted(range(1000), key=found.__getitem__)):
+            out.write_text(numbers(*points[i]) + "\n")
+        return paths
+
+    def rays(self, name, side):
+        """Write a file of side x side rays from one eye, in a square that the model fills."""
+        path, eye = self.work / name, [c + e * self.diagonal for c, e in zip(self.centre, (0.3, 0.4, 1.2))]
+        at = [(i / (side - 1) - 0.5) * 0.6 * self.diagonal for i in range(side)]
+        path.write_text("".join(numbers(*eye, self.centre[0] + x - eye[0], self.centre[1] + y - eye[1],
+                                        self.centre[2] - eye[2]) + "\n" for y in at for x in at))
         return path
 
     def crowd(self, name, count):
@@ -131,6 +152,10 @@ def rows(large, small, work, singles, views):
                   shown.format(c, "POINTS"), points(c, [fifty], *budget), "small")
               for c in ("distance", "inside")]
     table += [
+        Row("distance deep small", "one distance deep inside the small model", shown.format("distance", "POINT"),
+            points("distance", small.deep(singles), *budget), "small"),
+        Row("ray eye small", "100 rays from one eye to the small model", shown.format("ray", "RAYS"),
+            points("ray", [small.rays("rays_100.txt", 10)], *budget), "small"),
         Row("box", f"`fetch --box` that keeps {kept:,} B", f"ebpo fetch -q --box {box} URL OUT",
             [["fetch", "-q", "--box", box, "URL", "OUT"]]),
         Row("view", f"nodes of a view from {VIEW_FROM} diagonals away",
