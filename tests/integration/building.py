@@ -32,7 +32,7 @@ from run import has_terminal
 TOOL, GENERATE, FAULTS = (os.path.abspath(a) for a in sys.argv[1:4])
 MIB = 1 << 20
 FEW = "few" in sys.argv[4:]
-FACES, FEWER_FACES = 1_200_000 if FEW else 3_000_000, 1_200_000  # no model fits into 128 MiB
+FACES, FEWER_FACES = 1_600_000 if FEW else 3_000_000, 1_200_000  # no model fits into 128 MiB
 SMALL = 128 * MIB  # the least budget
 # Coarse envelopes: the number of planes does not matter here.
 QUICK = ["--max-level", "6", "--epsilon", "1", "--leaf-faces", "64"]
