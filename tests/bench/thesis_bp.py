@@ -188,7 +188,8 @@ def sending(page, runs):
             factors = sent_factors(runs, name)
             row.append(f"{factors[i]:.1f}" if i < len(factors) else "-")
         rows.append(row)
-    page.table(["level", "bunny: BP, reported", "BP by the model", "here", "BP / here", "dragon: BP by the model", "here", "BP / here"], rows)
+    page.table(["level", "bunny: BP, reported", "BP by the model", "here", "BP / here",
+                "dragon: BP by the model", "here", "BP / here"], rows)
 
 
 def points_bp(page, runs):
