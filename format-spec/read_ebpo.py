@@ -861,7 +861,7 @@ def read(path):
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and one(file.attrs["format_version_major"]) == 1
         assert text(file.attrs.get("format_version", "")) != "1.0-draft"
         required = text(file.attrs["required_parts"]).split()
-        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "gates", "pruned"}
+        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "gates", "inside", "pruned"}
         assert not unknown, f"needs {unknown}"
         parts = set(parts_of(file))
         given, added, dropped = (one(file.attrs.get(name, 0)) for name in

@@ -18,6 +18,7 @@
 
 #include <ebpo/build.h>
 
+#include "construct/capped.h"
 #include "construct/construct_stages.h"
 #include "construct/planes.h"
 #include "core/alloc.h"
@@ -46,32 +47,8 @@ typedef struct winding_walk {
     ebpo_triangle buffer[BUFFER_FACES];
 } winding_walk;
 
-/* For each corner of a cell except corner 0: an earlier corner `before`, and the axis of the edge
- * from the corner `before` to this corner. */
-static const struct {
-    int axis, before;
-} edge_to[8] = { { 0, 0 }, { 0, 0 }, { 1, 0 }, { 1, 1 }, { 2, 0 }, { 2, 1 }, { 2, 2 }, { 2, 3 } };
-
-/* Adds the crossings of caps along the edges of a cell to the corner differences `delta`. */
-static void add_cap_crossings(const winding_walk *w, ebpo_cell cell, int32_t delta[8])
-{
-    double low[3], high[3];
-    int32_t caps[8] = { 0 };
-    ebpo_cell_bounds(&w->box, cell, low, high);
-    if (!ebpo_caps_near(w->caps, low, high))
-        return;
-    for (int i = 1; i < 8; i++) {
-        int axis = edge_to[i].axis, before = edge_to[i].before;
-        const double from[3] = { before & 1 ? high[0] : low[0], before & 2 ? high[1] : low[1],
-                                 before & 4 ? high[2] : low[2] };
-        caps[i] = caps[before] + ebpo_cap_crossings(w->caps, from, high[axis], axis);
-        delta[i] += caps[i];
-    }
-}
-
-/* Adds the crossings of faces along the edges of a cell to the corner differences `delta`. The
- * indices of the faces are faces[0 .. count - 1]. If `faces` is NULL, they are first .. first +
- * count - 1. */
+/* Adds the crossings of faces along the edges of a cell to the differences of its corners. The
+ * faces are faces[0 .. count - 1]; if `faces` is NULL, first .. first + count - 1. */
 static void add_faces(winding_walk *w, ebpo_cell cell, const uint32_t *faces, uint64_t first,
                       uint64_t count, int32_t delta[8])
 {
@@ -101,7 +78,7 @@ static void visit_leaf(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t
     if (refs)
         add_faces(w, cell, level->leaf_refs + w->ref[cell.level], 0, refs, delta);
     w->ref[cell.level] += refs;
-    add_cap_crossings(w, cell, delta);
+    ebpo_cap_corners(w->caps, &w->box, cell, delta);
 }
 
 static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
@@ -145,7 +122,7 @@ static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int
         visit_leaf(w, cell, winding, delta);
     } else {
         w->tree->level[cell.level].white_winding[w->white[cell.level]++] = winding;
-        add_cap_crossings(w, cell, delta);
+        ebpo_cap_corners(w->caps, &w->box, cell, delta);
     }
 }
 
@@ -211,9 +188,8 @@ static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
     }
 }
 
-/* Finds the border of the mesh, and copies the positions of its points. */
-static ebpo_status find_loops(ebpo_border_loops *out, const ebpo_mesh *mesh, unsigned threads,
-                              ebpo_error *error)
+ebpo_status ebpo_build_find_border(ebpo_border_loops *out, const ebpo_mesh *mesh, unsigned threads,
+                                   ebpo_error *error)
 {
     ebpo_border border;
     ebpo_status status = ebpo_border_find(&border, mesh, threads, error);
@@ -232,6 +208,14 @@ static ebpo_status find_loops(ebpo_border_loops *out, const ebpo_mesh *mesh, uns
         out->loop[2 * i] = (uint32_t)(border.first[i + 1] - border.first[i]);
         out->loop[2 * i + 1] = border.weight[i];
     }
+    uint64_t bytes = out->point_count * EBPO_CAPS_BYTES,
+             memory = mesh->workspace ? ebpo_workspace_memory(mesh->workspace) : 0;
+    if (status == EBPO_OK && memory && bytes > memory / 2)
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "the border has %" PRIu64 " edges, whose caps take %" PRIu64
+                           " bytes; give at least %" PRIu64
+                           " bytes of memory, or build without the border",
+                           out->point_count, bytes, 2 * bytes);
     for (uint64_t i = 0; i < out->point_count && status == EBPO_OK; i++)
         ebpo_mesh_position(mesh, border.vertex[i], out->point + 3 * i);
     ebpo_border_free(&border);
@@ -241,15 +225,7 @@ static ebpo_status find_loops(ebpo_border_loops *out, const ebpo_mesh *mesh, uns
 ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
 {
     ebpo_cap_tree caps = { .node = NULL };
-    ebpo_status status = find_loops(&tree->border, &tree->mesh, threads, error);
-    uint64_t bytes = tree->border.point_count * EBPO_CAPS_BYTES,
-             memory = tree->workspace ? ebpo_workspace_memory(tree->workspace) : 0;
-    if (status == EBPO_OK && memory && bytes > memory / 2)
-        status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "the border has %" PRIu64 " edges, whose caps take %" PRIu64
-                           " bytes; give at least %" PRIu64
-                           " bytes of memory, or build without the border",
-                           tree->border.point_count, bytes, 2 * bytes);
+    ebpo_status status = ebpo_build_find_border(&tree->border, &tree->mesh, threads, error);
     if (status == EBPO_OK)
         status = ebpo_cap_tree_of_loops(&caps, &tree->border, error);
     if (status == EBPO_OK)

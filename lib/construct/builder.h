@@ -112,11 +112,12 @@ typedef struct ebpo_builder {
     const ebpo_build_options *options;
     ebpo_workspace *workspace;
     unsigned threads;
-    bool solid;            /* false: a surface */
-    int max_level;         /* deepest level */
-    ebpo_box box;          /* root box */
-    const ebpo_mesh *mesh; /* arranged along the curve */
-    uint64_t vertex_count; /* number of referenced vertices, which come first */
+    bool solid;                 /* false: a surface */
+    struct ebpo_capped *capped; /* a surface whose envelopes contain its inside; else NULL */
+    int max_level;              /* deepest level */
+    ebpo_box box;               /* root box */
+    const ebpo_mesh *mesh;      /* arranged along the curve */
+    uint64_t vertex_count;      /* number of referenced vertices, which come first */
     uint64_t face_count;
     const uint64_t *key;       /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3]; /* [face_count] vertices of each face */
@@ -133,6 +134,9 @@ typedef struct ebpo_builder {
     /* request of ebpo_build_as_theses; NULL: a tree for a file is built */
     const struct ebpo_thesis_run *thesis;
 } ebpo_builder;
+
+/* Returns true if winding numbers are defined: of a solid, or of a surface with its caps. */
+static inline bool ebpo_build_closed(const ebpo_builder *b) { return b->solid || b->capped; }
 
 /* Sets `out` to the corners of a face. */
 static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebpo_triangle *out)

@@ -22,8 +22,10 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "format/border_loops.h"
 #include "construct/pieces.h"
 #include "construct/planes.h"
+#include "construct/capped.h"
 #include "construct/construct_stages.h"
 #include "construct/supports.h"
 #include "construct/thesis_levels.h"
@@ -215,6 +217,7 @@ static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_me
 
 static void builder_free(ebpo_builder *b)
 {
+    ebpo_capped_free(b->capped);
     ebpo_bounds_free(&b->bounds);
     ebpo_array_free(b->workspace, b->final_index);
     ebpo_branch_free(&b->top);
@@ -321,6 +324,7 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK && border)
         status = ebpo_build_border(out, b->threads, error);
+    out->info.border_inside = b->capped;
     return status == EBPO_OK && b->options->parts & EBPO_PART_SURFACE
                ? ebpo_build_surface(out, b->threads, &b->options->progress, error)
                : status;
@@ -361,6 +365,14 @@ static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
         status = builder_begin(&b, mesh, report, &wanted, error);
     if (status == EBPO_OK)
         fill_info(&out->info, &b, mesh, report, repair_record);
+    if (status == EBPO_OK && !b.solid && !thesis && wanted.parts & EBPO_PART_BORDER &&
+        wanted.parts & EBPO_PART_PLANES) {
+        ebpo_border_loops loops = { 0 };
+        status = ebpo_build_find_border(&loops, mesh, b.threads, error);
+        if (status == EBPO_OK)
+            status = ebpo_capped_make(&b, &loops, error);
+        ebpo_border_loops_free(&loops);
+    }
     if (status == EBPO_OK)
         status = run_stages(&b, mesh, out, error);
     if (requested)

@@ -65,6 +65,10 @@ EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tr
 
 /* --- border_windings.c (format-spec/border.md) --- */
 
+/* Finds the border of a mesh, and copies the positions of its points. Returns EBPO_E_MEMORY,
+ * EBPO_E_IO, EBPO_E_LIMIT. `out` must be freed, also on failure. */
+EBPO_MUST_USE ebpo_status ebpo_build_find_border(ebpo_border_loops *out, const ebpo_mesh *mesh,
+                                                 unsigned threads, ebpo_error *error);
 /* Adds the part EBPO_PART_BORDER to a surface with levels and mesh. Returns EBPO_E_MEMORY,
  * EBPO_E_IO, EBPO_E_LIMIT. */
 EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error);
@@ -84,10 +88,10 @@ EBPO_MUST_USE ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads,
  * different winding numbers. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 /* Computes, from the children's corner differences, the offset of each child: the winding number at
- * the child's corner 0 minus the winding number at the parent's corner 0. `child`: index of the
- * first child's node. */
-void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
-                         int32_t offset[8]);
+ * the child's corner 0 minus the winding number at the parent's corner 0. `cell`: the parent's
+ * cell; `child`: index of the first child's node. */
+void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
+                         uint32_t child, int32_t offset[8]);
 /* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces
  * are list[entries[0]] to list[entries[count - 1]] of the branch. If `entries` is NULL, they are
  * the first `count` faces of the list. Long lists are processed EBPO_CORNER_FACES faces at a time,
@@ -96,14 +100,20 @@ enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);
-/* Computes a gray node's corner differences from the corner differences of its children. Returns
- * false if two paths along the children's edges give different winding numbers for a corner; then
- * the mesh does not bound a solid. */
-bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
+/* Computes a gray node's corner differences from those of its children. Returns false if two paths
+ * along the children's edges give different winding numbers for a corner; then the mesh does not
+ * balance. */
+bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell, uint32_t child,
                        int32_t delta[8]);
 /* Returns a mask: bit i is set if corner i of a cell is inside by the builder's rule. `winding`:
  * winding number at corner 0; `delta`: corner differences (ebpo_build_detail). */
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
+/* Returns the same mask for a leaf; all corners if points near caps may be inside (capped.h). */
+unsigned ebpo_leaf_corners(const ebpo_builder *b, ebpo_cell cell, int32_t winding,
+                           const int32_t delta[8]);
+/* Returns the type that the file has for a node without faces. `winding`: as above. The type is
+ * EBPO_LEAF if the node may hold a part of the inside of a surface with holes. */
+ebpo_node_type ebpo_empty_type(const ebpo_builder *b, ebpo_cell cell, int32_t winding);
 
 /* --- envelopes.c --- */
 
@@ -124,6 +134,7 @@ typedef struct ebpo_top_envelope {
     uint32_t codes[EBPO_PLANES_STORED];
     int count;
     double volume;
+    double empty_volume[8]; /* volume of the envelope of each child that is a leaf without faces */
 } ebpo_top_envelope;
 
 /* Computes the envelopes of the top's nodes, and passes them to the pieces (ebpo_branch.above). */

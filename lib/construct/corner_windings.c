@@ -16,6 +16,7 @@
 
 #include <string.h>
 
+#include "construct/capped.h"
 #include "construct/construct_stages.h"
 #include "construct/planes.h"
 #include "core/error.h"
@@ -39,6 +40,8 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
         for (int i = 0; i < 8; i++)
             delta[i] += part_delta[i];
     }
+    if (b->capped)
+        ebpo_capped_add_corners(b->capped, cell, delta);
 }
 
 /* Computes the offsets of the children (ebpo_child_windings). Returns false if two paths to a
@@ -62,15 +65,20 @@ static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
     return agree;
 }
 
-/* Sets child_delta[o] to the corner differences of child o, which are zero if the child is empty.
+/* Sets child_delta[o] to the corner differences of child o; those of an empty child are zero,
+ * except for the crossings of caps, which are written to `caps`. `cell`: the parent's cell;
  * `child`: index of the first child's node. */
-static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
-                         const int32_t *child_delta[8])
+static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
+                         uint32_t child, int32_t caps[8][8], const int32_t *child_delta[8])
 {
     static const int32_t none[8];
     for (uint32_t o = 0; o < 8; o++) {
         const ebpo_build_node *n = &s->nodes[child + o];
-        if (n->type == EBPO_WHITE)
+        if (n->type == EBPO_WHITE && b->capped) {
+            memset(caps[o], 0, sizeof caps[o]);
+            ebpo_capped_add_corners(b->capped, ebpo_cell_child(cell, o), caps[o]);
+            child_delta[o] = caps[o];
+        } else if (n->type == EBPO_WHITE)
             child_delta[o] = none;
         else if (s == &b->top && n->type == EBPO_LEAF)
             child_delta[o] = b->piece[n->detail].root_delta;
@@ -79,29 +87,30 @@ static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t c
     }
 }
 
-void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
-                         int32_t offset[8])
+void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
+                         uint32_t child, int32_t offset[8])
 {
     const int32_t *child_delta[8];
-    child_deltas(b, s, child, child_delta);
+    int32_t caps[8][8];
+    child_deltas(b, s, cell, child, caps, child_delta);
     child_offsets(child_delta, offset);
 }
 
-bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
+bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell, uint32_t child,
                        int32_t delta[8])
 {
     const int32_t *child_delta[8];
-    int32_t offset[8];
-    child_deltas(b, s, child, child_delta);
+    int32_t offset[8], caps[8][8];
+    child_deltas(b, s, cell, child, caps, child_delta);
     bool agree = child_offsets(child_delta, offset);
     for (int i = 0; i < 8; i++)
         delta[i] = offset[i] + child_delta[i][i];
     return agree;
 }
 
-/* Computes the corner differences of a node of the top and of all nodes below. Returns false if two
- * paths to a corner give different winding numbers (ebpo_gather_delta). */
-static bool top_deltas(ebpo_builder *b, uint32_t index)
+/* Computes the corner differences of a node of the top and of all nodes below. Returns false if
+ * they disagree (ebpo_gather_delta). */
+static bool top_deltas(ebpo_builder *b, uint32_t index, ebpo_cell cell)
 {
     ebpo_branch *s = &b->top;
     ebpo_build_node *node = &s->nodes[index];
@@ -109,15 +118,15 @@ static bool top_deltas(ebpo_builder *b, uint32_t index)
         return true;
     bool agree = true;
     for (uint32_t o = 0; o < 8; o++)
-        agree = top_deltas(b, node->child + o) && agree;
-    return ebpo_gather_delta(b, s, node->child, s->details[node->detail].delta) && agree;
+        agree = top_deltas(b, node->child + o, ebpo_cell_child(cell, o)) && agree;
+    return ebpo_gather_delta(b, s, cell, node->child, s->details[node->detail].delta) && agree;
 }
 
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error)
 {
-    if (!b->solid)
+    if (!ebpo_build_closed(b))
         return EBPO_OK;
-    if (!top_deltas(b, 0))
+    if (!top_deltas(b, 0, b->top.cell))
         return ebpo_fail(
             error, EBPO_E_NOT_SOLID,
             "winding numbers disagree: the mesh does not balance; check it again before building");
@@ -127,11 +136,26 @@ ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error)
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8])
 {
     unsigned mask = 0;
-    if (b->solid)
+    if (ebpo_build_closed(b))
         for (int i = 0; i < 8; i++)
             if (ebpo_rule_inside(b->options->rule, winding + delta[i]))
                 mask |= 1u << i;
     return mask;
+}
+
+unsigned ebpo_leaf_corners(const ebpo_builder *b, ebpo_cell cell, int32_t winding,
+                           const int32_t delta[8])
+{
+    return b->capped && ebpo_capped_overlap(b->capped, cell) != EBPO_CAP_NONE
+               ? 0xff
+               : ebpo_inside_corners(b, winding, delta);
+}
+
+ebpo_node_type ebpo_empty_type(const ebpo_builder *b, ebpo_cell cell, int32_t winding)
+{
+    if (b->capped)
+        return ebpo_capped_may_hold(b->capped, cell, winding) ? EBPO_LEAF : EBPO_WHITE;
+    return b->solid && ebpo_rule_inside(b->options->rule, winding) ? EBPO_BLACK : EBPO_WHITE;
 }
 
 /* --- the corners of one cell --- */

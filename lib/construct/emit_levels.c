@@ -41,6 +41,7 @@ typedef struct emitter {
     const ebpo_builder *b;
     ebpo_branch *s; /* the piece */
     ebpo_emit_scratch *scratch;
+    uint32_t next; /* final index of the next new face */
 } emitter;
 
 ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *workspace,
@@ -83,9 +84,25 @@ static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
 #undef GROW
 }
 
+/* Adds a leaf without faces. `next`: number of faces that leaves before it list; `volume`: volume
+ * of its envelope. Returns false when out of memory. */
+static bool add_empty_leaf(ebpo_piece_level *out, int32_t winding, uint32_t next, double volume)
+{
+    ebpo_level *l = &out->level;
+    if (!grow_leaf_arrays(out, 0))
+        return false;
+    l->leaf_winding[l->leaf_count] = winding;
+    l->leaf_first[l->leaf_count] = next;
+    l->leaf_new[l->leaf_count] = 0;
+    l->leaf_ref_count[l->leaf_count] = 0;
+    l->leaf_plane_counts[l->leaf_count++] = 0;
+    l->leaf_volume += volume;
+    return true;
+}
+
 /* Adds a leaf's winding number, range of new faces, and references. Returns false when out of
  * memory. */
-static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
+static bool emit_list(emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
                       int32_t winding)
 {
     ebpo_level *l = &out->level;
@@ -103,6 +120,7 @@ static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_l
     }
     l->ref_count += refs;
     l->new_count += d->new_count;
+    e->next = d->first + d->new_count;
     return true;
 }
 
@@ -133,7 +151,7 @@ static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t wind
         return -1;
     if (!proposed)
         return ebpo_leaf_planes(&b->box, cell, e->scratch->faces, d->entry_end - d->entry_begin,
-                                ebpo_inside_corners(b, winding, d->delta), b->options->epsilon,
+                                ebpo_leaf_corners(b, cell, winding, d->delta), b->options->epsilon,
                                 envelope, codes);
     memcpy(codes, proposed, (size_t)count * sizeof *codes);
     ebpo_planes_cut(envelope, codes, (uint64_t)count);
@@ -171,32 +189,30 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     return true;
 }
 
-static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
+/* Adds a node without faces, which has the type `type` in the file. */
+static bool emit_empty(emitter *e, ebpo_node_type type, ebpo_cell cell, int32_t winding,
+                       const ebpo_polytope *envelope)
 {
-    bool black = e->b->solid && ebpo_rule_inside(e->b->options->rule, winding);
-    return ebpo_piece_level_add_empty(&e->s->out[cell.level], black, winding);
+    ebpo_piece_level *out = &e->s->out[cell.level];
+    return type == EBPO_LEAF ? add_empty_leaf(out, winding, e->next,
+                                              ebpo_polytope_volume(envelope) *
+                                                  ebpo_cell_volume(&e->b->box, cell.level))
+                             : ebpo_piece_level_add_empty(out, type == EBPO_BLACK, winding);
 }
 
-static bool emit_node(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
-                      ebpo_polytope *envelope);
+static bool emit_node(emitter *e, uint32_t index, ebpo_node_type type, ebpo_cell cell,
+                      int32_t winding, ebpo_polytope *envelope);
 
-/* Returns a mask: bit o is set if child o is not empty. */
-static unsigned filled_children(const ebpo_branch *s, uint32_t child)
+/* Emits the children in the order of octants. Their envelopes are cut from halves and quarters of
+ * the node's envelope, which neighbours share. If a half becomes empty by rounding errors,
+ * ebpo_polytope_half replaces it by the whole cube: an envelope may be too large, never too small.
+ */
+static bool emit_children(emitter *e, uint32_t child, uint16_t types, ebpo_cell cell,
+                          int32_t winding, const int32_t offset[8], const ebpo_polytope *envelope)
 {
-    unsigned mask = 0;
-    for (uint32_t o = 0; o < 8; o++)
-        mask |= (unsigned)(s->nodes[child + o].type != EBPO_WHITE) << o;
-    return mask;
-}
-
-/* Emits the children in the order of octants. The children's envelopes are cut from halves and
- * quarters of the node's envelope; neighbouring children share a half or a quarter. If a half
- * becomes empty by rounding errors, ebpo_polytope_half replaces it by the whole cube. So an
- * envelope may be too large, but never too small. */
-static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
-                          const int32_t offset[8], const ebpo_polytope *envelope)
-{
-    unsigned filled = filled_children(e->s, child);
+    unsigned filled = 0; /* bit o: child o is gray or a leaf */
+    for (unsigned o = 0; o < 8; o++)
+        filled |= (unsigned)(ebpo_group_type(types, o) >= EBPO_LEAF) << o;
     ebpo_polytope(**half)[3] = &e->scratch->half[cell.level];
     if (!*half && !(*half = ebpo_alloc(1, sizeof **half)))
         return false;
@@ -208,7 +224,8 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
             ebpo_polytope_half(z, 1, o >> 1 & 1, y);
         if (filled >> o & 1)
             ebpo_polytope_half(y, 0, o & 1, x);
-        if (!emit_node(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], x))
+        if (!emit_node(e, child + o, ebpo_group_type(types, o), ebpo_cell_child(cell, o),
+                       winding + offset[o], x))
             return false;
     }
     return true;
@@ -230,39 +247,41 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
                                                      ebpo_cell_volume(&b->box, cell.level)))
         return false;
     int32_t offset[8];
-    ebpo_child_windings(b, e->s, node->child, offset);
+    ebpo_child_windings(b, e->s, cell, node->child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++) {
         ebpo_node_type type = e->s->nodes[node->child + o].type;
-        if (type == EBPO_WHITE && b->solid &&
-            ebpo_rule_inside(b->options->rule, winding + offset[o]))
-            type = EBPO_BLACK;
+        if (type == EBPO_WHITE)
+            type = ebpo_empty_type(b, ebpo_cell_child(cell, o), winding + offset[o]);
         types |= ebpo_group_of(type, o);
     }
     if (!ebpo_piece_level_add_group(&e->s->out[cell.level + 1], types))
         return false;
-    return emit_children(e, node->child, cell, winding, offset, envelope);
+    return emit_children(e, node->child, types, cell, winding, offset, envelope);
 }
 
-static bool emit_node(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
-                      ebpo_polytope *envelope)
+static bool emit_node(emitter *e, uint32_t index, ebpo_node_type type, ebpo_cell cell,
+                      int32_t winding, ebpo_polytope *envelope)
 {
     ebpo_build_node node = e->s->nodes[index];
     switch (node.type) {
     case EBPO_LEAF: return emit_leaf(e, node.detail, cell, winding, envelope);
     case EBPO_GRAY: return emit_gray(e, &node, cell, winding, envelope);
-    default: return emit_empty(e, cell, winding);
+    default: return emit_empty(e, type, cell, winding, envelope);
     }
 }
 
 ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
                             ebpo_error *error)
 {
-    emitter e = { b, s, scratch };
+    emitter e = { b, s, scratch, (uint32_t)s->first };
+    ebpo_node_type type = s->nodes[0].type;
+    if (type == EBPO_WHITE)
+        type = ebpo_empty_type(b, s->cell, s->winding);
     s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
     for (int level = 0; s->out && level < EBPO_LEVELS_MAX; level++)
         s->out[level].level.workspace = b->workspace;
-    if (!s->out || !emit_node(&e, 0, s->cell, s->winding, s->above))
+    if (!s->out || !emit_node(&e, 0, type, s->cell, s->winding, s->above))
         return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
     return EBPO_OK;
 }
@@ -274,9 +293,10 @@ typedef struct joiner {
     /* [count][EBPO_LEVELS_MAX] stretches of pieces and of the top, depth first */
     ebpo_piece_level **stretch;
     uint64_t count, capacity;
-    /* the last element of `stretch`, if it belongs to the top; NULL: it belongs to a piece */
-    ebpo_piece_level *current;
-    ebpo_level *level; /* [EBPO_LEVELS_MAX] result */
+    ebpo_piece_level *current; /* stretches of the top, if they are the last ones so far; NULL: the
+                                * last ones are those of a piece */
+    ebpo_level *level;         /* [EBPO_LEVELS_MAX] result */
+    uint32_t next;             /* final index of the next new face */
 } joiner;
 
 static const char stage[] = "joining levels";
@@ -310,23 +330,26 @@ static ebpo_piece_level *current_stretch(joiner *j)
 }
 
 /* Returns the type that the file stores for a node of the top. */
-static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
+static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, ebpo_cell cell,
+                              int32_t winding)
 {
     ebpo_node_type type = n->type == EBPO_LEAF ? b->piece[n->detail].root_type : n->type;
-    if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
-        return EBPO_BLACK;
-    return type;
+    return type == EBPO_WHITE ? ebpo_empty_type(b, cell, winding) : type;
 }
 
-/* Appends to the joiner's list the stretches of the pieces below a node and, between them,
- * stretches with the nodes of the top. Returns false when out of memory. */
-static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
+/* Appends to the list the stretches below a node: those of its pieces and, between them, stretches
+ * with the nodes of the top. `type`: the node's type in the file; `volume`: volume of its envelope,
+ * if it is a leaf without faces. Returns false when out of memory. */
+static bool collect_stretches(joiner *j, uint32_t index, ebpo_node_type type, ebpo_cell cell,
+                              int32_t winding, double volume)
 {
     ebpo_builder *b = j->b;
     ebpo_build_node node = b->top.nodes[index];
     if (node.type == EBPO_LEAF) {
-        ebpo_piece_level *out = b->piece[node.detail].out;
-        b->piece[node.detail].out = NULL;
+        ebpo_branch *piece = &b->piece[node.detail];
+        ebpo_piece_level *out = piece->out;
+        piece->out = NULL;
+        j->next = (uint32_t)(piece->first + piece->fresh_count);
         if (!push_stretch(j, out)) {
             ebpo_piece_levels_free(out);
             return false;
@@ -337,21 +360,24 @@ static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t
     ebpo_piece_level *out = current_stretch(j);
     if (!out)
         return false;
+    if (type == EBPO_LEAF)
+        return add_empty_leaf(&out[cell.level], winding, j->next, volume);
     if (node.type == EBPO_WHITE)
-        return ebpo_piece_level_add_empty(&out[cell.level],
-                                          b->solid && ebpo_rule_inside(b->options->rule, winding),
-                                          winding);
+        return ebpo_piece_level_add_empty(&out[cell.level], type == EBPO_BLACK, winding);
     const ebpo_top_envelope *t = &b->top_envelope[node.detail];
     int32_t offset[8];
-    ebpo_child_windings(b, &b->top, node.child, offset);
+    ebpo_child_windings(b, &b->top, cell, node.child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++)
-        types |= ebpo_group_of(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]), o);
+        types |= ebpo_group_of(type_of(b, &b->top.nodes[node.child + o], ebpo_cell_child(cell, o),
+                                       winding + offset[o]),
+                               o);
     if (!ebpo_piece_level_add_gray(&out[cell.level], t->codes, t->count, t->volume) ||
         !ebpo_piece_level_add_group(&out[cell.level + 1], types))
         return false;
     for (uint32_t o = 0; o < 8; o++)
-        if (!collect_stretches(j, node.child + o, ebpo_cell_child(cell, o), winding + offset[o]))
+        if (!collect_stretches(j, node.child + o, ebpo_group_type(types, o),
+                               ebpo_cell_child(cell, o), winding + offset[o], t->empty_volume[o]))
             return false;
     return true;
 }
@@ -540,15 +566,17 @@ static bool root_group(joiner *j)
     /* the group goes to a stretch of the top, because the arrays of a piece's stretch may be in the
      * store, where they cannot grow */
     ebpo_piece_level *first = current_stretch(j);
-    return first &&
-           ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
+    return first && ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0],
+                                                                            b->top.cell, 0));
 }
 
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
 {
     joiner j = { .b = b, .level = out->level };
     ebpo_status status =
-        root_group(&j) && collect_stretches(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
+        root_group(&j) && collect_stretches(&j, 0, b->top.nodes[0].type, b->top.cell, 0, 0)
+            ? EBPO_OK
+            : no_memory(b, error);
     uint64_t refs = 0, all = 0;
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         for (int unit = 0; unit <= EBPO_PER_GROUP; unit++)

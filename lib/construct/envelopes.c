@@ -486,15 +486,23 @@ static bool pass_down(ebpo_builder *b, const pending *p, front *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
     int32_t offset[8];
-    ebpo_child_windings(b, &b->top, node->child, offset);
+    ebpo_child_windings(b, &b->top, p->cell, node->child, offset);
     for (uint32_t o = 0; o < 8; o++) {
         const ebpo_build_node *child = &b->top.nodes[node->child + o];
-        if (child->type == EBPO_WHITE)
+        ebpo_cell cell = ebpo_cell_child(p->cell, o);
+        if (child->type == EBPO_WHITE &&
+            ebpo_empty_type(b, cell, p->winding + offset[o]) != EBPO_LEAF)
             continue;
         ebpo_polytope *envelope = ebpo_array_alloc(b->workspace, 1, sizeof *envelope);
         if (!envelope)
             return false;
         ebpo_polytope_child(p->envelope, o, envelope);
+        if (child->type == EBPO_WHITE) {
+            b->top_envelope[node->detail].empty_volume[o] =
+                ebpo_polytope_volume(envelope) * ebpo_cell_volume(&b->box, cell.level);
+            ebpo_array_free(b->workspace, envelope);
+            continue;
+        }
         if (child->type == EBPO_LEAF) {
             b->piece[child->detail].above = envelope;
             b->piece[child->detail].winding = p->winding + offset[o];
@@ -504,8 +512,8 @@ static bool pass_down(ebpo_builder *b, const pending *p, front *next)
             ebpo_array_free(b->workspace, envelope);
             return false;
         }
-        next->nodes[next->count++] = (pending){ node->child + o, ebpo_cell_child(p->cell, o),
-                                                p->winding + offset[o], envelope };
+        next->nodes[next->count++] =
+            (pending){ node->child + o, cell, p->winding + offset[o], envelope };
     }
     return true;
 }

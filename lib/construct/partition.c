@@ -139,7 +139,7 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     uint64_t leaves = atomic_fetch_add(&b->leaf_count, 1) + 1,
              entries = atomic_fetch_add(&b->entry_count, count) + count;
     ebpo_status status = ebpo_build_check_lists(b->face_count, leaves, entries, g->error);
-    if (status != EBPO_OK || !b->solid)
+    if (status != EBPO_OK || !ebpo_build_closed(b))
         return status;
     if (!ebpo_grow(&g->faces, &g->faces_capacity,
                    count < EBPO_CORNER_FACES ? count : EBPO_CORNER_FACES, sizeof *g->faces))
@@ -284,8 +284,8 @@ static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t
     if (status != EBPO_OK)
         return status;
     d.entry_end = s->entry_count;
-    if (g->b->solid)
-        ebpo_gather_delta(g->b, s, child, d.delta);
+    if (ebpo_build_closed(g->b))
+        ebpo_gather_delta(g->b, s, cell, child, d.delta);
     s->details[detail] = d;
     return collapse_if_few(g, index, cell, at, count);
 }
@@ -659,7 +659,7 @@ ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
     if (status == EBPO_OK)
         ebpo_array_fill(b->workspace, b->final_index, 0xff, /* EBPO_NO_INDEX */
                         b->face_count * sizeof *b->final_index);
-    if (status == EBPO_OK && b->solid)
+    if (status == EBPO_OK && ebpo_build_closed(b))
         status = ebpo_parallel_for(b->threads, b->workspace, b->piece_count, 1, corners_of_pieces,
                                    b, &b->options->progress, "winding numbers", error);
     return status;

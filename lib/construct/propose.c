@@ -236,7 +236,7 @@ static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
                           uint64_t count)
 {
     const ebpo_builder *b = p->b;
-    unsigned inside = ebpo_inside_corners(b, winding, d->delta);
+    unsigned inside = ebpo_leaf_corners(b, cell, winding, d->delta);
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
         ebpo_triangle t;
         double points[9][3], slack;
@@ -314,7 +314,7 @@ static bool propose_node(proposer *p, uint32_t index, ebpo_cell cell, int32_t wi
     int32_t offset[8];
     ebpo_handover given = { 0 };
     bool good = true;
-    ebpo_child_windings(p->b, p->s, node.child, offset);
+    ebpo_child_windings(p->b, p->s, cell, node.child, offset);
     for (unsigned o = 0; o < 8 && good; o++) {
         ebpo_handover child = { 0 };
         good = propose_node(p, node.child + o, ebpo_cell_child(cell, o), winding + offset[o],
@@ -447,7 +447,7 @@ static bool list_top(top_list *t)
     for (uint64_t i = 0; i < t->count; i++) {
         const ebpo_build_node *node = &b->top.nodes[t->nodes[i].node];
         int32_t offset[8];
-        ebpo_child_windings(b, &b->top, node->child, offset);
+        ebpo_child_windings(b, &b->top, t->nodes[i].cell, node->child, offset);
         for (uint32_t o = 0; o < 8; o++) {
             const ebpo_build_node *child = &b->top.nodes[node->child + o];
             int32_t winding = t->nodes[i].winding + offset[o];
@@ -483,7 +483,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
         ebpo_branch alone = b->top;
         uint32_t detail = node->detail;
         int32_t offset[8];
-        ebpo_child_windings(b, &b->top, node->child, offset);
+        ebpo_child_windings(b, &b->top, n->cell, node->child, offset);
         alone.proposals = NULL;
         bool good = make_proposals(b, &alone);
         for (unsigned o = 0; o < 8 && good; o++) {

@@ -1,7 +1,7 @@
-/* Computes the support of the solid in a cell along a direction n: the greatest n . x over the
- * points x of the solid in the cell. Three kinds of points are sufficient: the mesh vertices in the
- * cell, the points at which cell faces cut the faces of the mesh ("crossings"), and the corners of
- * the cell that are inside the solid. The support is the offset of a plane with the normal n.
+/* Computes the support of the solid in a cell: the greatest n . xi over the mesh vertices in the
+ * cell, the points where the mesh crosses cell faces, the corners of the cell that are inside the
+ * solid, and, for a surface with holes, the corners of cap cells (capped.h). The support is the
+ * offset of a plane with normal n.
  *
  * If there are few vertices, all points are gathered, each once, and searched in stretches (32
  * consecutive points that share a box, sweep.h). If there are many vertices, only crossings and
@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "construct/capped.h"
 #include "construct/construct_stages.h"
 #include "construct/supports.h"
 #include "core/alloc.h"
@@ -283,6 +284,9 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
     return true;
 }
 
+/* Adds a corner of a cap cell (ebpo_capped_corners). */
+static bool add_corner(void *context, const double x[3]) { return add_point(context, x, 0); }
+
 /* Does the work of ebpo_supports_gather, except for the boxes of the stretches. */
 static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
                           const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
@@ -300,13 +304,17 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
-    /* Corners come first. Their values are large, so a search stops early if its plane is useless.
-     */
-    unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
+    /* Corners come first: they have great values, so searches along directions of useless planes
+     * stop early. */
+    ebpo_cap_overlap overlap = b->capped ? ebpo_capped_overlap(b->capped, cell) : EBPO_CAP_NONE;
+    unsigned corners =
+        overlap == EBPO_CAP_WHOLE ? 0xff : ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 &&
             !add_point(s, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0))
             return false;
+    if (overlap == EBPO_CAP_PART && !ebpo_capped_corners(b->capped, cell, add_corner, s))
+        return false;
     return (!few || add_vertices(s, begin, end)) && add_crossings(s, branch, detail);
 }
 

@@ -177,11 +177,7 @@ static ebpo_status begin_search(ebpo_bounder *b)
     b->fragment_count = b->face_count = 0;
     if (node.type == EBPO_BLACK)
         return EBPO_OK;
-    ebpo_status status = ebpo_fragment_push(b,
-                                            node.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
-                                            : node.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
-                                                                     : EBPO_FRAGMENT_OUTSIDE,
-                                            NULL, &first);
+    ebpo_status status = ebpo_fragment_push(b, ebpo_fragment_kind_in(b, &node), NULL, &first);
     if (status != EBPO_OK)
         return status;
     ebpo_half_spaces_cut(&b->half_spaces, EBPO_CUT_SLACK, &first->p);
@@ -268,8 +264,10 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
         ebpo_box box = b->model_tree->box;
         ebpo_cell_frame_make(&frame, &box, cell);
         /* A face touches the cell of a gray node or leaf, so no point of the cell is farther from
-         * this face than the cell's diagonal. */
-        out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
+         * this face than the cell's diagonal. With border_inside, this is only certain of the
+         * parent's cell. */
+        double cells = b->model_tree->info->border_inside ? 2 : 1;
+        out->hi = ebpo_cell_frame_model_length(&frame, cells * ebpo_cell_frame_diagonal(&frame, 0));
     }
     for (;;) {
         double sufficient = fmax(goal->enough, goal->ratio * out->lo);

@@ -335,10 +335,20 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Raises the upper bound of the search to the bound of a fragment in a black cell, if this bound is
- * greater. The fragment is inside the solid, except for thin parts of neighbouring cells that
- * stayed with it. Parts within EBPO_CUT_SLACK of the cell are ignored, because fragments of the
- * neighbouring cells cover them, too. */
+ebpo_fragment_kind ebpo_fragment_kind_in(const ebpo_bounder *b, const ebpo_node *node)
+{
+    const ebpo_level *level = &b->model_tree->level[node->cell.level];
+    return node->type == EBPO_GRAY ? EBPO_FRAGMENT_GRAY
+           : node->type == EBPO_LEAF &&
+                   (level->leaf_new[node->rank] || level->leaf_ref_count[node->rank])
+               ? EBPO_FRAGMENT_LEAF
+               : EBPO_FRAGMENT_OUTSIDE;
+}
+
+/* Raises the upper bound of the search to the bound of a fragment in a black cell. The fragment is
+ * inside the solid, except for thin parts of neighbouring cells that stayed with it. Parts within
+ * EBPO_CUT_SLACK of the cell are ignored, because fragments of the neighbouring cells cover them,
+ * too. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
@@ -374,11 +384,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
             bound_black(b, &x, child.cell, fragment->levels + 1);
             continue;
         }
-        status = push_polytope(b,
-                               child.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
-                               : child.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
-                                                         : EBPO_FRAGMENT_OUTSIDE,
-                               fragment, &x, &next);
+        status = push_polytope(b, ebpo_fragment_kind_in(b, &child), fragment, &x, &next);
         if (status != EBPO_OK)
             break;
         next->levels++;

@@ -157,6 +157,11 @@ typedef struct ebpo_fragment_measure {
     double face[3][3];        /* the face nearest to the centre, in the model's unit */
 } ebpo_fragment_measure;
 
+/* Returns the kind of a fragment in the cell of a node of the model's tree that is not black. A
+ * leaf without faces, which may be in a surface with holes, is like a white node: its points may be
+ * far from all faces. */
+ebpo_fragment_kind ebpo_fragment_kind_in(const ebpo_bounder *b, const ebpo_node *node);
+
 /* Pushes a fragment onto the stack. The fragment gets the bounds of `parent`, the fragment from
  * which it was cut (NULL: no bounds). *out is valid until the next call; its polytope is not set.
  */

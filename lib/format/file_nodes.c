@@ -161,6 +161,22 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
     return status;
 }
 
+ebpo_status ebpo_chunks_leaf_empty(ebpo_chunks *chunks, const ebpo_node *leaf, bool *empty,
+                                   ebpo_error *error)
+{
+    static const ebpo_array_id arrays[] = { EBPO_A_LEAF_NEW, EBPO_A_LEAF_REF_COUNT };
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_status status = ebpo_chunks_check_node(chunks, leaf, error);
+    *empty = info->border_inside && info->parts & EBPO_PART_MESH;
+    for (int i = 0; i < 2 && status == EBPO_OK && *empty; i++) {
+        uint32_t count = 0;
+        status = ebpo_chunks_integers(chunks, arrays[i], leaf->cell.level, leaf->rank, 1, &count,
+                                      sizeof count, error);
+        *empty = count == 0;
+    }
+    return status;
+}
+
 ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error)
 {
     uint16_t types = 0;

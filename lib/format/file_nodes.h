@@ -31,6 +31,10 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_nod
 EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
                                               int32_t *winding, ebpo_error *error);
 
+/* Sets *empty to true if a leaf lists no face, which is possible in files with border_inside. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_leaf_empty(ebpo_chunks *chunks, const ebpo_node *leaf,
+                                                 bool *empty, ebpo_error *error);
+
 /* Reads the root. Cursors (geometry/cursor.h) whose holder is an ebpo_chunks begin with this node
  * and read other nodes with ebpo_chunks_source. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error);

@@ -55,8 +55,13 @@ typedef struct part_word {
 } part_word;
 
 /* Bits of required parts that have no ebpo_part, but a member of ebpo_info: pruned, subtree_level,
- * gates. */
-enum { WORD_PRUNED = 1 << 30, WORD_SUBTREES = 1 << 29, WORD_GATES = 1 << 28 };
+ * gates, border_inside. */
+enum {
+    WORD_PRUNED = 1 << 30,
+    WORD_SUBTREES = 1 << 29,
+    WORD_GATES = 1 << 28,
+    WORD_INSIDE = 1 << 27
+};
 
 static const char *const KINDS[] = { "surface", "solid", NULL }; /* indexed by info.solid */
 static const char *const COORDINATES[] = { "float32", "float64",
@@ -151,6 +156,7 @@ static const part_word part_words[] = {
     { "surface", EBPO_PART_SURFACE, false },
     { "subtrees", WORD_SUBTREES, true },
     { "gates", WORD_GATES, true },
+    { "inside", WORD_INSIDE, true },
     { "pruned", WORD_PRUNED, true },
 };
 static const int part_word_count = sizeof part_words / sizeof part_words[0];
@@ -254,6 +260,8 @@ static const char *check_mesh_counts(const ebpo_info *info)
 
 static const char *check_border(const ebpo_info *info)
 {
+    if (info->border_inside && info->solid)
+        return "there is the part inside, but the model is a solid";
     if (!(info->parts & EBPO_PART_BORDER))
         return NULL;
     if (info->solid || !(info->parts & EBPO_PART_MESH))
@@ -429,7 +437,8 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
 {
     char words[128] = "";
     uint32_t parts = info->parts | (info->pruned ? WORD_PRUNED : 0) |
-                     (info->subtree_level ? WORD_SUBTREES : 0) | (info->gates ? WORD_GATES : 0);
+                     (info->subtree_level ? WORD_SUBTREES : 0) | (info->gates ? WORD_GATES : 0) |
+                     (info->border_inside ? WORD_INSIDE : 0);
     for (int i = 0; i < part_word_count; i++)
         if (part_words[i].required == required &&
             (!part_words[i].part || parts & part_words[i].part)) {
@@ -778,7 +787,8 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
     info->pruned = info->parts & WORD_PRUNED;
     info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* get_subtrees replaces the 1 */
     info->gates = info->parts & WORD_GATES;
-    info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES);
+    info->border_inside = info->parts & WORD_INSIDE;
+    info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES | WORD_INSIDE);
     /* bit 0: the part `levels`, which every file has */
     return listed & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }

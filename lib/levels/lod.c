@@ -22,8 +22,10 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "format/border_loops.h"
 #include "format/pick_rows.h"
 #include "format/schema.h"
+#include "geometry/cap_cells.h"
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
@@ -202,6 +204,7 @@ void ebpo_lod_model_free(ebpo_lod_model *model)
     }
     ebpo_mesh_free(&model->mesh);
     free(model->picked);
+    ebpo_cap_tree_free(&model->caps);
 }
 
 static ebpo_status read_levels(ebpo_lod_model *out, const ebpo_file *file,
@@ -331,6 +334,20 @@ static ebpo_status read_faces(ebpo_lod_model *out, const ebpo_file *file,
     return status;
 }
 
+/* Reads the border of a surface whose envelopes contain its inside, and makes its caps. */
+static ebpo_status read_caps(ebpo_lod_model *out, const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_border_loops loops = { 0 };
+    if (!out->info->border_inside || !(out->info->parts & EBPO_PART_BORDER))
+        return EBPO_OK;
+    ebpo_status status = ebpo_border_read(file, &loops, error);
+    if (status == EBPO_OK)
+        status = ebpo_cap_tree_of_loops(&out->caps, &loops, error);
+    ebpo_border_loops_free(&loops);
+    out->has_caps = status == EBPO_OK;
+    return status;
+}
+
 ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int target,
                                 const ebpo_read_options *read, ebpo_error *error)
 {
@@ -345,6 +362,8 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
     ebpo_status status = read_levels(out, file, read, error);
     if (status == EBPO_OK && out->leaf_source == EBPO_LEAF_DERIVED)
         status = read_faces(out, file, read, error);
+    if (status == EBPO_OK && out->leaf_source == EBPO_LEAF_DERIVED)
+        status = read_caps(out, file, error);
     if (status != EBPO_OK)
         ebpo_lod_model_free(out);
     return status;
@@ -413,22 +432,45 @@ unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule 
     return inside;
 }
 
+/* Returns true if the part of the inside in a leaf is bounded by the leaf's faces: in a solid and
+ * in a surface of faces alone, and in a surface with holes if |w_D| < 1/2 in the leaf and no cap
+ * touches it. Then the rule for the winding number of faces and caps decides, as in a solid. */
+static bool faces_decide(const ebpo_lod_model *model, ebpo_cell cell)
+{
+    const uint32_t root = 0;
+    const double threshold = 0.5;
+    double low[3], high[3];
+    ebpo_cap_front front;
+    if (!model->info->border_inside)
+        return true;
+    ebpo_cell_bounds(&model->box, cell, low, high);
+    return model->has_caps &&
+           ebpo_cap_small_in(&front, &model->caps, low, high, &root, model->caps.node_count > 0,
+                             (ebpo_bounded){ 0, 0 }, threshold) == 1;
+}
+
 ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                  ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
                                  uint32_t codes[EBPO_PLANES_MAX], int *plane_count,
                                  ebpo_error *error)
 {
     uint64_t count = 0;
+    *plane_count = 0;
+    if (!faces_decide(model, cell))
+        return EBPO_OK;
     ebpo_status status = ebpo_lod_leaf_faces(model, cell, leaf, scratch, &count, error);
     if (status != EBPO_OK)
         return status;
     const int32_t *winding = model->level[cell.level].leaf_winding;
-    unsigned inside = model->info->solid && winding
+    unsigned inside = (model->info->solid || model->has_caps) && winding
                           ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
                                                     winding[leaf], scratch->faces, count)
                           : 0;
-    /* epsilon is 0: derived planes need no storage, so no plane is omitted because it removes
-     * little volume. The volumes in the file's header are computed in the same way. */
+    if (count == 0) /* with border_inside; no faces bound the inside */
+        return EBPO_OK;
+    /* The 0 is epsilon, the smallest effect of a plane that is kept. Derived planes need no
+     * storage, so no plane is omitted. The volumes in the file's header are computed in this way.
+     */
     *plane_count =
         ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
     return EBPO_OK;

@@ -7,6 +7,7 @@
 #include <ebpo/lod.h>
 
 #include "construct/planes.h"
+#include "geometry/cap_tree.h"
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
@@ -64,6 +65,10 @@ typedef struct ebpo_lod_model {
     /* NULL: `mesh` has all faces of the file. Otherwise `mesh` has only the faces that leaves list,
      * and this array, [mesh.face_count], has their indices in the file, ascending */
     uint32_t *picked;
+    /* with border_inside and EBPO_LEAF_DERIVED: the caps, which show in which leaves planes of the
+     * faces contain the inside; without a border in the file, no planes are derived */
+    ebpo_cap_tree caps;
+    bool has_caps;
 } ebpo_lod_model;
 
 /* Reads levels 0 .. target. After a failure there is nothing to free. */

@@ -29,7 +29,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "format/border_loops.h"
-#include "geometry/cap_bounds.h"
+#include "geometry/cap_cells.h"
 #include "geometry/level_nodes.h"
 #include "query/holes.h"
 
@@ -106,24 +106,6 @@ static void begin_front(marking *w, const ebpo_cap_box *box, const near_discs *n
                          near->end - near->begin, near->far);
 }
 
-/* Returns the bounds of 2 pi w_D after the refinements so far. *apart: as in ebpo_cap_front_sum. */
-static ebpo_bounded sum_front(marking *w, bool *apart)
-{
-    w->terms += w->front.count;
-    return ebpo_cap_front_sum(&w->front, apart);
-}
-
-/* Returns 1 if |w_D| is certainly below t and 1 - t, 0 if more refinements cannot show this, else
- * -1. `angles`: bounds of 2 pi w_D. */
-static int is_small(const marking *w, ebpo_bounded angles)
-{
-    const double t = fmin(w->holes->rule.threshold, 1 - w->holes->rule.threshold);
-    ebpo_bounded b = ebpo_cap_winding_of(angles, 0);
-    return fabs(b.middle) + b.error < t - 0x1p-40   ? 1
-           : fabs(b.middle) - b.error > t - 0x1p-41 ? 0
-                                                    : -1;
-}
-
 /* Returns true if a single disc of the list is large compared with the box. */
 static bool has_large_disc(const marking *w, const ebpo_cap_box *box, const near_discs *near)
 {
@@ -148,13 +130,8 @@ static bool caps_touch(const marking *w, ebpo_cell cell)
  */
 static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, int steps)
 {
-    bool apart;
-    int small;
     begin_front(w, box, near);
-    do {
-        small = is_small(w, sum_front(w, &apart));
-    } while (small < 0 && steps-- > 0 && ebpo_cap_front_refine(&w->front));
-    return small == 1;
+    return ebpo_cap_front_small(&w->front, w->holes->rule.threshold, 0, steps, &w->terms) == 1;
 }
 
 /* Begins to bound w_D at the centre of a cell. *variation bounds the difference between the values
@@ -175,16 +152,9 @@ static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variati
 static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
 {
     double variation;
-    bool apart;
-    int small;
-    if (!begin_at_centre(w, box, &variation))
-        return false;
-    do {
-        ebpo_bounded b = sum_front(w, &apart);
-        b.error += variation;
-        small = is_small(w, b);
-    } while (small < 0 && ebpo_cap_front_refine(&w->front));
-    return small == 1;
+    return begin_at_centre(w, box, &variation) &&
+           ebpo_cap_front_small(&w->front, w->holes->rule.threshold, variation, INT_MAX,
+                                &w->terms) == 1;
 }
 
 /* Returns 1 if all points of a cell without faces are certainly inside, 0 if all are outside, else
@@ -192,30 +162,14 @@ static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
 static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, const near_discs *near,
                        int32_t winding)
 {
-    const ebpo_cap_rule *rule = &w->holes->rule;
     double variation, low[3], high[3];
-    bool apart;
     begin_front(w, box, near);
-    do {
-        ebpo_bounded b = ebpo_cap_winding_of(sum_front(w, &apart), winding);
-        int result =
-            apart ? ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error) : -1;
-        if (result >= 0)
-            return result;
-    } while (ebpo_cap_front_refine(&w->front));
-    if (!has_large_disc(w, box, near) || !begin_at_centre(w, box, &variation))
-        return -1;
+    int result = ebpo_cap_front_result(&w->front, &w->holes->rule, winding, -1, &w->terms);
+    if (result >= 0 || !has_large_disc(w, box, near) || !begin_at_centre(w, box, &variation))
+        return result;
     ebpo_cell_bounds(w->m->box, cell, low, high);
     winding += ebpo_holes_crossings(w->holes, low, box->centre);
-    do {
-        ebpo_bounded b = sum_front(w, &apart);
-        b.error += variation;
-        b = ebpo_cap_winding_of(b, winding);
-        int result = ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error);
-        if (result >= 0)
-            return result;
-    } while (ebpo_cap_front_refine(&w->front));
-    return -1;
+    return ebpo_cap_front_result(&w->front, &w->holes->rule, winding, variation, &w->terms);
 }
 
 /* Returns true if the rule for k certainly decides at all points of a leaf. */

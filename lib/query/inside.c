@@ -561,6 +561,13 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
 
 /* --- node by node: EBP 2017, 4.2 --- */
 
+/* Returns true if envelopes contain the inside. Those of a surface with holes contain the points
+ * that are inside with the threshold 1/2, or with a greater one. */
+static bool envelopes_hold(const ebpo_model *m)
+{
+    return !m->holes || (m->info->border_inside && m->holes->rule.threshold >= 0.5);
+}
+
 /* Returns true if the query tests the envelopes of nodes on the way down. */
 static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
 {
@@ -569,7 +576,7 @@ static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
      * with a level or deadline use envelopes. */
     bool proves_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
-    if (o->envelopes == EBPO_ENVELOPES_SKIP || !proves_result || c->model->holes)
+    if (o->envelopes == EBPO_ENVELOPES_SKIP || !proves_result || !envelopes_hold(c->model))
         return false;
     return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
            o->deadline_ns;
@@ -773,12 +780,18 @@ static ebpo_status walk_file(inside_query *query, const ebpo_node *below, ebpo_i
             return status;
     }
     const ebpo_node *node = ebpo_cursor_node(&c);
-    if (node->type == EBPO_LEAF && (query->options->level >= 0 || is_late(query))) {
+    bool empty = node->type != EBPO_LEAF;
+    if (!empty) {
+        ebpo_status status = ebpo_chunks_leaf_empty(m->chunks, node, &empty, error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    if (!empty && (query->options->level >= 0 || is_late(query))) {
         give_maybe(query, node->cell, out);
         return EBPO_OK;
     }
-    return node->type == EBPO_LEAF ? leaf_from_file(query, node, out, error)
-                                   : uniform_from_file(query, node, out, error);
+    return empty ? uniform_from_file(query, node, out, error)
+                 : leaf_from_file(query, node, out, error);
 }
 
 /* Decides the point on the way down from the root, for EBPO_LOAD_NODES. */
@@ -856,7 +869,7 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
                                  ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    if (m->holes) /* envelopes do not contain the inside of a surface */
+    if (!envelopes_hold(m))
         return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     inside_query query = {
@@ -923,8 +936,8 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return inside_whole(context, points, count, o->done, out, error);
-    context->planes = !m->holes && (o->level >= 0 || o->deadline_ns ||
-                                    o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned);
+    context->planes = envelopes_hold(m) && (o->level >= 0 || o->deadline_ns ||
+                                            o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned);
     ebpo_batch batch = { .context = context,
                          .points = points,
                          .count = count,

@@ -141,6 +141,10 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
         return uniform_entry(r, level->white_winding, rank, 0, entry);
     if (type == EBPO_BLACK)
         return uniform_entry(r, level->black_winding, rank, 1, entry);
+    /* a leaf without faces, in a surface with holes, is like a white node */
+    if (type == EBPO_LEAF && level->leaf_new && level->leaf_new[rank] == 0 &&
+        level->leaf_ref_count[rank] == 0)
+        return uniform_entry(r, level->leaf_winding, rank, 0, entry);
     ebpo_node node = { .cell = cell,
                        .type = type,
                        .pruned = type == EBPO_GRAY && is_pruned(r, cell.level, rank),

@@ -31,6 +31,7 @@ typedef struct subtree_scratch subtree_scratch; /* memory for describing a node 
 struct ebpo_subtree {
     ebpo_box box; /* the model's root cell */
     bool solid;
+    bool border_inside; /* as in ebpo_info */
     ebpo_rule rule;
     ebpo_node root; /* root of the subtree */
     /* The arrays have the same names as in ebpo_subtree_nodes and ebpo_subtree_faces. */
@@ -471,9 +472,9 @@ static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons
     ebpo_node_type type = (ebpo_node_type)s->types[number];
     uint32_t derived[EBPO_PLANES_MAX], *codes = s->planes;
     unsigned count = 0;
-    /* derives: the leaf's planes are derived from its faces, because the file does not store them
-     */
-    bool derives = type == EBPO_LEAF && !s->has_leaf_planes && !s->no_faces;
+    /* derives: the leaf's planes are derived from its faces, because the file does not store them;
+     * the inside of a surface with holes may extend beyond such planes */
+    bool derives = type == EBPO_LEAF && !s->has_leaf_planes && !s->no_faces && !s->border_inside;
     ebpo_node_begin(&out->node, &s->box, octcode, type);
     out->node.winding = s->windings ? s->windings[number] : 0;
     add_inherited(s, octcode, out);
@@ -783,6 +784,7 @@ ebpo_status ebpo_subtree_open(const ebpo_file *file, uint64_t octcode,
     const ebpo_info *info = ebpo_file_info(file);
     s->box = ebpo_root_box(info);
     s->solid = info->solid;
+    s->border_inside = info->border_inside;
     s->rule = info->rule;
     status = ebpo_chunks_make(&chunks, file, chunk_budget(wanted.memory), error);
     if (status == EBPO_OK)

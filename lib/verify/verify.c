@@ -26,6 +26,7 @@
 #include <ebpo/colours.h>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/fp_env.h"
 #include "core/wide.h"
 #include "core/workspace.h"
@@ -202,6 +203,9 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
         status = ebpo_check_patches(tally, tree, options->workspace, error);
     if (status == EBPO_OK)
         status = ebpo_verify_walk(tally, &view, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_inside(tally, &view, ebpo_thread_count(options->threads),
+                                   &options->progress, error);
     if (status == EBPO_OK && file)
         status = ebpo_check_subtrees(tally, file, &view, options, error);
     if (status == EBPO_OK && file)

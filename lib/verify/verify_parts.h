@@ -81,6 +81,14 @@ EBPO_MUST_USE ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_poi
                                                  const ebpo_reference_tree *view, unsigned threads,
                                                  const ebpo_progress *progress, ebpo_error *error);
 
+/* --- verify_inside.c: envelopes of a surface with holes --- */
+
+/* Checks, for a sample of points, that envelopes contain the inside of a surface with
+ * border_inside. Does nothing for other trees, for subsets, and without a mesh. */
+EBPO_MUST_USE ebpo_status ebpo_check_inside(ebpo_tally *tally, const ebpo_reference_tree *view,
+                                            unsigned threads, const ebpo_progress *progress,
+                                            ebpo_error *error);
+
 /* --- verify_surface.c: the simplified surface (format-spec/surface.md) --- */
 
 /* Checks the nodes and the errors of all patches. Does nothing if the tree is a subset or has no

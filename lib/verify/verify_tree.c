@@ -648,7 +648,7 @@ static void check_leaf(descent *d, const ebpo_reference_node *leaf)
         d, leaf, level->leaf_first[leaf->rank] == d->next_face,
         "the leaf's new faces do not follow the new faces of the previous leaf in depth-first "
         "order");
-    record_check(d, leaf, listed > 0, "the leaf lists no face");
+    record_check(d, leaf, listed > 0 || info->border_inside, "the leaf lists no face");
     record_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
                  "the leaf lists more faces than leaf_faces, and is above max_level");
     d->next_face = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];

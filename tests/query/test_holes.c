@@ -13,8 +13,10 @@
 
 #include "check_main.h"
 #include "geometry/predicates.h"
+#include "levels/lod.h"
 #include "mesh/mesh_parts.h"
 #include "model_file.h"
+#include "query/point_bounds.h"
 #include "query/query_model.h"
 #include "scratch.h"
 #include "solids.h"
@@ -362,6 +364,8 @@ static void check_same_files(const char *one, const char *other)
     fclose(b);
 }
 
+/* The border that is added to a file equals the border that is built, except for envelopes: those
+ * of a built surface contain its inside. */
 START_TEST(test_border_is_added_to_file)
 {
     uint64_t state = 4, seed = 4;
@@ -372,7 +376,143 @@ START_TEST(test_border_is_added_to_file)
     model_must(ebpo_file_add_border(file, scratch("added.ebpo.h5"), NULL, NULL, &error), "adding",
                &error);
     ebpo_close(file);
+    file = model_open(scratch("added.ebpo.h5"));
+    ebpo_file *built = model_open(scratch("with.ebpo.h5"));
+    const ebpo_info *added = ebpo_file_info(file), *with = ebpo_file_info(built);
+    ck_assert(!added->border_inside && with->border_inside);
+    ck_assert_uint_eq(added->border_loops, with->border_loops);
+    ck_assert_uint_eq(added->border_points, with->border_points);
+    ck_assert_double_eq(added->border_area, with->border_area);
+    ebpo_close(file);
+    ebpo_close(built);
+    /* a repacked file keeps its envelopes and border_inside */
+    file = model_open(scratch("with.ebpo.h5"));
+    model_must(ebpo_file_add_border(file, scratch("added.ebpo.h5"), NULL, NULL, &error), "adding",
+               &error);
+    ebpo_close(file);
     check_same_files(scratch("added.ebpo.h5"), scratch("with.ebpo.h5"));
+}
+END_TEST
+
+/* ---- envelopes contain the inside ---- */
+
+/* Makes faces with random corners, which intersect each other and have nothing in common. */
+static ebpo_mesh random_soup(uint64_t *state, uint64_t faces)
+{
+    ebpo_mesh m = ebpo_test_tetrahedron(1);
+    m.face_count = 1;
+    for (uint64_t i = 1; i < faces; i++) {
+        uint32_t corner[3];
+        for (int k = 0; k < 3; k++) {
+            double x = ebpo_test_random_unit(state), y = ebpo_test_random_unit(state);
+            corner[k] = ebpo_test_append_vertex(&m, x, y, ebpo_test_random_unit(state));
+        }
+        ebpo_test_append_face(&m, corner[0], corner[1], corner[2]);
+    }
+    return m;
+}
+
+/* Makes a part of a torus: a shell with two large holes, or a sheet. */
+static ebpo_mesh part_of_torus(unsigned first, unsigned end)
+{
+    ebpo_mesh m = ebpo_test_torus(3, 1, 24, 12);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < m.face_count; f++)
+        if (f >= first * m.face_count / 24 && f < end * m.face_count / 24)
+            memmove(m.faces + 3 * kept++, m.faces + 3 * f, 3 * sizeof *m.faces);
+    m.face_count = kept;
+    return m;
+}
+
+/* Checks that the envelopes of all levels contain a point that is inside. */
+static void check_levels(const holed *h, const double p[3], double w)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (int level = 0; level < ebpo_file_info(h->file)->level_count; level++) {
+        ebpo_inside_options o = EBPO_INSIDE_OPTIONS_INIT;
+        ebpo_inside_result r;
+        o.level = level;
+        o.envelopes = EBPO_ENVELOPES_USE;
+        model_must(ebpo_inside(h->context, p, &o, &r, &error), "level", &error);
+        ck_assert_msg(r.where != EBPO_OUT, "(%a %a %a), level %d: w = %.17g, but outside", p[0],
+                      p[1], p[2], level, w);
+    }
+}
+
+/* Checks that planes derived from the faces of a leaf contain a point that is inside. */
+static void check_leaf(const ebpo_lod_model *m, ebpo_leaf_scratch *faces, const double p[3])
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(m);
+    ebpo_node node = ebpo_level_root(&nodes);
+    uint32_t at[3], codes[EBPO_PLANES_MAX];
+    int count = 0;
+    ebpo_polytope envelope;
+    if (!ebpo_locate(&m->box, m->target, p, at))
+        return;
+    while (node.type == EBPO_GRAY)
+        node = ebpo_level_child(&nodes, &node, ebpo_octant_at(at, m->target - 1 - node.cell.level));
+    ck_assert_msg(node.type == EBPO_LEAF, "(%a %a %a) is in a white node", p[0], p[1], p[2]);
+    ebpo_polytope_cube(&envelope);
+    model_must(ebpo_lod_leaf_planes(m, node.cell, node.rank, faces, &envelope, codes, &count,
+                                    &error),
+               "planes", &error);
+    ck_assert_msg(!ebpo_outside_planes(&m->box, node.cell, codes, (uint32_t)count, p),
+                  "(%a %a %a) is outside a plane of a leaf", p[0], p[1], p[2]);
+}
+
+/* Chooses points in the model's box and near its faces and caps. Returns the number of points whose
+ * sum of solid angles is certainly beyond the threshold, all of which must be in all levels. */
+static uint64_t check_envelopes(ebpo_mesh mesh, ebpo_rule rule, uint64_t points, uint64_t state)
+{
+    holed h;
+    uint64_t inside = 0;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    ebpo_lod_model tree;
+    ebpo_leaf_scratch faces = { NULL, 0 };
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    holed_make(&h, mesh, rule, 0.5);
+    model_must(ebpo_lod_model_read(&tree, h.file, ebpo_file_info(h.file)->level_count - 1, &read,
+                                   &error),
+               "reading", &error);
+    ck_assert(ebpo_file_info(h.file)->border_inside);
+    model_must(ebpo_verify(h.file, NULL, &report, &error), "verifying", &error);
+    ck_assert_msg(report.violations == 0, "%s; %s", report.structure.first,
+                  report.containment.first);
+    for (uint64_t i = 0; i < points; i++) {
+        double p[3], q[3], error_of_w = 0, share = ebpo_test_random_unit(&state);
+        choose_point(&state, &h, p);
+        choose_point(&state, &h, q); /* points between two points of faces are near caps */
+        for (int k = 0; k < 3; k++)
+            p[k] += i % 2 * share * (q[k] - p[k]);
+        double w = winding_by_sum(&h.mesh, p, &error_of_w);
+        if (expected_where(w, error_of_w, rule, 0.5) != EBPO_IN)
+            continue;
+        inside++;
+        check_levels(&h, p, w);
+        check_leaf(&tree, &faces, p);
+    }
+    free(faces.faces);
+    ebpo_lod_model_free(&tree);
+    holed_free(&h);
+    return inside;
+}
+
+START_TEST(test_envelopes_contain_inside)
+{
+    const ebpo_rule rule = (ebpo_rule)(_i % 3);
+    uint64_t state = (uint64_t)_i + 77, points = ebpo_test_scaled(4000);
+    uint64_t inside = check_envelopes(holed_torus(&state, 10, 0), rule, points, state);
+    inside += check_envelopes(holed_torus(&state, 30, 5), rule, points, state);
+    inside += check_envelopes(random_soup(&state, 12), rule, points, state);
+    inside += check_envelopes(random_soup(&state, 60), rule, points, state);
+    inside += check_envelopes(part_of_torus(0, 20), rule, points, state);
+    inside += check_envelopes(part_of_torus(3, 5), rule, points, state);
+    static const char *const shapes[] = { "mobius", "open_box", "flipped_face_cube" };
+    for (int i = 0; i < 3; i++)
+        inside += check_envelopes(ebpo_test_make(shapes[i]), rule, points, state);
+    ck_assert_uint_gt(inside, points / 4);
 }
 END_TEST
 
@@ -512,8 +652,12 @@ START_TEST(test_scans_match_sums_over_faces)
     snprintf(path, sizeof path, "%s/%s.ply", getenv("EBPO_MODELS"), scans[_i]);
     model_must(ebpo_mesh_read(path, NULL, &mesh, &error), "reading", &error);
     uint64_t points = ebpo_test_scaled(mesh.face_count > 100000 ? 40 : 400);
+    ebpo_mesh copy;
+    model_must(ebpo_mesh_copy(&mesh, &copy, &error), "copying", &error);
+    uint64_t inside = check_envelopes(copy, EBPO_RULE_NONZERO, 25 * points, (uint64_t)_i + 9);
     check_model(mesh, EBPO_RULE_NONZERO, 0.5, points, (uint64_t)_i + 5, &all);
-    printf("%s: %llu in, %llu out, %llu on\n", scans[_i], (unsigned long long)all.of[EBPO_IN],
+    printf("%s: %llu points in all levels, %llu in, %llu out, %llu on\n", scans[_i],
+           (unsigned long long)inside, (unsigned long long)all.of[EBPO_IN],
            (unsigned long long)all.of[EBPO_OUT], (unsigned long long)all.of[EBPO_ON]);
 }
 END_TEST
@@ -526,6 +670,7 @@ TEST_SUITE(holes)
     tcase_add_checked_fixture(shapes, scratch_enter, scratch_leave);
     tcase_add_loop_test(shapes, test_surfaces_match_sums_over_faces, 0, 9);
     tcase_add_loop_test(shapes, test_few_holes_match_sums_over_faces, 0, EBPO_RULE_POSITIVE + 1);
+    tcase_add_loop_test(shapes, test_envelopes_contain_inside, 0, 3);
     tcase_add_test(shapes, test_ties_are_counted);
     tcase_add_test(shapes, test_invalid_queries_are_refused);
     tcase_add_test(shapes, test_border_is_added_to_file);

@@ -442,7 +442,14 @@ START_TEST(test_verify_detects_surface_with_inside)
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.solid = false;
     expect_caught(EBPO_VERIFY_STRUCTURE, "a surface has no winding numbers");
-    build("sheet", 2, EBPO_RULE_NONZERO);
+    /* two triangles: cells away from both, and so from their caps, are white */
+    ebpo_mesh far = ebpo_test_tetrahedron(1);
+    far.face_count = 1;
+    uint32_t a = ebpo_test_append_vertex(&far, 20, 20, 20),
+             b = ebpo_test_append_vertex(&far, 19, 20, 20),
+             c = ebpo_test_append_vertex(&far, 20, 19, 20);
+    ebpo_test_append_face(&far, a, b, c);
+    build_mesh(&far, 1, EBPO_RULE_NONZERO, (ebpo_repair_record){ 0 });
     position white = find_from(1, EBPO_WHITE);
     set_type(white.level, white.group, white.octant, EBPO_BLACK);
     recount(white.level);

@@ -571,6 +571,8 @@ static void v_border_nan(void) { poke("/border/points", 0, INT64_C(0xfffffffe));
 static void v_border_changed(void) { poke("/border/loops", 1, 3); }
 static void v_border_moved(void) { add_to("/border/points", 6, INT64_C(1) << 21); }
 static void v_border_winding(void) { add_to("/levels/01/leaf_winding", 0, 1); }
+static void v_inside_solid(void) { set_text("/", "required_parts", "levels mesh inside"); }
+static void v_inside_missed(void) { set_text("/", "required_parts", "levels mesh inside"); }
 static void v_border_area(void) { set_real("/", "border_area", 17); }
 static void v_surface_counts(void) { set_count("/", "surface_patches", 1 << 20); }
 static void v_surface_octcode(void) { poke("/surface/patches", 0, 3); }
@@ -749,6 +751,8 @@ static const failed_vector failed[] = {
     { "unverified_border_moved", BORDER, v_border_moved, NONE, "RK.6" },
     { "unverified_border_winding", BORDER, v_border_winding, NONE, "RK.7" },
     { "unverified_border_area", BORDER, v_border_area, NONE, "RK.8" },
+    { "inside_of_a_solid", LEAVES, v_inside_solid, NONE, "RK.9" },
+    { "unverified_inside_missed", BORDER, v_inside_missed, NONE, "RK.10" },
     { "surface_counts", PATCHES, v_surface_counts, NONE, "RL.1" },
     { "surface_octcode", PATCHES, v_surface_octcode, NONE, "RL.2" },
     { "surface_faces", PATCHES, v_surface_faces, NONE, "RL.3" },

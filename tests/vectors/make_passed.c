@@ -18,6 +18,7 @@
 #include "nodes_json.h"
 #include "mesh/ply.h"
 #include "solids.h"
+#include "construct/construct_stages.h"
 #include "derive/subset_parts.h"
 #include "tree_json.h"
 #include "vector_read.h"
@@ -820,25 +821,50 @@ static ebpo_mesh open_faces(void)
     return mesh;
 }
 
+/* Adds the border to a tree that was built without it, whose envelopes contain the faces only. */
+static void add_border(ebpo_tree *tree)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (ebpo_build_border(tree, 1, &error) != EBPO_OK)
+        die("border", error.message);
+}
+
 static void make_borders(void)
 {
     ebpo_tree tree;
     ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
-    how with = { 2, 1, EBPO_PART_BORDER, 0, 0, 0, 0 };
-    build_float(&tree, open_faces(), with);
+    how plain = { 2, 1, 0, 0, 0, 0, 0 };
+    build_float(&tree, open_faces(), plain);
+    add_border(&tree);
     write_vector("65_border", &tree, EBPO_CODEC_NONE, ~0u);
-    build_mesh(&tree, open_faces(), with);
+    build_mesh(&tree, open_faces(), plain);
+    add_border(&tree);
     write_vector("66_border_doubles", &tree, EBPO_CODEC_ZSTD, ~0u);
     ebpo_mesh torus = ebpo_test_torus(1, 0.375, 80, 32);
     torus.face_count -= 70;
-    with = (how){ 5, 6, EBPO_PART_BORDER, 0, 0, 0, 0 };
-    build_float(&tree, torus, with);
+    plain = (how){ 5, 6, 0, 0, 0, 0, 0 };
+    build_float(&tree, torus, plain);
+    add_border(&tree);
     write_laid_out("67_border_with_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
     box.boxed = true;
     for (int k = 0; k < 3; k++)
         box.max[k] = 0.6;
     subset(&tree, "67_border_with_subtrees", &box);
     write_vector("68_border_of_a_subset", &tree, EBPO_CODEC_ZSTD, ~0u);
+}
+
+/* Surfaces with holes whose envelopes contain the inside. */
+static void make_insides(void)
+{
+    ebpo_tree tree;
+    ebpo_mesh torus = ebpo_test_torus(1, 0.375, 12, 8);
+    torus.face_count -= 20;
+    build_float(&tree, torus, (how){ 3, 4, EBPO_PART_BORDER, 0, 0, 0, 0 });
+    write_vector("72_inside", &tree, EBPO_CODEC_NONE, ~0u);
+    torus = ebpo_test_torus(1, 0.375, 80, 32);
+    torus.face_count -= 70;
+    build_float(&tree, torus, (how){ 5, 6, EBPO_PART_BORDER, 0, 0, 0, 0 });
+    write_laid_out("73_inside_with_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
 }
 
 /* --- the simplified surface --- */
@@ -924,4 +950,5 @@ void make_passed(const char *to)
     make_long();
     make_borders();
     make_surfaces();
+    make_insides();
 }

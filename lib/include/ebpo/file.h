@@ -405,6 +405,14 @@ typedef struct ebpo_info {
     bool gates;
 
     /*
+     * True for a surface whose envelopes contain its inside (the points with a winding number that
+     * satisfies the rule with the threshold 1/2), so that its levels bound the inside as those of a
+     * solid do. Then a leaf without faces is a cell that may hold a part of the inside, and white
+     * nodes are outside. The builder sets it for surfaces with EBPO_PART_BORDER and planes.
+     */
+    bool border_inside;
+
+    /*
      * For files with EBPO_PART_BORDER. border_loops: number of loops of the border. border_points:
      * number of points in all loops. border_longest: number of points in the longest loop.
      * border_area: area of the triangles that close the loops, in square units of the model.
