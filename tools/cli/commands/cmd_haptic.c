@@ -3,6 +3,7 @@
 #include <float.h>
 #include <math.h>
 #include <sched.h>
+#include <signal.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,6 +17,8 @@
 #include "cli/command.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/haptic_device.h"
+#include "cli/commands/haptic_live.h"
+#include "cli/commands/haptic_paint.h"
 #include "cli/json.h"
 #include "cli/model_memory.h"
 #include "cli/numbers.h"
@@ -49,9 +52,14 @@ typedef struct haptic_play {
     ebpo_haptic *haptic;         /* NULL: steps do nothing */
     const haptic_device *device; /* source of positions */
     ebpo_haptic_kind kind;
-    double range;        /* for probes: the distance that has the last colour of the scale */
-    haptic_pose *record; /* [maximum number of steps], set to the device's positions; or NULL */
+    double range;         /* for probes: the distance that has the last colour of the scale */
+    haptic_pose *record;  /* [maximum number of steps], set to the device's positions; or NULL */
+    const double *points; /* points of the tool, or NULL */
+    haptic_live *live;    /* takes the steps; or NULL */
 } haptic_play;
+
+/* Set by a signal: the loop ends after the current step. */
+static volatile sig_atomic_t stopped_by_signal;
 
 /* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
  * that says what the system granted. Threads created afterwards inherit the scheduling. */
@@ -154,15 +162,30 @@ static void step_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_resul
     memcpy(a->proxy.rotation, pose->rotation, sizeof pose->rotation);
     memcpy(a->force, r.force, sizeof r.force);
     memcpy(a->normal, r.normal, sizeof r.normal);
+    memcpy(a->touch, r.face == EBPO_NO_FACE ? r.proxy : r.point, sizeof r.point);
     a->depth = r.depth;
     a->face = r.face;
     a->flags = r.flags;
 }
 
-static void step_tool(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
+/* Computes q * v / q: the vector v, rotated by the unit quaternion q. */
+static void rotate_vector(const double q[4], const double v[3], double out[3])
+{
+    const double t[3] = { 2 * (q[1] * v[2] - q[2] * v[1]), 2 * (q[2] * v[0] - q[0] * v[2]),
+                          2 * (q[0] * v[1] - q[1] * v[0]) };
+    out[0] = v[0] + q[3] * t[0] + q[1] * t[2] - q[2] * t[1];
+    out[1] = v[1] + q[3] * t[1] + q[2] * t[0] - q[0] * t[2];
+    out[2] = v[2] + q[3] * t[2] + q[0] * t[1] - q[1] * t[0];
+}
+
+static void step_tool(const haptic_play *p, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_tool_result r;
-    ebpo_haptic_step_tool(haptic, pose->position, pose->rotation, &r);
+    ebpo_haptic_step_tool(p->haptic, pose->position, pose->rotation, &r);
+    if (r.point != EBPO_NO_FACE)
+        rotate_vector(r.turn, p->points + 3 * r.point, a->touch);
+    for (int k = 0; k < 3; k++)
+        a->touch[k] += r.proxy[k];
     memcpy(a->proxy.position, r.proxy, sizeof r.proxy);
     memcpy(a->proxy.rotation, r.turn, sizeof r.turn);
     memcpy(a->force, r.force, sizeof r.force);
@@ -188,6 +211,20 @@ static void step_probe(const haptic_play *p, const haptic_pose *pose, haptic_res
     ebpo_map_colour(EBPO_MAP_THESIS, r.distance, p->range, a->rgb);
 }
 
+/* Passes a step to the thread that paints. */
+static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
+                      const haptic_result *a)
+{
+    haptic_sample sample = {
+        .time = (double)i * 1000 / p->rate, .depth = a->depth, .pressure = 1, .flags = a->flags
+    };
+    memcpy(sample.device, pose->position, sizeof sample.device);
+    memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);
+    memcpy(sample.force, a->force, sizeof sample.force);
+    memcpy(sample.touch, a->touch, sizeof sample.touch);
+    haptic_live_push(p->live, &sample);
+}
+
 /* Returns false if the device has ended. */
 static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
 {
@@ -202,8 +239,10 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
     switch (p->kind) {
     case EBPO_HAPTIC_BALL: step_ball(p->haptic, &pose, &result); break;
     case EBPO_HAPTIC_PROBE: step_probe(p, &pose, &result); break;
-    case EBPO_HAPTIC_TOOL: step_tool(p->haptic, &pose, &result); break;
+    case EBPO_HAPTIC_TOOL: step_tool(p, &pose, &result); break;
     }
+    if (p->live)
+        push_step(p, i, &pose, &result);
     p->device->write(p->device->self, &result);
     out->width_mean += result.hi - result.lo; /* a sum until haptic_play_run divides it */
     out->width_max = fmax(out->width_max, result.hi - result.lo);
@@ -217,7 +256,7 @@ static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times 
 {
     const double period = 1e9 / p->rate;
     uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults_before = page_faults(), i = 0;
-    for (; i < count; i++) {
+    for (; i < count && !stopped_by_signal; i++) {
         uint64_t due = begin + (uint64_t)((double)i * period);
         tool_wait_until(due);
         uint64_t cpu_begin = thread_clock(), begin_time = tool_clock();
@@ -263,10 +302,11 @@ static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 
 typedef struct values {
     /* as text; NULL: not given */
-    const char *path, *device, *record, *tool, *memory;
-    double rate, seconds, radius, friction, stiffness, damping, skin, search_radius;
-    int64_t faces;
-    bool probe, json;
+    const char *path, *device, *record, *tool, *memory, *paint, *colour;
+    double rate, seconds, radius, friction, stiffness, damping, skin, search_radius, pen_radius,
+        full_force, thin, spread;
+    int64_t faces, density, layer;
+    bool probe, json, erase;
     remote_values remote;
 } values;
 
@@ -289,6 +329,10 @@ typedef struct job {
     ebpo_haptic_stats stats;
     ebpo_error stopped; /* status EBPO_OK, or the error that ended loading */
     ebpo_model_stats memory;
+    haptic_paint *paint; /* NULL: not requested */
+    haptic_painted painted;
+    ebpo_error paint_error; /* status EBPO_OK, or why paint is missing in the file */
+    uint64_t lost;          /* steps that were not painted, because painting was too slow */
 } job;
 
 /* --- output --- */
@@ -340,6 +384,12 @@ static void print_report(const job *j)
         printf("  loading failed: in %llu steps\n", (unsigned long long)s->stopped);
     printf("  model: %llu bytes at most, %llu subtrees loaded\n",
            (unsigned long long)j->memory.memory_peak, (unsigned long long)j->memory.loads);
+    if (j->v->paint)
+        printf("  painted %llu strokes, %llu points; lost steps %llu; saved %llu times, failed "
+               "%llu; longest %.3f s\n",
+               (unsigned long long)j->painted.strokes, (unsigned long long)j->painted.points,
+               (unsigned long long)j->lost, (unsigned long long)j->painted.saves,
+               (unsigned long long)j->painted.failed_saves, j->painted.save_seconds_max);
     print_bins(&j->times);
 }
 
@@ -363,6 +413,21 @@ static void json_times(json *out, const char *key, const haptic_times *t)
     for (int i = 0; i < HAPTIC_BINS; i++)
         json_uint(out, NULL, t->bins[i]);
     json_end(out);
+    json_end(out);
+}
+
+static void json_painted(json *out, const job *j)
+{
+    json_object(out, "paint");
+    json_text(out, "file", j->v->paint);
+    json_uint(out, "strokes", j->painted.strokes);
+    json_uint(out, "points", j->painted.points);
+    json_uint(out, "lost_steps", j->lost);
+    json_uint(out, "saves", j->painted.saves);
+    json_uint(out, "failed_saves", j->painted.failed_saves);
+    json_real(out, "save_seconds_max", j->painted.save_seconds_max);
+    if (j->paint_error.status != EBPO_OK)
+        json_text(out, "failure", j->paint_error.message);
     json_end(out);
 }
 
@@ -396,6 +461,8 @@ static void json_report(const job *j)
     json_uint(&out, "model_bytes_max", j->memory.memory_peak);
     json_uint(&out, "subtrees_loaded", j->memory.loads);
     json_uint(&out, "stopped", s->stopped);
+    if (j->v->paint)
+        json_painted(&out, j);
     if (j->stopped.status != EBPO_OK)
         json_text(&out, "failure", j->stopped.message);
     json_finish(&out);
@@ -530,21 +597,86 @@ static ebpo_status play_empty(job *j, ebpo_error *error)
     return played ? EBPO_OK : no_memory(error, "the times of steps");
 }
 
+/* Opens the paint file. */
+static ebpo_status open_paint(job *j, ebpo_error *error)
+{
+    const values *v = j->v;
+    haptic_pen pen = { .path = v->paint, .pen = EBPO_PAINT_PEN_INIT };
+    if (!v->paint)
+        return EBPO_OK;
+    pen.pen.radius = v->pen_radius > 0 ? v->pen_radius : v->radius;
+    pen.pen.kind = v->erase ? EBPO_PAINT_ERASES : EBPO_PAINT_PAINTS;
+    pen.pen.spread = v->spread;
+    pen.pen.density = (uint32_t)v->density;
+    pen.pen.size_least = v->thin;
+    pen.pen.layer = (uint64_t)v->layer;
+    pen.default_layer = v->layer < 0;
+    pen.default_colour = !v->colour;
+    if (v->colour)
+        (void)words_read_colour(v->colour, &pen.pen.colour); /* already checked */
+    pen.dated = v->device != NULL;
+    pen.stiffness = v->stiffness;
+    pen.full_force = v->full_force > 0 ? v->full_force : v->stiffness * pen.pen.radius;
+    return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
+}
+
+static void stop_loop(int number)
+{
+    (void)number;
+    stopped_by_signal = 1;
+}
+
+/* The first SIGINT, SIGTERM or SIGHUP ends the loop, so that the paint is saved; a second one ends
+ * the process. */
+static void end_on_signals(void)
+{
+    static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action = { .sa_handler = stop_loop }, before;
+        action.sa_flags = (int)SA_RESETHAND;
+        if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            sigaction(numbers[i], &action, NULL);
+    }
+}
+
+/* Plays the device, and meanwhile paints. */
+static ebpo_status play_painting(job *j, haptic_play *all, ebpo_error *error)
+{
+    if (j->paint) {
+        all->live = haptic_live_begin(haptic_paint_take, j->paint);
+        if (!all->live)
+            return no_memory(error, "painting");
+        end_on_signals();
+    }
+    j->scheduling = request_real_time();
+    bool played = haptic_play_run(all, &j->times);
+    if (all->live)
+        end_real_time();
+    j->lost = haptic_live_end(all->live);
+    (void)haptic_paint_close(j->paint, &j->painted, &j->paint_error);
+    j->paint = NULL;
+    return played ? EBPO_OK : no_memory(error, "the times of steps");
+}
+
 static ebpo_status play_device(job *j, ebpo_error *error)
 {
     const values *v = j->v;
-    haptic_play all = { v->rate,    v->seconds, j->haptic,
-                        &j->device, j->kind,    model_diagonal(ebpo_file_info(j->file)) / 20,
-                        NULL };
+    haptic_play all = { .rate = v->rate,
+                        .seconds = v->seconds,
+                        .haptic = j->haptic,
+                        .device = &j->device,
+                        .kind = j->kind,
+                        .range = model_diagonal(ebpo_file_info(j->file)) / 20,
+                        .points = j->points };
     if (v->record) {
         j->record = calloc(haptic_play_steps(&all), sizeof *j->record);
         if (!j->record)
             return no_memory(error, "the record");
         all.record = j->record;
     }
-    j->scheduling = request_real_time();
-    if (!haptic_play_run(&all, &j->times))
-        return no_memory(error, "the times of steps");
+    ebpo_status status = play_painting(j, &all, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_haptic_get_stats(j->haptic, &j->stats);
     ebpo_model_get_stats(j->model, &j->memory);
     j->stopped.status = ebpo_haptic_check(j->haptic, &j->stopped);
@@ -580,6 +712,8 @@ static int run_job(job *j, uint64_t memory)
         status = open_model(j, memory, &error);
     if (status == EBPO_OK)
         status = play_empty(j, &error);
+    if (status == EBPO_OK)
+        status = open_paint(j, &error);
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
         return EXIT_FAILED;
     if (status == EBPO_OK)
@@ -594,7 +728,37 @@ static int run_job(job *j, uint64_t memory)
         json_report(j);
     else
         print_report(j);
-    return j->stopped.status == EBPO_OK ? EXIT_OK : command_failed("haptic", &j->stopped);
+    if (j->paint_error.status != EBPO_OK)
+        (void)command_failed("haptic", &j->paint_error);
+    if (j->stopped.status != EBPO_OK)
+        (void)command_failed("haptic", &j->stopped);
+    return j->stopped.status == EBPO_OK && j->paint_error.status == EBPO_OK ? EXIT_OK : EXIT_FAILED;
+}
+
+/* Checks the options of painting. Returns an exit code. */
+static int check_pen(const values *v)
+{
+    uint32_t colour;
+    bool pen = v->colour || v->erase || v->pen_radius > 0 || v->full_force > 0 || v->thin != 0.25 ||
+               v->spread > 0 || v->density != 1 || v->layer >= 0;
+    if (pen && !v->paint)
+        return command_usage("haptic", "--pen-radius, --colour and other options of a pen belong "
+                                       "to --paint");
+    if (v->paint && v->probe)
+        return command_usage("haptic", "--paint and --probe cannot be used together: a probe "
+                                       "touches nothing");
+    if (v->paint && v->pen_radius == 0 && v->radius == 0)
+        return command_usage("haptic", "--paint needs --pen-radius, or a ball with --radius");
+    if (v->paint && v->stiffness == 0)
+        return command_usage("haptic", "--paint needs a --stiffness above 0, because the force "
+                                       "is the pressure of the pen");
+    if (v->colour && !words_read_colour(v->colour, &colour))
+        return command_usage("haptic", "--colour '%s': expected " WORDS_COLOUR_EXPECTED, v->colour);
+    if (v->colour && v->erase)
+        return command_usage("haptic", "--erase and --colour cannot be used together");
+    return v->density != 1 && v->spread == 0
+               ? command_usage("haptic", "--density belongs to --spread")
+               : EXIT_OK;
 }
 
 /* Checks the values of the options, and sets *memory. Returns an exit code. */
@@ -616,17 +780,18 @@ static int check_values(const values *v, uint64_t *memory)
                                        "point");
     if ((v->tool || v->probe) && v->radius > 0)
         return command_usage("haptic", "--radius is for a ball, without --tool and --probe");
-    return 0;
+    return check_pen(v);
 }
 
-/* Returns true if the record would overwrite an input. */
+/* Returns true if the record or the paint would overwrite an input, or the record the paint. */
 static bool overwrites_input(const values *v, const char *model)
 {
-    const char *in[] = { model, v->path, v->tool };
-    for (int i = 0; v->record && i < 3; i++)
-        if (in[i] && command_overwrites("haptic", in[i], v->record))
-            return true;
-    return false;
+    const char *in[] = { model, v->path, v->tool }, *out[] = { v->record, v->paint };
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; out[i] && k < 3; k++)
+            if (in[k] && command_overwrites("haptic", in[k], out[i]))
+                return true;
+    return v->record && v->paint && command_overwrites("haptic", v->paint, v->record);
 }
 
 static int run_haptic(void *given, const char **operand)
@@ -647,6 +812,7 @@ static int run_haptic(void *given, const char **operand)
                     (!v->path || haptic_path_open(&j.device, v->path)) &&
                     (!v->device || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
+    (void)haptic_paint_close(j.paint, &j.painted, &j.paint_error);
     ebpo_haptic_free(j.haptic);
     ebpo_model_free(j.model);
     ebpo_close(j.file);
@@ -662,6 +828,9 @@ static const values standard = { .rate = 1000,
                                  .stiffness = 400,
                                  .damping = 0.4,
                                  .faces = 1 << 14,
+                                 .thin = 0.25,
+                                 .density = 1,
+                                 .layer = -1,
                                  .remote = REMOTE_VALUES_INIT };
 
 const command command_haptic = { &spec, sizeof standard, &standard, run_haptic };

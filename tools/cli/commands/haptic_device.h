@@ -18,8 +18,9 @@ typedef struct haptic_pose {
 typedef struct haptic_result {
     haptic_pose proxy; /* the pose of the tool on the surface, see ebpo_haptic_ball_result */
     double force[3], torque[3], normal[3];
-    double depth;  /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
-    double lo, hi; /* bounds of the distance */
+    double touch[3]; /* in contact: a point of the tool or of the surface, where they touch */
+    double depth;    /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
+    double lo, hi;   /* bounds of the distance */
     uint64_t face;
     uint32_t flags;
     uint8_t rgb[3]; /* colour of the distance */
