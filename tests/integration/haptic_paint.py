@@ -71,7 +71,7 @@ class Device:
         self.sent += 1
         self.socket.sendto(POSITION.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1), self.to)
 
-    def draw(self, process, seconds, step=None):
+    def draw(self, process, seconds, step=None, kind=1):
         """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""
         begin, sent, down = time.monotonic(), [], None
         self.send((0.1, 0.5, 1.2))
@@ -80,7 +80,7 @@ class Device:
             if z < 1 and down is None:
                 down = now
             x = 0.1 + (now - down) * 0.1 if down is not None else 0.1
-            self.send((x, 0.5, z))
+            self.send((x, 0.5, z), kind)
             sent.append((time.monotonic(), x))
             if step:
                 step(now)
@@ -166,6 +166,17 @@ def test_second_writer(t):
     check(max(q["place"][0] for q in points) >= sent[-1][1] - RADIUS, "the last points are missing")
 
 
+def test_lifted_pen(t):
+    """A device whose pen is lifted touches, and does not paint."""
+    paint = t.at("lifted.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    device = Device(p)
+    device.draw(p, 0.8, kind=4)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
+
+
 def test_full_disk(t, recovers):
     """The loop continues when the paint cannot be saved. It is saved when there is space again."""
     paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
@@ -197,6 +208,7 @@ def main(ebpo):
         test_erase(t)
         test_kill(t)
         test_second_writer(t)
+        test_lifted_pen(t)
         test_full_disk(t, True)
         test_full_disk(t, False)
 

@@ -19,6 +19,7 @@
 #include "cli/commands/haptic_device.h"
 #include "cli/commands/haptic_live.h"
 #include "cli/commands/haptic_paint.h"
+#include "cli/commands/haptic_view.h"
 #include "cli/json.h"
 #include "cli/model_memory.h"
 #include "cli/numbers.h"
@@ -215,9 +216,11 @@ static void step_probe(const haptic_play *p, const haptic_pose *pose, haptic_res
 static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
                       const haptic_result *a)
 {
-    haptic_sample sample = {
-        .time = (double)i * 1000 / p->rate, .depth = a->depth, .pressure = 1, .flags = a->flags
-    };
+    haptic_sample sample = { .time = (double)i * 1000 / p->rate,
+                             .depth = a->depth,
+                             .clock = tool_clock(),
+                             .flags = a->flags,
+                             .lifted = pose->lifted };
     memcpy(sample.device, pose->position, sizeof sample.device);
     memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);
     memcpy(sample.force, a->force, sizeof sample.force);
@@ -302,15 +305,18 @@ static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 
 typedef struct values {
     /* as text; NULL: not given */
-    const char *path, *device, *record, *tool, *memory, *paint, *colour;
+    const char *path, *device, *record, *tool, *memory, *paint, *colour, *viewer;
     double rate, seconds, radius, friction, stiffness, damping, skin, search_radius, pen_radius,
         full_force, thin, spread;
-    int64_t faces, density, layer;
-    bool probe, json, erase;
+    int64_t faces, density, layer, port;
+    bool probe, json, erase, view;
     remote_values remote;
 } values;
 
 #include "cli/options/haptic.inc"
+
+/* Returns true if the page of the viewer is the device. */
+static bool is_page(const char *device) { return device && strcmp(device, "viewer") == 0; }
 
 typedef struct job {
     const values *v;
@@ -329,6 +335,7 @@ typedef struct job {
     ebpo_haptic_stats stats;
     ebpo_error stopped; /* status EBPO_OK, or the error that ended loading */
     ebpo_model_stats memory;
+    haptic_view *view;   /* NULL: not requested */
     haptic_paint *paint; /* NULL: not requested */
     haptic_painted painted;
     ebpo_error paint_error; /* status EBPO_OK, or why paint is missing in the file */
@@ -582,19 +589,28 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
     return EBPO_E_MEMORY;
 }
 
-/* Plays steps that do nothing for a tenth of the time, to measure the delays that the machine
- * itself causes. Call before the device starts. */
+/* Plays steps that do nothing for a tenth of the time, with a viewer at most for a second, to
+ * measure the delays that the machine itself causes. Call before the device starts. */
 static ebpo_status play_empty(job *j, ebpo_error *error)
 {
     const values *v = j->v;
     uint64_t step_count = v->path ? j->device.step_count(j->device.self) : 0;
-    const haptic_play empty = { .rate = v->rate,
-                                .seconds = step_count ? (double)step_count / v->rate / 10
-                                                      : v->seconds / 10 };
+    double seconds = (step_count ? (double)step_count / v->rate : v->seconds) / 10;
+    const haptic_play empty = { .rate = v->rate, .seconds = v->view ? fmin(seconds, 1) : seconds };
     request_real_time();
     bool played = haptic_play_run(&empty, &j->empty);
     end_real_time(); /* so that the loading thread, which is created next, has normal scheduling */
     return played ? EBPO_OK : no_memory(error, "the times of steps");
+}
+
+/* Returns the force of full pressure; without paint, that of 1 % of the model's diagonal. */
+static double full_force(const job *j)
+{
+    const values *v = j->v;
+    double depth = v->pen_radius > 0 ? v->pen_radius : v->radius;
+    if (depth == 0)
+        depth = 0.01 * model_diagonal(ebpo_file_info(j->file));
+    return v->full_force > 0 ? v->full_force : v->stiffness * depth;
 }
 
 /* Opens the paint file. */
@@ -616,7 +632,7 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
         (void)words_read_colour(v->colour, &pen.pen.colour); /* already checked */
     pen.dated = v->device != NULL;
     pen.stiffness = v->stiffness;
-    pen.full_force = v->full_force > 0 ? v->full_force : v->stiffness * pen.pen.radius;
+    pen.full_force = full_force(j);
     return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
 }
 
@@ -639,11 +655,42 @@ static void end_on_signals(void)
     }
 }
 
-/* Plays the device, and meanwhile paints. */
-static ebpo_status play_painting(job *j, haptic_play *all, ebpo_error *error)
+/* Starts the viewer. Returns false after an error, which was reported. */
+static bool open_view(job *j)
 {
-    if (j->paint) {
-        all->live = haptic_live_begin(haptic_paint_take, j->paint);
+    const values *v = j->v;
+    const haptic_view_options view = { .model = j->name,
+                                       .viewer = v->viewer,
+                                       .port = v->port,
+                                       .max_expansion = v->remote.max_expansion,
+                                       .paint = j->paint,
+                                       .radius = v->radius,
+                                       .full_depth =
+                                           v->stiffness > 0 ? full_force(j) / v->stiffness : 0,
+                                       .is_device = is_page(v->device) };
+    if (!v->view)
+        return true;
+    j->view = haptic_view_begin(&view);
+    if (j->view && is_page(v->device))
+        haptic_view_open_device(&j->device, j->view);
+    return j->view != NULL;
+}
+
+/* A haptic_live_fn, whose `user` is a job. */
+static void take_steps(void *user, const haptic_sample *samples, uint64_t count)
+{
+    job *j = user;
+    if (j->paint)
+        haptic_paint_take(j->paint, samples, count);
+    if (j->view)
+        haptic_view_take(j->view, samples, count);
+}
+
+/* Plays the device, and meanwhile paints and shows. */
+static ebpo_status play_live(job *j, haptic_play *all, ebpo_error *error)
+{
+    if (j->paint || j->view) {
+        all->live = haptic_live_begin(take_steps, j);
         if (!all->live)
             return no_memory(error, "painting");
         end_on_signals();
@@ -653,6 +700,8 @@ static ebpo_status play_painting(job *j, haptic_play *all, ebpo_error *error)
     if (all->live)
         end_real_time();
     j->lost = haptic_live_end(all->live);
+    haptic_view_end(j->view);
+    j->view = NULL;
     (void)haptic_paint_close(j->paint, &j->painted, &j->paint_error);
     j->paint = NULL;
     return played ? EBPO_OK : no_memory(error, "the times of steps");
@@ -674,7 +723,7 @@ static ebpo_status play_device(job *j, ebpo_error *error)
             return no_memory(error, "the record");
         all.record = j->record;
     }
-    ebpo_status status = play_painting(j, &all, error);
+    ebpo_status status = play_live(j, &all, error);
     if (status != EBPO_OK)
         return status;
     ebpo_haptic_get_stats(j->haptic, &j->stats);
@@ -714,6 +763,8 @@ static int run_job(job *j, uint64_t memory)
         status = play_empty(j, &error);
     if (status == EBPO_OK)
         status = open_paint(j, &error);
+    if (status == EBPO_OK && !open_view(j))
+        return EXIT_FAILED;
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
         return EXIT_FAILED;
     if (status == EBPO_OK)
@@ -762,7 +813,7 @@ static int check_pen(const values *v)
 }
 
 /* Checks the values of the options, and sets *memory. Returns an exit code. */
-static int check_values(const values *v, uint64_t *memory)
+static int check_values(const values *v, const char *model, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
@@ -772,9 +823,18 @@ static int check_values(const values *v, uint64_t *memory)
     if (v->path && v->device)
         return command_usage("haptic", "--path and --device cannot be used together: both move the "
                                        "tool");
-    if (v->device && !haptic_udp_named(v->device))
-        return command_usage("haptic", "--device '%s': expected udp:PORT or udp:ADDRESS:PORT",
+    if (v->device && !is_page(v->device) && !haptic_udp_named(v->device))
+        return command_usage("haptic",
+                             "--device '%s': expected udp:PORT, udp:ADDRESS:PORT or viewer",
                              v->device);
+    if (is_page(v->device) && !v->view)
+        return command_usage("haptic", "--device viewer needs --view");
+    if (is_page(v->device) && v->tool)
+        return command_usage("haptic", "--device viewer moves a ball or a probe, not a --tool");
+    if (!v->view && (v->viewer || v->port != 8080))
+        return command_usage("haptic", "--port and --viewer belong to --view");
+    if (v->view && (strncmp(model, "http://", 7) == 0 || strncmp(model, "https://", 8) == 0))
+        return command_usage("haptic", "--view needs a model on this machine; fetch it first");
     if (v->tool && v->probe)
         return command_usage("haptic", "--tool and --probe cannot be used together: a probe is a "
                                        "point");
@@ -805,13 +865,14 @@ static int run_haptic(void *given, const char **operand)
               .stats = EBPO_HAPTIC_STATS_INIT,
               .memory = EBPO_MODEL_STATS_INIT };
     uint64_t memory = 0;
-    int code = check_values(v, &memory);
+    int code = check_values(v, operand[0], &memory);
     if (code != 0 || overwrites_input(v, operand[0]))
         return EXIT_USAGE;
     bool prepared = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
                     (!v->path || haptic_path_open(&j.device, v->path)) &&
-                    (!v->device || haptic_udp_open(&j.device, v->device));
+                    (!v->device || is_page(v->device) || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
+    haptic_view_end(j.view);
     (void)haptic_paint_close(j.paint, &j.painted, &j.paint_error);
     ebpo_haptic_free(j.haptic);
     ebpo_model_free(j.model);
@@ -831,6 +892,7 @@ static const values standard = { .rate = 1000,
                                  .thin = 0.25,
                                  .density = 1,
                                  .layer = -1,
+                                 .port = 8080,
                                  .remote = REMOTE_VALUES_INIT };
 
 const command command_haptic = { &spec, sizeof standard, &standard, run_haptic };

@@ -4,6 +4,7 @@
 #define EBPO_TOOLS_HAPTIC_DEVICE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include <ebpo/haptic.h>
@@ -11,6 +12,7 @@
 typedef struct haptic_pose {
     double position[3];
     double rotation[4]; /* a unit quaternion x, y, z, w; 0 0 0 1: not rotated */
+    bool lifted;        /* the pen of the device does not paint */
 } haptic_pose;
 
 /* Feedback for a device. Only a probe sets lo, hi, rgb and `where`; only other tools set the
@@ -42,6 +44,11 @@ typedef struct haptic_device {
     void (*end)(void *self);
     void *self; /* the first argument of these functions */
 } haptic_device;
+
+/* haptic_path.c: reads a line 'x y z' or 'x y z qx qy qz qw' of `length` bytes, which ends with a
+ * zero byte. Returns the number of numbers, 3 or 7; 0: an empty line or a comment; -1: other
+ * text, such as numbers that are not finite. */
+int haptic_pose_read(const char *line, size_t length, haptic_pose *out);
 
 /* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
  * false after an error, reported on stderr. Call `end` in any case. */

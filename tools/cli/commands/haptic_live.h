@@ -12,11 +12,11 @@ typedef struct haptic_sample {
     double device[3]; /* position of the device */
     double proxy[3];  /* position of the proxy */
     double force[3];
-    double touch[3];  /* in contact: the point of contact; otherwise the position of the proxy */
-    double depth;     /* as in ebpo_haptic_ball_result */
-    double pressure;  /* of the device's pen, 0 to 1 */
-    uint32_t flags;   /* ebpo_haptic_flag bits */
-    uint32_t buttons; /* of the device, as in docs/guide/haptic.md */
+    double touch[3]; /* in contact: the point of contact; otherwise the position of the proxy */
+    double depth;    /* as in ebpo_haptic_ball_result */
+    uint64_t clock;  /* tool_clock at the end of the step */
+    uint32_t flags;  /* ebpo_haptic_flag bits */
+    bool lifted;     /* the pen of the device does not paint */
 } haptic_sample;
 
 /* Takes `count` successive steps. Called by one thread. */

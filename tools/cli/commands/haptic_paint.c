@@ -14,7 +14,9 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/numbers.h"
 #include "cli/tool_clock.h"
+#include "cli/words.h"
 
 /* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
 enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
@@ -27,6 +29,7 @@ static const double LIFT_MS = 30;
 
 struct haptic_paint {
     haptic_pen pen;
+    uint32_t colour; /* of the pen when it does not erase */
     ebpo_context *context;
     /* Used by the thread that paints. */
     ebpo_paint_drawing *drawing; /* NULL: the pen is lifted */
@@ -37,6 +40,8 @@ struct haptic_paint {
     ebpo_paint *drawn;
     uint64_t finished; /* number of strokes of `drawn` that will not change */
     uint64_t changes;  /* number of changes of `drawn` */
+    uint64_t epoch;    /* number of removed strokes */
+    uint64_t layer_changes;
     /* Used by the thread that saves. */
     ebpo_paint *saved;
     uint64_t copied; /* number of strokes of `saved` that will not change */
@@ -57,10 +62,23 @@ static ebpo_paint_info info_of(const ebpo_paint *paint)
 
 /* --- saving --- */
 
+/* Adds the layers of `drawn` that `saved` does not have. The caller has the lock. */
+static ebpo_status copy_layers(haptic_paint *p, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    uint64_t count = info_of(p->drawn).layer_count;
+    for (uint64_t i = info_of(p->saved).layer_count; i < count && status == EBPO_OK; i++) {
+        ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+        ebpo_paint_get_layer(p->drawn, i, &layer);
+        status = ebpo_paint_add_layer(p->saved, &layer, NULL, error);
+    }
+    return status;
+}
+
 /* Makes `saved` equal to `drawn`. The caller has the lock. */
 static ebpo_status copy_strokes(haptic_paint *p, ebpo_error *error)
 {
-    ebpo_status status = EBPO_OK;
+    ebpo_status status = copy_layers(p, error);
     uint64_t count = info_of(p->drawn).stroke_count;
     for (uint64_t i = info_of(p->saved).stroke_count; i > p->copied && status == EBPO_OK; i--)
         status = ebpo_paint_remove_stroke(p->saved, i - 1, error);
@@ -156,13 +174,16 @@ static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
     return ebpo_paint_drawing_new(p->drawn, p->context, &pen, &p->drawing, error);
 }
 
-static bool is_touching(const haptic_sample *s) { return s->flags & EBPO_HAPTIC_CONTACT; }
+static bool is_touching(const haptic_sample *s)
+{
+    return s->flags & EBPO_HAPTIC_CONTACT && !s->lifted;
+}
 
 static ebpo_paint_input input_of(const haptic_paint *p, const haptic_sample *s)
 {
     ebpo_paint_input input = { .time = fmin(s->time, UINT32_MAX) };
     memcpy(input.place, s->touch, sizeof input.place);
-    input.pressure = fmin(1, p->pen.stiffness * s->depth / p->pen.full_force) * s->pressure;
+    input.pressure = fmin(1, p->pen.stiffness * s->depth / p->pen.full_force);
     return input;
 }
 
@@ -201,6 +222,199 @@ void haptic_paint_take(void *user, const haptic_sample *samples, uint64_t count)
     pthread_mutex_unlock(&p->lock);
 }
 
+/* --- commands --- */
+
+/* Removes the last stroke of this run. Returns false if there is none. The caller has the lock. */
+static bool undo_stroke(haptic_paint *p)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t count = info_of(p->drawn).stroke_count;
+    if (count == p->strokes_before ||
+        ebpo_paint_remove_stroke(p->drawn, count - 1, &error) != EBPO_OK)
+        return false;
+    p->finished = count - 1;
+    if (p->copied > p->finished)
+        p->copied = p->finished;
+    p->changes++;
+    p->epoch++;
+    return true;
+}
+
+static bool add_layer(haptic_paint *p, const char *title)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+    layer.title = title;
+    if (p->pen.pen.kind == EBPO_PAINT_PAINTS)
+        layer.colour = p->pen.pen.colour;
+    if (ebpo_paint_add_layer(p->drawn, &layer, &p->pen.pen.layer, &error) != EBPO_OK)
+        return false;
+    p->changes++;
+    p->layer_changes++;
+    return true;
+}
+
+static bool choose_number(haptic_paint *p, const char *text)
+{
+    char *end;
+    unsigned long number = strtoul(text, &end, 10);
+    if (*text < '0' || *text > '9' || *end || number >= info_of(p->drawn).layer_count)
+        return false;
+    p->pen.pen.layer = number;
+    return true;
+}
+
+static bool set_radius(haptic_paint *p, const char *text)
+{
+    const char *end;
+    double radius = number_read(text, text + strlen(text), &end);
+    if (end == text || *end || !(radius >= 0x1p-200 && radius <= 0x1p200))
+        return false;
+    p->pen.pen.radius = radius;
+    return true;
+}
+
+static bool set_colour(haptic_paint *p, const char *text)
+{
+    uint32_t colour;
+    if (!words_read_colour(text, &colour))
+        return false;
+    p->colour = colour;
+    p->pen.pen.kind = EBPO_PAINT_PAINTS;
+    p->pen.pen.colour = colour;
+    return true;
+}
+
+/* Sets the kind of the pen; its colour is that before erasing. */
+static bool set_kind(haptic_paint *p, ebpo_paint_kind kind)
+{
+    p->pen.pen.kind = kind;
+    p->pen.pen.colour = kind == EBPO_PAINT_ERASES ? 0 : p->colour;
+    return true;
+}
+
+bool haptic_paint_command(haptic_paint *p, const char *text)
+{
+    size_t word = strcspn(text, " ");
+    const char *value = text[word] ? text + word + 1 : "";
+    char name[16] = "";
+    if (word < sizeof name)
+        memcpy(name, text, word);
+    pthread_mutex_lock(&p->lock);
+    lift_pen(p);
+    bool done = strcmp(text, "undo") == 0        ? undo_stroke(p)
+                : strcmp(text, "paint") == 0     ? set_kind(p, EBPO_PAINT_PAINTS)
+                : strcmp(text, "erase") == 0     ? set_kind(p, EBPO_PAINT_ERASES)
+                : strcmp(name, "colour") == 0    ? set_colour(p, value)
+                : strcmp(name, "radius") == 0    ? set_radius(p, value)
+                : strcmp(name, "layer") == 0     ? choose_number(p, value)
+                : strcmp(name, "new-layer") == 0 ? add_layer(p, value)
+                                                 : false;
+    pthread_mutex_unlock(&p->lock);
+    return done;
+}
+
+/* --- news for pages --- */
+
+static void write_text(FILE *f, const char *name, const char *text)
+{
+    fprintf(f, "\"%s\":\"", name);
+    for (; text && *text; text++)
+        if (*text == '"' || *text == '\\')
+            fprintf(f, "\\%c", *text);
+        else if ((unsigned char)*text >= ' ')
+            fputc(*text, f);
+    fputs("\",", f);
+}
+
+static void write_layers(const haptic_paint *p, FILE *f)
+{
+    uint64_t count = info_of(p->drawn).layer_count;
+    fputs("\"layers\":[", f);
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+        ebpo_paint_get_layer(p->drawn, i, &layer);
+        fputs(i ? ",{" : "{", f);
+        write_text(f, "title", layer.title);
+        write_text(f, "author", layer.author);
+        write_text(f, "date", layer.date);
+        write_text(f, "description", layer.description);
+        fprintf(f, "\"colour\":%lu,\"opacity\":%u,\"visible\":%s}", (unsigned long)layer.colour,
+                (unsigned)layer.opacity, layer.visible ? "true" : "false");
+    }
+    fputs("],", f);
+}
+
+/* Writes the points of a stroke from number `first` on, at most `most`. Returns their number. */
+static uint64_t write_stroke(const ebpo_paint_stroke *s, uint64_t number, uint64_t first,
+                             uint64_t most, FILE *f)
+{
+    uint64_t end = s->point_count - first < most ? s->point_count : first + most;
+    fprintf(f,
+            "{\"number\":%llu,\"layer\":%llu,\"erases\":%s,\"colour\":[%u,%u,%u,%u],"
+            "\"radius\":%.17g,\"time\":%llu,\"points\":[",
+            (unsigned long long)number, (unsigned long long)s->layer,
+            s->kind == EBPO_PAINT_ERASES ? "true" : "false", s->colour >> 24 & 255,
+            s->colour >> 16 & 255, s->colour >> 8 & 255, s->colour & 255, s->radius,
+            (unsigned long long)s->time);
+    for (uint64_t i = first; i < end; i++) {
+        const ebpo_paint_point *q = &s->points[i];
+        fprintf(f, "%s[%lu,%lu,%lu,%.17g,%.17g,%.17g,%u,%u,%lu]", i > first ? "," : "",
+                (unsigned long)q->face, (unsigned long)q->weight[0], (unsigned long)q->weight[1],
+                q->place[0], q->place[1], q->place[2], q->size, q->pressure,
+                (unsigned long)q->time);
+    }
+    fputs("]}", f);
+    return end - first;
+}
+
+/* Writes new points, at most MOST in one event. The caller has the lock. */
+static void write_strokes(const haptic_paint *p, haptic_paint_cursor *at, FILE *f)
+{
+    enum { MOST = 4096 };
+    uint64_t count = info_of(p->drawn).stroke_count, room = MOST;
+    const char *comma = "";
+    fputs("\"strokes\":[", f);
+    for (uint64_t i = at->strokes ? at->strokes - 1 : 0; i < count && room; i++) {
+        ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+        ebpo_paint_get_stroke(p->drawn, i, &stroke);
+        if (i >= at->strokes)
+            at->points = 0;
+        at->strokes = i + 1;
+        if (stroke.point_count == at->points)
+            continue;
+        fputs(comma, f);
+        uint64_t written = write_stroke(&stroke, i, at->points, room, f);
+        at->points += written;
+        room -= written;
+        comma = ",";
+    }
+    fputs("]", f);
+}
+
+void haptic_paint_write_news(haptic_paint *p, haptic_paint_cursor *at, FILE *out)
+{
+    pthread_mutex_lock(&p->lock);
+    ebpo_paint_info info = info_of(p->drawn);
+    ebpo_paint_stroke last = EBPO_PAINT_STROKE_INIT;
+    if (at->epoch != p->epoch && at->strokes > 0)
+        at->strokes = at->points = 0; /* everything is sent again */
+    if (info.stroke_count)
+        ebpo_paint_get_stroke(p->drawn, info.stroke_count - 1, &last);
+    if (at->epoch != p->epoch || at->layer_changes != p->layer_changes ||
+        at->strokes != info.stroke_count || at->points != last.point_count) {
+        fprintf(out, "event: paint\ndata: {\"count\":%llu,\"layer\":%llu,",
+                (unsigned long long)at->strokes, (unsigned long long)p->pen.pen.layer);
+        if (at->layer_changes != p->layer_changes || at->epoch != p->epoch)
+            write_layers(p, out);
+        write_strokes(p, at, out);
+        fputs("}\n\n", out);
+        at->epoch = p->epoch;
+        at->layer_changes = p->layer_changes;
+    }
+    pthread_mutex_unlock(&p->lock);
+}
+
 /* --- opening and closing --- */
 
 /* Sets the layer and the colour of the pen. Adds a layer if there is none. */
@@ -226,10 +440,8 @@ static ebpo_status choose_layer(haptic_paint *p, ebpo_error *error)
         return EBPO_E_ARGUMENT;
     }
     ebpo_paint_get_layer(p->saved, pen->layer, &layer);
-    if (pen->kind == EBPO_PAINT_ERASES)
-        pen->colour = 0;
-    else if (p->pen.default_colour)
-        pen->colour = layer.colour;
+    p->colour = p->pen.default_colour ? layer.colour : pen->colour;
+    pen->colour = pen->kind == EBPO_PAINT_ERASES ? 0 : p->colour;
     return status;
 }
 
