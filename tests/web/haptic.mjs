@@ -204,7 +204,7 @@ const flags = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swi
 const browser = await playwright.launch({ executablePath: chromium, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
 try {
   const tab = await browser.newPage({ viewport: { width: 480, height: 360 } }), complaints = [];
-  tab.on('pageerror', (e) => complaints.push(e.message));
+  tab.on('pageerror', (e) => complaints.push(e.stack));
   const delay = await testRecording(tab);
   await testMouse(tab);
   await testLostPage(tab);

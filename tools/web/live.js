@@ -30,17 +30,17 @@ export function addLive({ scene, query }, pen) {
   mark(line, ends, ([a, b]) => Object.entries({ x1: a[0], y1: a[1], x2: b[0], y2: b[1] }).forEach(([name, value]) => line.setAttribute(name, value)));
 
   function show(step) {
-    const { device, proxy, force, contact, depth } = step, size = Math.hypot(...force), from = toScene(proxy);
+    const { device, proxy, force, contact, depth, colour } = step, size = Math.hypot(...force), from = toScene(proxy);
     greatest = Math.max(greatest, size);
     // toScene() of a direction: the difference of two points
     const to = toScene(proxy.map((x, k) => x + (size ? force[k] / greatest * ARROW / state.scene.scale : 0)));
     ends.splice(0, 2, from, to);
     line.style.visibility = size ? '' : 'hidden';
-    scene.showProbe(toScene(device), from, contact ? CONTACT : FREE); // also draws a new frame
-    $('liveState').textContent = contact ? `Contact: force ${size.toPrecision(3)}, depth ${length(depth, 3)}` : 'No contact';
+    scene.showProbe(toScene(device), from, colour ?? (contact ? CONTACT : FREE)); // also draws a new frame
+    $('liveState').textContent = colour ? `Distance ${depth === null ? 'unknown' : length(depth, 4)}` : contact ? `Contact: force ${size.toPrecision(3)}, depth ${length(depth, 3)}` : 'No contact';
   }
 
-  const isSame = (a, b) => b && a.contact === b.contact && ['device', 'proxy', 'force'].every((name) => a[name].every((x, k) => x === b[name][k]));
+  const isSame = (a, b) => b && a.contact === b.contact && a.colour === b.colour && ['device', 'proxy', 'force'].every((name) => a[name].every((x, k) => x === b[name][k]));
   function takeStep(step) {
     const moved = !isSame(step, live.last);
     live.steps++;

@@ -225,6 +225,7 @@ static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
     memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);
     memcpy(sample.force, a->force, sizeof sample.force);
     memcpy(sample.touch, a->touch, sizeof sample.touch);
+    memcpy(sample.rgb, a->rgb, sizeof sample.rgb);
     haptic_live_push(p->live, &sample);
 }
 
@@ -667,7 +668,8 @@ static bool open_view(job *j)
                                        .radius = v->radius,
                                        .full_depth =
                                            v->stiffness > 0 ? full_force(j) / v->stiffness : 0,
-                                       .is_device = is_page(v->device) };
+                                       .is_device = is_page(v->device),
+                                       .is_probe = v->probe };
     if (!v->view)
         return true;
     j->view = haptic_view_begin(&view);

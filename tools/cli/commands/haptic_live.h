@@ -17,6 +17,7 @@ typedef struct haptic_sample {
     uint64_t clock;  /* tool_clock at the end of the step */
     uint32_t flags;  /* ebpo_haptic_flag bits */
     bool lifted;     /* the pen of the device does not paint */
+    uint8_t rgb[3];  /* of a probe: colour of the distance */
 } haptic_sample;
 
 /* Takes `count` successive steps. Called by one thread. */

@@ -7,6 +7,7 @@
 #include "cli/commands/haptic_view.h"
 
 #include <errno.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -74,8 +75,14 @@ static void write_step(haptic_view *view, uint64_t *taken, FILE *f)
     write_vector(f, "device", s.device);
     write_vector(f, "proxy", s.proxy);
     write_vector(f, "force", s.force);
-    fprintf(f, "\"depth\":%.9g,\"contact\":%s,\"age\":%.3f,\"touch_age\":%.3f,\"now\":%.3f}\n\n",
-            s.depth, s.flags & EBPO_HAPTIC_CONTACT ? "true" : "false", ms_since(s.clock),
+    if (isnan(s.depth)) /* only bounds of the distance are known */
+        fputs("\"depth\":null,", f);
+    else
+        fprintf(f, "\"depth\":%.9g,", s.depth);
+    if (view->options.is_probe)
+        fprintf(f, "\"colour\":\"#%02x%02x%02x\",", s.rgb[0], s.rgb[1], s.rgb[2]);
+    fprintf(f, "\"contact\":%s,\"age\":%.3f,\"touch_age\":%.3f,\"now\":%.3f}\n\n",
+            s.flags & EBPO_HAPTIC_CONTACT ? "true" : "false", ms_since(s.clock),
             touch ? ms_since(touch) : 0, real_time_ms());
 }
 

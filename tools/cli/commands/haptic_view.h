@@ -15,6 +15,7 @@ typedef struct haptic_view_options {
     double radius;       /* radius of the ball */
     double full_depth;   /* depth of full pressure */
     bool is_device;      /* the page is the device */
+    bool is_probe;       /* the tool is a probe, without contact */
 } haptic_view_options;
 
 typedef struct haptic_view haptic_view;
