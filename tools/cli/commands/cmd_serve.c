@@ -9,7 +9,7 @@
 #include "cli/remote_args.h"
 #include "cli/commands/commands.h"
 #include "cli/serve/http_server.h"
-#include "cli/serve/site.h"
+#include "cli/commands/site.h"
 
 typedef struct values {
     int64_t port, max_expansion;

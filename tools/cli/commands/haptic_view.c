@@ -18,7 +18,7 @@
 
 #include "cli/command.h"
 #include "cli/serve/http_request.h"
-#include "cli/serve/site.h"
+#include "cli/commands/site.h"
 #include "cli/tool_clock.h"
 
 /* TICK_NS: time between two looks for news. PING_TICKS: number of looks without news after which a

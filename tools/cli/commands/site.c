@@ -1,7 +1,7 @@
 /* All paths that can be requested are in a table, which is made at the start. A request selects an
  * entry of the table, and opens the entry's file only if it is still the same file, so no request
  * leads to another file. */
-#include "cli/serve/site.h"
+#include "cli/commands/site.h"
 
 #include "ebpo_config.h"
 
