@@ -19,8 +19,8 @@ export function addLive({ scene, query }, pen) {
     complain('the device must be on the server of this page; open the address that ebpo haptic prints');
     return;
   }
-  // delays: milliseconds from each contact until the page submitted the drawing with its paint; without paint, with the contact
-  const live = { delays: [], steps: 0, paints: 0, connected: false, ended: false, last: undefined };
+  // Milliseconds from each contact until its first paint has arrived (arrivals), and until the page has submitted its drawing (delays). Without paint: the contact.
+  const live = { arrivals: [], delays: [], steps: 0, paints: 0, connected: false, ended: false, last: undefined };
   let hello = { radius: 0, full_depth: 0, device: false, paint: false }, source, touched, submits, greatest = 0;
   section('Device', HTML, { open: true });
 
@@ -48,7 +48,7 @@ export function addLive({ scene, query }, pen) {
     const begin = step.now - step.touch_age;
     if (step.contact && !(Math.abs(begin - touched) < 5)) { // a new contact
       touched = begin;
-      submits = { begin, painted: !hello.paint };
+      submits = { begin, arrived: hello.paint ? undefined : Date.now() };
     }
     if (state.info && moved)
       show(step);
@@ -57,14 +57,16 @@ export function addLive({ scene, query }, pen) {
   function takePaint(news) {
     live.paints++;
     if (submits && news.strokes.length)
-      submits.painted = true;
+      submits.arrived ??= Date.now();
     pen.receive(news);
   }
 
   on('frame', () => {
-    if (submits?.painted) {
+    if (submits?.arrived) {
+      live.arrivals.push(submits.arrived - submits.begin);
       live.delays.push(Date.now() - submits.begin);
-      live.delays.splice(0, live.delays.length - KEPT);
+      for (const list of [live.arrivals, live.delays])
+        list.splice(0, list.length - KEPT);
       submits = undefined;
     }
   });
