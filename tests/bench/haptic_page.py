@@ -3,7 +3,7 @@
     haptic_page.py EBPO MODEL.ebpo.h5 [SECONDS] >docs/measured/haptic.md
 
 The first row takes SECONDS, each other row a tenth of that. The user needs the right to SCHED_FIFO
-(ulimit -r, or root) and to lock memory. The last section of the page is written by hand.
+(ulimit -r, or root) and to lock memory. The last two sections of the page are written by hand.
 """
 import contextlib
 import io

@@ -318,7 +318,13 @@ static ebpo_status query_paint(ebpo_paint *paint, ebpo_context *context, ebpo_er
     pen.density = 3;
     options.fineness = 8;
     options.threads = 1;
+    ebpo_paint_drawing *drawing = NULL;
     ebpo_status status = ebpo_paint_draw(paint, context, hand, 2, &pen, &laid, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_drawing_new(paint, context, &pen, &drawing, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_drawing_add(drawing, hand, 2, NULL, error);
+    ebpo_paint_drawing_free(drawing);
     if (status == EBPO_OK)
         status = ebpo_paint_cover(paint, context, 0, take_painted, NULL, &elsewhere, error);
     if (status == EBPO_OK)
@@ -362,6 +368,8 @@ static ebpo_status keep_paint(ebpo_paint *paint, ebpo_error *error)
     ebpo_status status = ebpo_paint_save(paint, scratch("every.paint.h5"), error);
     if (status == EBPO_OK)
         status = ebpo_paint_open_to_change(scratch("every.paint.h5"), NULL, 0, NULL, &read, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_checkpoint(read, error);
     if (status == EBPO_OK)
         status = ebpo_paint_save(read, scratch("every.paint.h5"), error);
     ebpo_paint_free(read);

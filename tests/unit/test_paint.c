@@ -241,6 +241,33 @@ START_TEST(test_paint_keeps_file_modified_in_place)
 }
 END_TEST
 
+START_TEST(test_paint_checkpoint_keeps_the_lock)
+{
+    opened o = open_model(ebpo_test_sheet(8, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint *one = NULL, *other = NULL;
+    ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    const char *path = scratch("checkpoint.paint.h5");
+    model_must(ebpo_paint_new(o.file, &one, &error), "new", &error);
+    ck_assert(ebpo_paint_checkpoint(one, NULL) == EBPO_E_ARGUMENT); /* no file */
+    ebpo_paint_free(one);
+    model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
+    for (uint64_t i = 1; i <= 3; i++) {
+        model_must(ebpo_paint_add_layer(one, &layer, NULL, &error), "adding", &error);
+        model_must(ebpo_paint_checkpoint(one, &error), "checkpoint", &error);
+        ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, NULL) == EBPO_E_IO);
+        model_must(ebpo_paint_open(path, &other, &error), "reading", &error);
+        ck_assert(ebpo_paint_get_info(other, &info) == EBPO_OK && info.layer_count == i);
+        ebpo_paint_free(other);
+    }
+    ebpo_paint_free(one);
+    model_must(ebpo_paint_open_to_change(path, NULL, 0, NULL, &other, &error), "next", &error);
+    ebpo_paint_free(other);
+    close_model(&o);
+}
+END_TEST
+
 START_TEST(test_paint_file_is_locked_for_changes)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
@@ -646,6 +673,110 @@ START_TEST(test_paint_pressure_adds_points)
 }
 END_TEST
 
+/* Draws the same path in calls of 1 to 5 positions. */
+START_TEST(test_paint_drawing_in_parts_equals_one_call)
+{
+    opened o = open_model(ebpo_test_sheet(8, 16), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_input input[INPUT];
+    ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
+    ebpo_paint_drawing *drawing = NULL;
+    ebpo_paint_drawn drawn = EBPO_PAINT_DRAWN_INIT, all = EBPO_PAINT_DRAWN_INIT;
+    ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT, t = EBPO_PAINT_STROKE_INIT;
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    pen.radius = 0.1;
+    pen.spread = 0.3;
+    pen.density = 5;
+    pen.size_least = 0.25;
+    pen.pressure_step = 0.2;
+    pen.within = 1;
+    for (int i = 0; i < INPUT; i++)
+        input[i] = (ebpo_paint_input){ { 1 + 0.15 * i, 4, i == 20 || i == 27 ? 3 : 0.5 },
+                                       i % 13 / 12.,
+                                       5. * i };
+    for (int most = 1; most <= 5; most++) {
+        model_must(ebpo_paint_draw(o.paint, o.context, input, INPUT, &pen, &all, &error), "drawing",
+                   &error);
+        model_must(ebpo_paint_drawing_new(o.paint, o.context, &pen, &drawing, &error), "beginning",
+                   &error);
+        for (int i = 0, count; i < INPUT; i += count) {
+            count = i + most < INPUT ? most : INPUT - i;
+            model_must(ebpo_paint_drawing_add(drawing, input + i, (uint64_t)count, &drawn, &error),
+                       "drawing in parts", &error);
+        }
+        ebpo_paint_drawing_free(drawing);
+        ck_assert(all.strokes > 2 && memcmp(&all, &drawn, sizeof all) == 0);
+        ck_assert(ebpo_paint_get_info(o.paint, &info) == EBPO_OK);
+        ck_assert(info.stroke_count == 2 * all.strokes && info.point_count == 2 * all.points);
+        for (uint64_t i = 0; i < all.strokes; i++) {
+            ck_assert(ebpo_paint_get_stroke(o.paint, i, &s) == EBPO_OK);
+            ck_assert(ebpo_paint_get_stroke(o.paint, i + all.strokes, &t) == EBPO_OK);
+            ck_assert(s.point_count == t.point_count);
+            ck_assert(memcmp(s.points, t.points, s.point_count * sizeof *s.points) == 0);
+        }
+        while (info.stroke_count > 0)
+            model_must(ebpo_paint_remove_stroke(o.paint, --info.stroke_count, &error), "removing",
+                       &error);
+    }
+    close_model(&o);
+}
+END_TEST
+
+START_TEST(test_paint_rising_pressure_widens_a_spot)
+{
+    opened o = open_model(ebpo_test_sheet(8, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_input input[INPUT];
+    ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
+    ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
+    pen.radius = 0.1;
+    pen.size_least = 0.25;
+    for (int i = 0; i < INPUT; i++) /* the pressure rises to 1 and falls */
+        input[i] = (ebpo_paint_input){ { 1, 1, 1 }, i <= 20 ? 0.05 * i : 2 - 0.05 * i, 5. * i };
+    model_must(ebpo_paint_draw(o.paint, o.context, input + 1, INPUT - 1, &pen, NULL, &error),
+               "drawing", &error);
+    ck_assert(ebpo_paint_get_stroke(o.paint, 0, &s) == EBPO_OK && s.point_count == 1);
+    pen.pressure_step = 0.25;
+    model_must(ebpo_paint_draw(o.paint, o.context, input + 1, INPUT - 1, &pen, NULL, &error),
+               "drawing", &error);
+    ck_assert(ebpo_paint_get_stroke(o.paint, 1, &s) == EBPO_OK && s.point_count == 4);
+    for (uint64_t i = 1; i < s.point_count; i++)
+        ck_assert(s.points[i].pressure >= s.points[i - 1].pressure + 16383 &&
+                  s.points[i].size > s.points[i - 1].size);
+    pen.pressure_step = 2;
+    ck_assert(ebpo_paint_draw(o.paint, o.context, input, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    close_model(&o);
+}
+END_TEST
+
+/* A failed call adds nothing, and the drawing can be continued. */
+START_TEST(test_paint_drawing_continues_after_failure)
+{
+    opened o = open_model(ebpo_test_sheet(8, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    const ebpo_paint_input near = { { 1, 1, 1 }, 1, 0 },
+                           far[2] = { { { 2, 1, 1 }, 1, 0 }, { { 1e9, 1, 1 }, 1, 0 } };
+    ebpo_paint_drawing *drawing = NULL;
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
+    ck_assert(ebpo_paint_drawing_new(o.paint, o.context, &pen, &drawing, NULL) == EBPO_E_ARGUMENT &&
+              !drawing);
+    pen.radius = 0.1;
+    model_must(ebpo_paint_drawing_new(o.paint, o.context, &pen, &drawing, &error), "beginning",
+               &error);
+    ck_assert(ebpo_paint_drawing_add(drawing, &near, 0, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_drawing_add(drawing, &near, 1, NULL, NULL) == EBPO_OK);
+    ck_assert(ebpo_paint_drawing_add(drawing, far, 2, NULL, NULL) == EBPO_E_LIMIT);
+    ck_assert(ebpo_paint_get_info(o.paint, &info) == EBPO_OK);
+    ck_assert(info.stroke_count == 1 && info.point_count == 1);
+    ck_assert(ebpo_paint_drawing_add(drawing, &near, 1, NULL, NULL) == EBPO_OK);
+    ebpo_paint_drawing_free(drawing);
+    ck_assert(ebpo_paint_get_info(o.paint, &info) == EBPO_OK);
+    ck_assert(info.stroke_count == 2 && info.point_count == 2);
+    close_model(&o);
+}
+END_TEST
+
 START_TEST(test_paint_invalid_pen_adds_nothing)
 {
     opened o = open_model(ebpo_test_sheet(8, 2), -1);
@@ -709,6 +840,7 @@ TEST_SUITE(paint)
     tcase_add_test(c, test_paint_second_save_is_refused);
     tcase_add_test(c, test_paint_keeps_file_modified_in_place);
     tcase_add_test(c, test_paint_file_is_locked_for_changes);
+    tcase_add_test(c, test_paint_checkpoint_keeps_the_lock);
     tcase_add_test(c, test_new_paint_keeps_file_made_meanwhile);
     tcase_add_test(c, test_new_paint_writes_file_on_save);
     tcase_add_test(c, test_paint_points_are_checked_against_model);
@@ -721,6 +853,9 @@ TEST_SUITE(paint)
     tcase_add_test(c, test_paint_smallest_balls_terminate);
     tcase_add_test(c, test_paint_areas_follow_surface);
     tcase_add_test(c, test_paint_pressure_adds_points);
+    tcase_add_test(c, test_paint_drawing_in_parts_equals_one_call);
+    tcase_add_test(c, test_paint_rising_pressure_widens_a_spot);
+    tcase_add_test(c, test_paint_drawing_continues_after_failure);
     tcase_add_test(c, test_paint_invalid_pen_adds_nothing);
     tcase_add_test(c, test_paint_baked_colours_keep_type);
     suite_add_tcase(s, c);

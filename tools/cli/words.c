@@ -83,6 +83,16 @@ char *words_format(char *out, size_t capacity, int major, int minor)
     return out;
 }
 
+bool words_read_colour(const char *text, uint32_t *out)
+{
+    size_t length = strlen(text), digits = strspn(text, "0123456789abcdefABCDEF");
+    if (length != digits || (length != 6 && length != 8))
+        return false;
+    uint32_t value = (uint32_t)strtoul(text, NULL, 16);
+    *out = length == 8 ? value : value << 8 | 255;
+    return true;
+}
+
 char *words_colour(char out[8], uint32_t colour)
 {
     snprintf(out, 8, "#%02x%02x%02x", colour & 255, colour >> 8 & 255, colour >> 16 & 255);

@@ -26,6 +26,8 @@ char *words_parts(char *out, size_t capacity, uint32_t parts);
 char *words_format(char *out, size_t capacity, int major, int minor);
 /* Writes "#ff8000" for the colour red + 256 green + 65,536 blue. */
 char *words_colour(char out[8], uint32_t colour);
+/* Reads "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. Returns false for other text. */
+bool words_read_colour(const char *text, uint32_t *out);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);
@@ -54,6 +56,7 @@ bool words_read_levels(const char *text, word_levels *out);
     "a date as in ISO 8601 and in the calendar, such as 2026-11-26 or 2026-11-26T21:43:05Z"
 
 /* Expected forms, for texts that words_read_size and words_read_levels refuse. */
+#define WORDS_COLOUR_EXPECTED "RRGGBB or RRGGBBAA in hexadecimal"
 #define WORDS_SIZE_EXPECTED   "a size such as 512M, 0.5G or 1GiB"
 #define WORDS_LEVELS_EXPECTED "levels such as 3, 0-5, 3- or 0,2,4; the deepest possible is 20"
 bool words_end_with(const char *text, const char *end);

@@ -1,5 +1,6 @@
 // Modules that the page loads after the first picture: measuring, a section box, notes, the pen, sharing, shading, cube and scale.
 import { addCompass } from './compass.js';
+import { addLive } from './live.js';
 import { addMeasuring } from './measure.js';
 import { addNotes } from './notes.js';
 import { addPen } from './paint/pen.js';
@@ -25,6 +26,7 @@ export async function begin(page) {
   addSharing({ address: page.address, elementOf });
   addCompass(page);
   addHelp();
+  addLive(page, pen.live);
   state.more = true;
 }
 

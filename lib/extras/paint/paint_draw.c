@@ -32,17 +32,25 @@ typedef struct stroke_range {
     uint64_t first, count;
 } stroke_range;
 
-typedef struct drawing {
+typedef struct ebpo_paint_drawing {
+    ebpo_paint *paint;
     ebpo_context *context;
     ebpo_paint_pen pen;
     ebpo_reach_search reach;
+    /* Results of the current call. */
     ebpo_paint_point *point; /* [point_count] points of all new strokes */
     stroke_range *run;       /* [run_count] the new strokes */
     uint64_t point_count, point_capacity, run_count, run_capacity;
-    uint64_t random;    /* state of the pseudorandom numbers */
-    uint64_t space;     /* number of points that can be added to the paint */
-    bool pen_down;      /* the pen was painting at the previous step */
-    double stroke_time; /* time at which the current stroke began */
+    uint64_t space;        /* number of points that can be added to the paint */
+    bool continues;        /* the first run continues the stroke of the previous call */
+    uint64_t random;       /* state of the pseudorandom numbers */
+    bool begun;            /* `last` and `ahead` are set */
+    bool in_paint;         /* the stroke that is being drawn is the last stroke of the paint */
+    bool pen_down;         /* the pen was painting at the previous step */
+    double step_pressure;  /* pressure at the last step */
+    double stroke_time;    /* time at which the current stroke began */
+    ebpo_paint_input last; /* last position of the previous call */
+    double ahead;          /* distance along the path from `last` to the next step */
     ebpo_paint_drawn drawn;
 } drawing;
 
@@ -62,6 +70,8 @@ static const char *pen_wrong(const ebpo_paint_pen *pen)
         return "a pen's sizes must be 2^-15 to 1";
     if (pen->step != 0 && !is_in_range(pen->step, 1 / EBPO_PAINT_MAX, DBL_MAX))
         return "a pen's step must be 0, or at least 2^-200";
+    if (pen->pressure_step != 0 && !is_in_range(pen->pressure_step, 0x1p-15, 1))
+        return "a pen's step of the pressure must be 0, or 2^-15 to 1";
     return pen->within >= 0 ? NULL : "a pen's distance from the surface must be at least 0";
 }
 
@@ -75,14 +85,17 @@ static const char *input_wrong(const ebpo_paint_input *h)
     return is_in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time must be 0 to 2^32 - 1";
 }
 
-static ebpo_status check_input(const drawing *d, const ebpo_paint *p, const ebpo_paint_input *input,
-                               uint64_t count, ebpo_error *error)
+static ebpo_status check_input(const ebpo_paint_input *input, uint64_t count, ebpo_error *error)
 {
-    const char *wrong = pen_wrong(&d->pen);
-    if (count == 0)
-        wrong = "a stroke needs at least one position of the pen";
+    const char *wrong = count ? NULL : "a stroke needs at least one position of the pen";
     for (uint64_t i = 0; i < count && !wrong; i++)
         wrong = input_wrong(&input[i]);
+    return wrong ? ebpo_fail(error, EBPO_E_ARGUMENT, "%s", wrong) : EBPO_OK;
+}
+
+static ebpo_status check_pen(const drawing *d, ebpo_error *error)
+{
+    const char *wrong = pen_wrong(&d->pen);
     ebpo_stroke_data stroke = { .radius = d->pen.radius,
                                 .time = d->pen.time,
                                 .layer =
@@ -92,7 +105,7 @@ static ebpo_status check_input(const drawing *d, const ebpo_paint *p, const ebpo
     for (int i = 0; i < 4; i++)
         stroke.rgba[i] = (uint8_t)(d->pen.colour >> (24 - 8 * i));
     if (!wrong)
-        wrong = ebpo_paint_stroke_wrong(&stroke, p->layer_count);
+        wrong = ebpo_paint_stroke_wrong(&stroke, d->paint->layer_count);
     return wrong ? ebpo_fail(error, EBPO_E_ARGUMENT, "%s", wrong) : EBPO_OK;
 }
 
@@ -273,6 +286,7 @@ static ebpo_status make_step(drawing *d, const ebpo_paint_input *input, ebpo_err
 {
     ebpo_distance_result at = { .face = EBPO_NO_FACE };
     ebpo_status status = EBPO_OK;
+    d->step_pressure = input->pressure;
     if (input->pressure > 0)
         status = find_nearest(d->context, input->place, d->pen.within, &at, error);
     if (status != EBPO_OK)
@@ -317,11 +331,17 @@ static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *
 static ebpo_status follow_path(drawing *d, const ebpo_paint_input *input, uint64_t count,
                                ebpo_error *error)
 {
-    double step = d->pen.step != 0 ? d->pen.step : fmax(d->pen.radius, d->pen.spread) / 2,
-           ahead = step; /* distance from the current position to the next step */
-    ebpo_status status = make_step(d, &input[0], error);
-    for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
-        double length = length_between(&input[i - 1], &input[i]), at = ahead;
+    double step = d->pen.step != 0 ? d->pen.step : fmax(d->pen.radius, d->pen.spread) / 2;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        const ebpo_paint_input *from = i ? &input[i - 1] : &d->last;
+        if (!d->begun) {
+            status = make_step(d, &input[i], error);
+            d->ahead = step;
+            d->begun = true;
+            continue;
+        }
+        double length = length_between(from, &input[i]), at = d->ahead;
         if (i % 64 == 1 && !ebpo_progress_step(&d->pen.progress, "drawing", i, count, error))
             return EBPO_E_CANCELLED;
         if (!(length / step <= EBPO_PAINT_POINTS))
@@ -331,68 +351,156 @@ static ebpo_status follow_path(drawing *d, const ebpo_paint_input *input, uint64
                 EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_input pen;
-            interpolate_input(&input[i - 1], &input[i], at / length, &pen);
+            interpolate_input(from, &input[i], at / length, &pen);
             pen.time = fmax(pen.time, d->stroke_time);
             status = make_step(d, &pen, error);
-            at = ahead + (double)k * step;
+            at = d->ahead + (double)k * step;
         }
-        ahead = at - length;
+        d->ahead = at - length;
+        if (status == EBPO_OK && d->pen.pressure_step > 0 &&
+            input[i].pressure >= d->step_pressure + d->pen.pressure_step)
+            status = make_step(d, &input[i], error);
+    }
+    d->last = input[count - 1];
+    return status;
+}
+
+/* Adds the points of a run to the last stroke of the paint. */
+static ebpo_status extend_stroke(drawing *d, const stroke_range *run, ebpo_error *error)
+{
+    ebpo_paint *p = d->paint;
+    if (!ebpo_grow(&p->point, &p->point_capacity, p->point_count + run->count, sizeof *p->point))
+        return ebpo_fail_memory(error, run->count * sizeof *p->point);
+    if (run->count)
+        memcpy(p->point + p->point_count, d->point + run->first, run->count * sizeof *p->point);
+    p->stroke[p->stroke_count - 1].count += (uint32_t)run->count;
+    p->point_count += run->count;
+    return EBPO_OK;
+}
+
+static ebpo_status add_stroke(drawing *d, const stroke_range *run, ebpo_error *error)
+{
+    ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
+    s.layer = d->pen.layer;
+    s.kind = d->pen.kind;
+    s.colour = d->pen.colour;
+    s.radius = d->pen.radius;
+    s.time = d->pen.time;
+    s.points = d->point + run->first;
+    s.point_count = run->count;
+    return ebpo_paint_add_stroke(d->paint, &s, error);
+}
+
+/* Adds the points of all runs to the paint. After a failure, removes those that were added. */
+static ebpo_status keep_strokes(drawing *d, ebpo_error *error)
+{
+    ebpo_paint *p = d->paint;
+    uint64_t strokes = p->stroke_count, points = p->point_count;
+    bool extends = d->continues && d->in_paint;
+    uint32_t extended = extends ? p->stroke[strokes - 1].count : 0;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < d->run_count && status == EBPO_OK; i++) {
+        const stroke_range *run = &d->run[i];
+        if (i > 0 || !d->continues)
+            d->in_paint = false;
+        if (d->in_paint)
+            status = extend_stroke(d, run, error);
+        else if (run->count)
+            status = add_stroke(d, run, error);
+        d->in_paint = d->in_paint || run->count > 0;
+    }
+    if (status == EBPO_OK) {
+        d->drawn.strokes += p->stroke_count - strokes;
+        d->drawn.points += d->point_count;
+        return EBPO_OK;
+    }
+    p->stroke_count = strokes;
+    p->point_count = points;
+    if (extends)
+        p->stroke[strokes - 1].count = extended;
+    return status;
+}
+
+/* Draws the path of `input`, which begins at the end of the previous call's path. */
+static ebpo_status draw_path(drawing *d, const ebpo_paint_input *input, uint64_t count,
+                             ebpo_error *error)
+{
+    d->space = EBPO_PAINT_POINTS - d->paint->point_count;
+    d->point_count = d->run_count = 0;
+    d->continues = d->pen_down;
+    if (d->continues) {
+        if (!ebpo_grow(&d->run, &d->run_capacity, 1, sizeof *d->run))
+            return ebpo_fail_memory(error, sizeof *d->run);
+        d->run[d->run_count++] = (stroke_range){ 0, 0 };
+    }
+    ebpo_status status = follow_path(d, input, count, error);
+    return status == EBPO_OK ? keep_strokes(d, error) : status;
+}
+
+ebpo_status ebpo_paint_drawing_new(ebpo_paint *p, ebpo_context *context, const ebpo_paint_pen *pen,
+                                   ebpo_paint_drawing **out, ebpo_error *error)
+{
+    *out = NULL;
+    drawing *d = ebpo_alloc_zero(1, sizeof *d);
+    if (!d)
+        return ebpo_fail_memory(error, sizeof *d);
+    d->paint = p;
+    d->context = context;
+    d->pen = (ebpo_paint_pen)EBPO_PAINT_PEN_INIT;
+    d->drawn.struct_size = sizeof d->drawn;
+    ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &d->pen, pen, error);
+    if (status == EBPO_OK)
+        status = check_pen(d, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_context(p, context, error);
+    if (status != EBPO_OK) {
+        free(d);
+        return status;
+    }
+    d->random = d->pen.seed;
+    ebpo_reach_begin(&d->reach, context);
+    *out = d;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_paint_drawing_add(ebpo_paint_drawing *d, const ebpo_paint_input *input,
+                                   uint64_t count, ebpo_paint_drawn *drawn, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    const ebpo_paint_drawn before = d->drawn;
+    ebpo_status status = drawn ? EBPO_CHECK_SIZED(ebpo_paint_drawn, drawn, error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = check_input(input, count, error);
+    if (status != EBPO_OK)
+        return status;
+    status = draw_path(d, input, count, error);
+    if (status == EBPO_OK && drawn)
+        EBPO_GIVE(ebpo_paint_drawn, drawn, &d->drawn);
+    if (status != EBPO_OK) {
+        d->begun = d->pen_down = d->in_paint = false;
+        d->drawn = before;
     }
     return status;
 }
 
-/* Adds all strokes to the paint. After a failure, removes the strokes that this call has added. */
-static ebpo_status keep_strokes(drawing *d, ebpo_paint *p, ebpo_error *error)
+void ebpo_paint_drawing_free(ebpo_paint_drawing *d)
 {
-    uint64_t before = p->stroke_count;
-    ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < d->run_count && status == EBPO_OK; i++) {
-        ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
-        s.layer = d->pen.layer;
-        s.kind = d->pen.kind;
-        s.colour = d->pen.colour;
-        s.radius = d->pen.radius;
-        s.time = d->pen.time;
-        s.points = d->point + d->run[i].first;
-        s.point_count = d->run[i].count;
-        if (s.point_count)
-            status = ebpo_paint_add_stroke(p, &s, error);
-    }
-    d->drawn.strokes = p->stroke_count - before;
-    d->drawn.points = d->point_count;
-    while (status != EBPO_OK && p->stroke_count > before) {
-        p->stroke_count--;
-        p->point_count -= p->stroke[p->stroke_count].count;
-    }
-    return status;
+    if (!d)
+        return;
+    ebpo_reach_end(&d->reach);
+    free(d->point);
+    free(d->run);
+    free(d);
 }
 
 ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_paint_input *input,
                             uint64_t count, const ebpo_paint_pen *pen, ebpo_paint_drawn *drawn,
                             ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
-    drawing d = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
-    d.drawn.struct_size = sizeof d.drawn;
-    ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &d.pen, pen, error);
-    if (status == EBPO_OK && drawn)
-        status = EBPO_CHECK_SIZED(ebpo_paint_drawn, drawn, error);
+    ebpo_paint_drawing *d = NULL;
+    ebpo_status status = ebpo_paint_drawing_new(p, context, pen, &d, error);
     if (status == EBPO_OK)
-        status = check_input(&d, p, input, count, error);
-    if (status == EBPO_OK)
-        status = ebpo_paint_check_context(p, context, error);
-    if (status != EBPO_OK)
-        return status;
-    d.random = d.pen.seed;
-    d.space = EBPO_PAINT_POINTS - p->point_count;
-    ebpo_reach_begin(&d.reach, context);
-    status = follow_path(&d, input, count, error);
-    if (status == EBPO_OK)
-        status = keep_strokes(&d, p, error);
-    if (status == EBPO_OK && drawn)
-        EBPO_GIVE(ebpo_paint_drawn, drawn, &d.drawn);
-    ebpo_reach_end(&d.reach);
-    free(d.point);
-    free(d.run);
+        status = ebpo_paint_drawing_add(d, input, count, drawn, error);
+    ebpo_paint_drawing_free(d);
     return status;
 }

@@ -181,7 +181,9 @@ static void remember_version(ebpo_paint_file *f, char *path, int fd)
     f->version = ebpo_file_version_of(fd);
 }
 
-static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error *error)
+/* Saves the paint. keeps_lock: the lock of the paint's file is kept. */
+static ebpo_status save_locked(const ebpo_paint *p, const char *path, bool keeps_lock,
+                               ebpo_error *error)
 {
     enum { LINKS = 4 };
     ebpo_paint_file *f = p->file;
@@ -211,7 +213,8 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
-    if (to_own_file) /* released after a failure, too: other programs may then change the file */
+    /* released after a failure, too: other programs may then change the file */
+    if (to_own_file && !keeps_lock)
         ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
         remember_version(f, target, fd);
@@ -226,7 +229,23 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error
 ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     pthread_mutex_lock(&p->file->mutex);
-    ebpo_status status = save_locked(p, path, error);
+    ebpo_status status = save_locked(p, path, false, error);
     pthread_mutex_unlock(&p->file->mutex);
+    return status;
+}
+
+ebpo_status ebpo_paint_checkpoint(const ebpo_paint *p, ebpo_error *error)
+{
+    ebpo_status status;
+    pthread_mutex_lock(&p->file->mutex);
+    char *path = p->file->path ? strdup(p->file->path) : NULL;
+    if (path)
+        status = save_locked(p, path, true, error);
+    else
+        status = p->file->path ? ebpo_fail_memory(error, strlen(p->file->path))
+                               : ebpo_fail(error, EBPO_E_ARGUMENT,
+                                           "the paint has no file yet; save it to a path first");
+    pthread_mutex_unlock(&p->file->mutex);
+    free(path);
     return status;
 }

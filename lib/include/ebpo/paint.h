@@ -2,13 +2,15 @@
  * Adds colours (paint) and notes to a model, in a separate file.
  *
  *   Files      ebpo_paint_new, ebpo_paint_open, ebpo_paint_open_memory, ebpo_paint_open_to_change,
- *              ebpo_paint_save, ebpo_paint_free; ebpo_paint_get_info, ebpo_paint_check_model,
- *              ebpo_paint_check_points
+ *              ebpo_paint_save, ebpo_paint_checkpoint, ebpo_paint_free; ebpo_paint_get_info,
+ *              ebpo_paint_check_model, ebpo_paint_check_points
  *   Layers     ebpo_paint_get_layer, ebpo_paint_add_layer, ebpo_paint_set_layer,
  *              ebpo_paint_remove_layer
  *   Notes      ebpo_paint_get_note, ebpo_paint_add_note, ebpo_paint_remove_note
  *   Strokes    ebpo_paint_get_stroke, ebpo_paint_add_stroke, ebpo_paint_remove_stroke
  *   A pen      ebpo_paint_draw (makes strokes from device positions), ebpo_paint_locate
+ *   Live pens  ebpo_paint_drawing_new, ebpo_paint_drawing_add, ebpo_paint_drawing_free: strokes
+ *              while the positions arrive
  *   Results    ebpo_paint_cover, ebpo_paint_bake, ebpo_paint_colour_mesh, ebpo_paint_measure
  *
  *     ebpo_paint *paint = NULL;
@@ -141,6 +143,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_save(const ebpo_paint *paint, const char *path,
                                                    ebpo_error *error);
+
+/*
+ * Saves the paint to the file to which it belongs (see ebpo_paint_save), and keeps the lock of
+ * ebpo_paint_open_to_change, also after a failure. So a program can save often while it works, and
+ * no other program can change the file meanwhile.
+ *
+ * EBPO_E_ARGUMENT: the paint belongs to no file. Other errors are those of ebpo_paint_save.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_checkpoint(const ebpo_paint *paint,
+                                                         ebpo_error *error);
 
 /*
  * Frees a paint.
@@ -490,15 +504,19 @@ typedef struct ebpo_paint_pen {
     uint64_t time;
 
     ebpo_progress progress;
+
+    /*
+     * Above 0: the pen also paints at a position of the input if the pressure there is greater by
+     * at least this value, 2^-15 to 1, than where the pen painted last. So a pen that presses
+     * harder at one position paints a larger disc. 0: the pen paints only at each step.
+     */
+    double pressure_step;
 } ebpo_paint_pen;
 
 #define EBPO_PAINT_PEN_INIT                                                            \
     {                                                                                  \
         sizeof(ebpo_paint_pen), 0, EBPO_PAINT_PAINTS, 0xd62728ff, 0, 0, 1, 0, 1, 1, 0, \
-            __builtin_inf(), 1, 0,                                                     \
-        {                                                                              \
-            NULL, NULL                                                                 \
-        }                                                                              \
+            __builtin_inf(), 1, 0, { NULL, NULL }, 0                                   \
     }
 
 /* Statistics of ebpo_paint_draw. */
@@ -541,6 +559,49 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_conte
                                                    const ebpo_paint_input *input, uint64_t count,
                                                    const ebpo_paint_pen *pen,
                                                    ebpo_paint_drawn *drawn, ebpo_error *error);
+
+/* A pen whose positions arrive in several calls. */
+typedef struct ebpo_paint_drawing ebpo_paint_drawing;
+
+/*
+ * Begins to draw with a pen. Until the drawing is freed, only ebpo_paint_drawing_add may change the
+ * paint, and the paint and the context must exist.
+ *
+ * pen   is copied; its `progress` is called by ebpo_paint_drawing_add
+ *
+ * EBPO_E_ARGUMENT: a value is not valid, or the model does not match.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_drawing_new(ebpo_paint *paint, ebpo_context *context,
+                                                          const ebpo_paint_pen *pen,
+                                                          ebpo_paint_drawing **out,
+                                                          ebpo_error *error);
+
+/*
+ * Continues the path of the pen with more positions, and adds points to the last stroke, or new
+ * strokes. All calls together make the same strokes as one call of ebpo_paint_draw with all
+ * positions.
+ *
+ * input   [count] next positions of the device, at least 1
+ * drawn   receives statistics of all calls of this drawing; may be NULL
+ *
+ * On failure this call adds no points, and the next call begins a new stroke. Errors are those of
+ * ebpo_paint_draw.
+ *
+ * Threads: one at a time per paint and per context.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_drawing_add(ebpo_paint_drawing *drawing,
+                                                          const ebpo_paint_input *input,
+                                                          uint64_t count, ebpo_paint_drawn *drawn,
+                                                          ebpo_error *error);
+
+/*
+ * Ends the drawing. Its strokes stay in the paint.
+ *
+ * Threads: one at a time per drawing.
+ */
+EBPO_API void ebpo_paint_drawing_free(ebpo_paint_drawing *drawing);
 
 /*
  * Finds the point of the surface nearest to a position, for notes and for pens of the caller. The

@@ -2,275 +2,40 @@
  * times of the haptic steps. */
 #include <float.h>
 #include <math.h>
-#include <sched.h>
+#include <signal.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/resource.h>
-#include <time.h>
-
-#include <ebpo/map.h>
 
 #include "cli/command.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/haptic_device.h"
+#include "cli/commands/haptic_live.h"
+#include "cli/commands/haptic_paint.h"
+#include "cli/commands/haptic_play.h"
+#include "cli/commands/haptic_view.h"
 #include "cli/json.h"
 #include "cli/model_memory.h"
 #include "cli/numbers.h"
 #include "cli/points.h"
 #include "cli/remote_args.h"
-#include "cli/tool_clock.h"
 #include "cli/words.h"
 
-/* --- haptic steps at a steady rate --- */
-
-/* Number of bins of the histogram of step times. Bin 0 counts times below 1 microsecond, bin n
- * times from 2^(n - 1) to 2^n microseconds; the last bin also counts all longer times. */
-enum { HAPTIC_BINS = 16 };
-
-typedef struct haptic_times {
-    uint64_t step_count; /* number of steps */
-    uint64_t late; /* number of steps that end more than a period (1 / rate) after the due time */
-    double p50, p99, p99_9, p99_99, max_time; /* seconds from the start to the end of a step */
-    double wake_p99_9, wake_max;              /* seconds from the due time of a step to its start */
-    double cpu_p99_9, cpu_max;    /* processor time from the start to the end of a step */
-    uint64_t over_ms;             /* steps that took more than a millisecond from start to end */
-    uint64_t bins[HAPTIC_BINS];   /* histogram of times from the start to the end of a step */
-    uint64_t page_faults;         /* page faults of the thread that plays the steps */
-    double width_mean, width_max; /* widths hi - lo of the bounds of a probe's distance */
-} haptic_times;
-
-/* Arguments of haptic_play_run. */
-typedef struct haptic_play {
-    double rate;                 /* steps per second */
-    double seconds;              /* duration; used if the device's step_count is 0 */
-    ebpo_haptic *haptic;         /* NULL: steps do nothing */
-    const haptic_device *device; /* source of positions */
-    ebpo_haptic_kind kind;
-    double range;        /* for probes: the distance that has the last colour of the scale */
-    haptic_pose *record; /* [maximum number of steps] receives the positions; or NULL */
-} haptic_play;
-
-/* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
- * that says what the system granted. Threads created afterwards inherit the scheduling. */
-static const char *request_real_time(void)
-{
-    bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-#ifdef EBPO_HAVE_SCHED_SETSCHEDULER
-    struct sched_param parameters = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
-    /* a loading thread that exists already is not affected */
-    bool is_real_time = sched_setscheduler(0, SCHED_FIFO, &parameters) == 0;
-#else
-    bool is_real_time = false;
-#endif
-    return is_real_time ? locked ? "SCHED_FIFO, memory locked" : "SCHED_FIFO, memory not locked"
-           : locked     ? "as other threads, memory locked"
-                        : "as other threads, memory not locked";
-}
-
-/* Returns to normal scheduling. */
-static void end_real_time(void)
-{
-#ifdef EBPO_HAVE_SCHED_SETSCHEDULER
-    (void)sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){ 0 });
-#endif
-    (void)munlockall();
-}
-
-static int compare_times(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-/* Returns the quantile `part` (0 .. 1) of ascending times. */
-static double time_quantile(const float *sorted, uint64_t count, double part)
-{
-    uint64_t rank = (uint64_t)ceil(part * (double)count);
-    return sorted[rank > 0 ? rank - 1 : 0];
-}
-
-static void sort_times(float *times, uint64_t count)
-{
-    qsort(times, count, sizeof *times, compare_times);
-}
-
-/* Times of each step, in seconds, as in haptic_times. */
-typedef struct step_times {
-    float *duration; /* times from the start to the end of each step */
-    float *wake;     /* times from the due time to the start of each step */
-    float *cpu;      /* processor times from the start to the end of each step */
-} step_times;
-
-/* Sets the histogram and the quantiles; sorts the times of `s`. */
-static void compute_times(const step_times *s, uint64_t count, haptic_times *out)
-{
-    for (uint64_t i = 0; i < count; i++) {
-        int bin = s->duration[i] < 1e-6F ? 0 : 1 + (int)log2(1e6 * (double)s->duration[i]);
-        out->bins[bin < HAPTIC_BINS ? bin : HAPTIC_BINS - 1]++;
-        out->over_ms += s->duration[i] > 1e-3F;
-    }
-    sort_times(s->duration, count);
-    sort_times(s->wake, count);
-    sort_times(s->cpu, count);
-    out->p50 = time_quantile(s->duration, count, 0.5);
-    out->p99 = time_quantile(s->duration, count, 0.99);
-    out->p99_9 = time_quantile(s->duration, count, 0.999);
-    out->p99_99 = time_quantile(s->duration, count, 0.9999);
-    out->max_time = s->duration[count - 1];
-    out->wake_p99_9 = time_quantile(s->wake, count, 0.999);
-    out->wake_max = s->wake[count - 1];
-    out->cpu_p99_9 = time_quantile(s->cpu, count, 0.999);
-    out->cpu_max = s->cpu[count - 1];
-}
-
-/* Returns the number of page faults of this thread so far; 0: not known. */
-static uint64_t page_faults(void)
-{
-    struct rusage r;
-#ifdef EBPO_HAVE_RUSAGE_THREAD
-    bool known = getrusage(RUSAGE_THREAD, &r) == 0;
-#else
-    bool known = getrusage(RUSAGE_SELF, &r) == 0;
-#endif
-    return known ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
-}
-
-/* Returns the processor time of this thread in nanoseconds. */
-static uint64_t thread_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
-}
-
-static void step_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
-{
-    ebpo_haptic_ball_result r;
-    ebpo_haptic_step_ball(haptic, pose->position, &r);
-    memcpy(a->proxy.position, r.proxy, sizeof r.proxy);
-    memcpy(a->proxy.rotation, pose->rotation, sizeof pose->rotation);
-    memcpy(a->force, r.force, sizeof r.force);
-    memcpy(a->normal, r.normal, sizeof r.normal);
-    a->depth = r.depth;
-    a->face = r.face;
-    a->flags = r.flags;
-}
-
-static void step_tool(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
-{
-    ebpo_haptic_tool_result r;
-    ebpo_haptic_step_tool(haptic, pose->position, pose->rotation, &r);
-    memcpy(a->proxy.position, r.proxy, sizeof r.proxy);
-    memcpy(a->proxy.rotation, r.turn, sizeof r.turn);
-    memcpy(a->force, r.force, sizeof r.force);
-    memcpy(a->torque, r.torque, sizeof r.torque);
-    memcpy(a->normal, r.normal, sizeof r.normal);
-    a->depth = r.depth;
-    a->face = r.face;
-    a->flags = r.flags;
-}
-
-static void step_probe(const haptic_play *p, const haptic_pose *pose, haptic_result *a)
-{
-    ebpo_haptic_probe_result r;
-    ebpo_haptic_step_probe(p->haptic, pose->position, &r);
-    a->proxy = *pose;
-    memcpy(a->normal, r.normal, sizeof r.normal);
-    a->depth = r.distance;
-    a->lo = r.lo;
-    a->hi = r.hi;
-    a->face = r.face;
-    a->flags = r.flags;
-    a->where = (uint8_t)r.where;
-    ebpo_map_colour(EBPO_MAP_THESIS, r.distance, p->range, a->rgb);
-}
-
-/* Plays step i. Returns false if the device has ended. */
-static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
-{
-    haptic_result result = { .depth = 0 };
-    haptic_pose pose;
-    if (!p->haptic)
-        return true;
-    if (!p->device->read(p->device->self, i, &pose))
-        return false;
-    if (p->record)
-        p->record[i] = pose;
-    switch (p->kind) {
-    case EBPO_HAPTIC_BALL: step_ball(p->haptic, &pose, &result); break;
-    case EBPO_HAPTIC_PROBE: step_probe(p, &pose, &result); break;
-    case EBPO_HAPTIC_TOOL: step_tool(p->haptic, &pose, &result); break;
-    }
-    p->device->write(p->device->self, &result);
-    out->width_mean += result.hi - result.lo; /* a sum until haptic_play_run divides it */
-    out->width_max = fmax(out->width_max, result.hi - result.lo);
-    return true;
-}
-
-/* Plays up to `count` steps. A late step is not omitted, and the due times of later steps do not
- * change. Returns the number of played steps, which is less than `count` if the device ends. */
-static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times *s,
-                         haptic_times *out)
-{
-    const double period = 1e9 / p->rate;
-    uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults_before = page_faults(), i = 0;
-    for (; i < count; i++) {
-        uint64_t due = begin + (uint64_t)((double)i * period);
-        tool_wait_until(due);
-        uint64_t cpu_begin = thread_clock(), begin_time = tool_clock();
-        if (!play_step(p, i, out))
-            break;
-        uint64_t end_time = tool_clock();
-        s->cpu[i] = 1e-9F * (float)(thread_clock() - cpu_begin);
-        s->duration[i] = 1e-9F * (float)(end_time - begin_time);
-        s->wake[i] = 1e-9F * (float)(begin_time - due);
-        out->late += (double)(end_time - due) > period;
-    }
-    out->page_faults = page_faults() - faults_before;
-    return i;
-}
-
-/* Returns the maximum number of steps. */
-static uint64_t haptic_play_steps(const haptic_play *p)
-{
-    uint64_t count = p->haptic ? p->device->step_count(p->device->self) : 0;
-    return count ? count : (uint64_t)ceil(p->rate * p->seconds);
-}
-
-/* Plays all steps, and sets *out to the times of the steps. Returns false if there is not enough
- * memory. */
-static bool haptic_play_run(const haptic_play *p, haptic_times *out)
-{
-    uint64_t count = haptic_play_steps(p);
-    float *all = malloc(3 * count * sizeof *all);
-    *out = (haptic_times){ .step_count = 0 };
-    if (!all)
-        return false;
-    memset(all, 0, 3 * count * sizeof *all); /* now, so that later writes cause no page faults */
-    const step_times s = { all, all + count, all + 2 * count };
-    out->step_count = play_all(p, count, &s, out);
-    out->width_mean /= fmax(1, (double)out->step_count);
-    if (out->step_count > 0)
-        compute_times(&s, out->step_count, out);
-    free(all);
-    return true;
-}
-
-/* --- the command --- */
-
 typedef struct values {
-    /* texts of the options; NULL: not given */
-    const char *path, *device, *record, *tool, *memory;
-    double rate, seconds, radius, friction, stiffness, damping, skin, search_radius;
-    int64_t faces;
-    bool probe, json;
+    /* as text; NULL: not given */
+    const char *path, *device, *record, *tool, *memory, *paint, *colour, *viewer;
+    double rate, seconds, radius, friction, stiffness, damping, skin, search_radius, pen_radius,
+        full_force, thin, spread;
+    int64_t faces, density, layer, port;
+    bool probe, json, erase, view;
     remote_values remote;
 } values;
 
 #include "cli/options/haptic.inc"
+
+/* Returns true if the page of the viewer is the device. */
+static bool is_page(const char *device) { return device && strcmp(device, "viewer") == 0; }
 
 typedef struct job {
     const values *v;
@@ -283,12 +48,17 @@ typedef struct job {
     ebpo_haptic_kind kind;
     haptic_device device;
     haptic_pose *record;    /* for --record; NULL: not requested */
-    const char *scheduling; /* text of request_real_time */
+    const char *scheduling; /* text of haptic_request_real_time */
     haptic_times empty;     /* times of steps that do nothing */
     haptic_times times;
     ebpo_haptic_stats stats;
     ebpo_error stopped; /* status EBPO_OK, or the error that ended loading */
     ebpo_model_stats memory;
+    haptic_view *view;   /* NULL: not requested */
+    haptic_paint *paint; /* NULL: not requested */
+    haptic_painted painted;
+    ebpo_error paint_error; /* status EBPO_OK, or why paint is missing in the file */
+    uint64_t lost;          /* steps that were not painted, because painting was too slow */
 } job;
 
 /* --- output --- */
@@ -340,6 +110,12 @@ static void print_report(const job *j)
         printf("  loading failed: in %llu steps\n", (unsigned long long)s->stopped);
     printf("  model: %llu bytes at most, %llu subtrees loaded\n",
            (unsigned long long)j->memory.memory_peak, (unsigned long long)j->memory.loads);
+    if (j->v->paint)
+        printf("  painted %llu strokes, %llu points; lost steps %llu; saved %llu times, failed "
+               "%llu; longest %.3f s\n",
+               (unsigned long long)j->painted.strokes, (unsigned long long)j->painted.points,
+               (unsigned long long)j->lost, (unsigned long long)j->painted.saves,
+               (unsigned long long)j->painted.failed_saves, j->painted.save_seconds_max);
     print_bins(&j->times);
 }
 
@@ -363,6 +139,21 @@ static void json_times(json *out, const char *key, const haptic_times *t)
     for (int i = 0; i < HAPTIC_BINS; i++)
         json_uint(out, NULL, t->bins[i]);
     json_end(out);
+    json_end(out);
+}
+
+static void json_painted(json *out, const job *j)
+{
+    json_object(out, "paint");
+    json_text(out, "file", j->v->paint);
+    json_uint(out, "strokes", j->painted.strokes);
+    json_uint(out, "points", j->painted.points);
+    json_uint(out, "lost_steps", j->lost);
+    json_uint(out, "saves", j->painted.saves);
+    json_uint(out, "failed_saves", j->painted.failed_saves);
+    json_real(out, "save_seconds_max", j->painted.save_seconds_max);
+    if (j->paint_error.status != EBPO_OK)
+        json_text(out, "failure", j->paint_error.message);
     json_end(out);
 }
 
@@ -396,6 +187,8 @@ static void json_report(const job *j)
     json_uint(&out, "model_bytes_max", j->memory.memory_peak);
     json_uint(&out, "subtrees_loaded", j->memory.loads);
     json_uint(&out, "stopped", s->stopped);
+    if (j->v->paint)
+        json_painted(&out, j);
     if (j->stopped.status != EBPO_OK)
         json_text(&out, "failure", j->stopped.message);
     json_finish(&out);
@@ -515,36 +308,145 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
     return EBPO_E_MEMORY;
 }
 
-/* Plays steps that do nothing, to measure the delays that the machine itself causes. Takes a tenth
- * of the time of the actual steps. Call before the device starts. */
+/* Plays steps that do nothing for a tenth of the time, with a viewer at most for a second, to
+ * measure the delays that the machine itself causes. Call before the device starts. */
 static ebpo_status play_empty(job *j, ebpo_error *error)
 {
     const values *v = j->v;
     uint64_t step_count = v->path ? j->device.step_count(j->device.self) : 0;
-    const haptic_play empty = { .rate = v->rate,
-                                .seconds = step_count ? (double)step_count / v->rate / 10
-                                                      : v->seconds / 10 };
-    request_real_time();
+    double seconds = (step_count ? (double)step_count / v->rate : v->seconds) / 10;
+    const haptic_play empty = { .rate = v->rate, .seconds = v->view ? fmin(seconds, 1) : seconds };
+    haptic_request_real_time();
     bool played = haptic_play_run(&empty, &j->empty);
-    end_real_time(); /* so that the loading thread, which is created next, has normal scheduling */
+    haptic_end_real_time(); /* so that the loading thread, which is created next, has normal
+                               scheduling */
+    return played ? EBPO_OK : no_memory(error, "the times of steps");
+}
+
+/* Returns the force of full pressure; without paint, that of 1 % of the model's diagonal. */
+static double full_force(const job *j)
+{
+    const values *v = j->v;
+    double depth = v->pen_radius > 0 ? v->pen_radius : v->radius;
+    if (depth == 0)
+        depth = 0.01 * model_diagonal(ebpo_file_info(j->file));
+    return v->full_force > 0 ? v->full_force : v->stiffness * depth;
+}
+
+/* Opens the paint file. */
+static ebpo_status open_paint(job *j, ebpo_error *error)
+{
+    const values *v = j->v;
+    haptic_pen pen = { .path = v->paint, .pen = EBPO_PAINT_PEN_INIT };
+    if (!v->paint)
+        return EBPO_OK;
+    pen.pen.radius = v->pen_radius > 0 ? v->pen_radius : v->radius;
+    pen.pen.kind = v->erase ? EBPO_PAINT_ERASES : EBPO_PAINT_PAINTS;
+    pen.pen.spread = v->spread;
+    pen.pen.density = (uint32_t)v->density;
+    pen.pen.size_least = v->thin;
+    pen.pen.layer = (uint64_t)v->layer;
+    pen.default_layer = v->layer < 0;
+    pen.default_colour = !v->colour;
+    if (v->colour)
+        (void)words_read_colour(v->colour, &pen.pen.colour); /* already checked */
+    pen.dated = v->device != NULL;
+    pen.stiffness = v->stiffness;
+    pen.full_force = full_force(j);
+    return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
+}
+
+static void stop_loop(int number)
+{
+    (void)number;
+    haptic_play_stopped = 1;
+}
+
+/* The first SIGINT, SIGTERM or SIGHUP ends the loop, so that the paint is saved; a second one ends
+ * the process. */
+static void end_on_signals(void)
+{
+    static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action = { .sa_handler = stop_loop }, before;
+        action.sa_flags = (int)SA_RESETHAND;
+        if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            sigaction(numbers[i], &action, NULL);
+    }
+}
+
+/* Starts the viewer. Returns false after an error, which was reported. */
+static bool open_view(job *j)
+{
+    const values *v = j->v;
+    const haptic_view_options view = { .model = j->name,
+                                       .viewer = v->viewer,
+                                       .port = v->port,
+                                       .max_expansion = v->remote.max_expansion,
+                                       .paint = j->paint,
+                                       .radius = v->radius,
+                                       .full_depth =
+                                           v->stiffness > 0 ? full_force(j) / v->stiffness : 0,
+                                       .is_device = is_page(v->device),
+                                       .is_probe = v->probe };
+    if (!v->view)
+        return true;
+    j->view = haptic_view_begin(&view);
+    if (j->view && is_page(v->device))
+        haptic_view_open_device(&j->device, j->view);
+    return j->view != NULL;
+}
+
+/* A haptic_live_fn, whose `user` is a job. */
+static void take_steps(void *user, const haptic_sample *samples, uint64_t count)
+{
+    job *j = user;
+    if (j->paint)
+        haptic_paint_take(j->paint, samples, count);
+    if (j->view)
+        haptic_view_take(j->view, samples, count);
+}
+
+/* Plays the device, and meanwhile paints and shows. */
+static ebpo_status play_live(job *j, haptic_play *all, ebpo_error *error)
+{
+    if (j->paint || j->view) {
+        all->live = haptic_live_begin(take_steps, j);
+        if (!all->live)
+            return no_memory(error, "painting");
+        end_on_signals();
+    }
+    j->scheduling = haptic_request_real_time();
+    bool played = haptic_play_run(all, &j->times);
+    if (all->live)
+        haptic_end_real_time();
+    j->lost = haptic_live_end(all->live);
+    haptic_view_end(j->view);
+    j->view = NULL;
+    (void)haptic_paint_close(j->paint, &j->painted, &j->paint_error);
+    j->paint = NULL;
     return played ? EBPO_OK : no_memory(error, "the times of steps");
 }
 
 static ebpo_status play_device(job *j, ebpo_error *error)
 {
     const values *v = j->v;
-    haptic_play all = { v->rate,    v->seconds, j->haptic,
-                        &j->device, j->kind,    model_diagonal(ebpo_file_info(j->file)) / 20,
-                        NULL };
+    haptic_play all = { .rate = v->rate,
+                        .seconds = v->seconds,
+                        .haptic = j->haptic,
+                        .device = &j->device,
+                        .kind = j->kind,
+                        .range = model_diagonal(ebpo_file_info(j->file)) / 20,
+                        .points = j->points };
     if (v->record) {
         j->record = calloc(haptic_play_steps(&all), sizeof *j->record);
         if (!j->record)
             return no_memory(error, "the record");
         all.record = j->record;
     }
-    j->scheduling = request_real_time();
-    if (!haptic_play_run(&all, &j->times))
-        return no_memory(error, "the times of steps");
+    ebpo_status status = play_live(j, &all, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_haptic_get_stats(j->haptic, &j->stats);
     ebpo_model_get_stats(j->model, &j->memory);
     j->stopped.status = ebpo_haptic_check(j->haptic, &j->stopped);
@@ -580,6 +482,10 @@ static int run_job(job *j, uint64_t memory)
         status = open_model(j, memory, &error);
     if (status == EBPO_OK)
         status = play_empty(j, &error);
+    if (status == EBPO_OK)
+        status = open_paint(j, &error);
+    if (status == EBPO_OK && !open_view(j))
+        return EXIT_FAILED;
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
         return EXIT_FAILED;
     if (status == EBPO_OK)
@@ -594,11 +500,41 @@ static int run_job(job *j, uint64_t memory)
         json_report(j);
     else
         print_report(j);
-    return j->stopped.status == EBPO_OK ? EXIT_OK : command_failed("haptic", &j->stopped);
+    if (j->paint_error.status != EBPO_OK)
+        (void)command_failed("haptic", &j->paint_error);
+    if (j->stopped.status != EBPO_OK)
+        (void)command_failed("haptic", &j->stopped);
+    return j->stopped.status == EBPO_OK && j->paint_error.status == EBPO_OK ? EXIT_OK : EXIT_FAILED;
+}
+
+/* Checks the options of painting. Returns an exit code. */
+static int check_pen(const values *v)
+{
+    uint32_t colour;
+    bool pen = v->colour || v->erase || v->pen_radius > 0 || v->full_force > 0 || v->thin != 0.25 ||
+               v->spread > 0 || v->density != 1 || v->layer >= 0;
+    if (pen && !v->paint)
+        return command_usage("haptic", "--pen-radius, --colour and other options of a pen belong "
+                                       "to --paint");
+    if (v->paint && v->probe)
+        return command_usage("haptic", "--paint and --probe cannot be used together: a probe "
+                                       "touches nothing");
+    if (v->paint && v->pen_radius == 0 && v->radius == 0)
+        return command_usage("haptic", "--paint needs --pen-radius, or a ball with --radius");
+    if (v->paint && v->stiffness == 0)
+        return command_usage("haptic", "--paint needs a --stiffness above 0, because the force "
+                                       "is the pressure of the pen");
+    if (v->colour && !words_read_colour(v->colour, &colour))
+        return command_usage("haptic", "--colour '%s': expected " WORDS_COLOUR_EXPECTED, v->colour);
+    if (v->colour && v->erase)
+        return command_usage("haptic", "--erase and --colour cannot be used together");
+    return v->density != 1 && v->spread == 0
+               ? command_usage("haptic", "--density belongs to --spread")
+               : EXIT_OK;
 }
 
 /* Checks the values of the options, and sets *memory. Returns an exit code. */
-static int check_values(const values *v, uint64_t *memory)
+static int check_values(const values *v, const char *model, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
@@ -608,25 +544,35 @@ static int check_values(const values *v, uint64_t *memory)
     if (v->path && v->device)
         return command_usage("haptic", "--path and --device cannot be used together: both move the "
                                        "tool");
-    if (v->device && !haptic_udp_named(v->device))
-        return command_usage("haptic", "--device '%s': expected udp:PORT or udp:ADDRESS:PORT",
+    if (v->device && !is_page(v->device) && !haptic_udp_named(v->device))
+        return command_usage("haptic",
+                             "--device '%s': expected udp:PORT, udp:ADDRESS:PORT or viewer",
                              v->device);
+    if (is_page(v->device) && !v->view)
+        return command_usage("haptic", "--device viewer needs --view");
+    if (is_page(v->device) && v->tool)
+        return command_usage("haptic", "--device viewer moves a ball or a probe, not a --tool");
+    if (!v->view && (v->viewer || v->port != 8080))
+        return command_usage("haptic", "--port and --viewer belong to --view");
+    if (v->view && (strncmp(model, "http://", 7) == 0 || strncmp(model, "https://", 8) == 0))
+        return command_usage("haptic", "--view needs a model on this machine; fetch it first");
     if (v->tool && v->probe)
         return command_usage("haptic", "--tool and --probe cannot be used together: a probe is a "
                                        "point");
     if ((v->tool || v->probe) && v->radius > 0)
         return command_usage("haptic", "--radius is for a ball, without --tool and --probe");
-    return 0;
+    return check_pen(v);
 }
 
-/* Returns true if the record would overwrite an input. */
+/* Returns true if the record or the paint would overwrite an input, or the record the paint. */
 static bool overwrites_input(const values *v, const char *model)
 {
-    const char *in[] = { model, v->path, v->tool };
-    for (int i = 0; v->record && i < 3; i++)
-        if (in[i] && command_overwrites("haptic", in[i], v->record))
-            return true;
-    return false;
+    const char *in[] = { model, v->path, v->tool }, *out[] = { v->record, v->paint };
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; out[i] && k < 3; k++)
+            if (in[k] && command_overwrites("haptic", in[k], out[i]))
+                return true;
+    return v->record && v->paint && command_overwrites("haptic", v->paint, v->record);
 }
 
 static int run_haptic(void *given, const char **operand)
@@ -640,13 +586,15 @@ static int run_haptic(void *given, const char **operand)
               .stats = EBPO_HAPTIC_STATS_INIT,
               .memory = EBPO_MODEL_STATS_INIT };
     uint64_t memory = 0;
-    int code = check_values(v, &memory);
+    int code = check_values(v, operand[0], &memory);
     if (code != 0 || overwrites_input(v, operand[0]))
         return EXIT_USAGE;
     bool prepared = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
                     (!v->path || haptic_path_open(&j.device, v->path)) &&
-                    (!v->device || haptic_udp_open(&j.device, v->device));
+                    (!v->device || is_page(v->device) || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
+    haptic_view_end(j.view);
+    (void)haptic_paint_close(j.paint, &j.painted, &j.paint_error);
     ebpo_haptic_free(j.haptic);
     ebpo_model_free(j.model);
     ebpo_close(j.file);
@@ -662,6 +610,10 @@ static const values standard = { .rate = 1000,
                                  .stiffness = 400,
                                  .damping = 0.4,
                                  .faces = 1 << 14,
+                                 .thin = 0.25,
+                                 .density = 1,
+                                 .layer = -1,
+                                 .port = 8080,
                                  .remote = REMOTE_VALUES_INIT };
 
 const command command_haptic = { &spec, sizeof standard, &standard, run_haptic };

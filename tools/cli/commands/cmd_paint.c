@@ -16,19 +16,6 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* --- reading colours and positions --- */
-
-/* Reads "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. Returns false for other text. */
-static bool paint_read_colour(const char *text, uint32_t *out)
-{
-    size_t length = strlen(text), digits = strspn(text, "0123456789abcdefABCDEF");
-    if (length != digits || (length != 6 && length != 8))
-        return false;
-    uint32_t value = (uint32_t)strtoul(text, NULL, 16);
-    *out = length == 8 ? value : value << 8 | 255;
-    return true;
-}
-
 /* --- paths --- */
 
 /* Reads numbers separated by blanks or commas. Returns the count of the numbers; -1: other text, or
@@ -175,7 +162,7 @@ static void set_layer_facts(const paint_values *v, ebpo_paint_layer *layer)
     layer->date = v->date ? v->date : layer->date;
     layer->description = v->description ? v->description : layer->description;
     if (v->colour)
-        (void)paint_read_colour(v->colour, &layer->colour); /* already checked */
+        (void)words_read_colour(v->colour, &layer->colour); /* already checked */
     if (v->opacity >= 0)
         layer->opacity = (uint32_t)v->opacity;
     if (v->show || v->hide)
@@ -255,7 +242,7 @@ static ebpo_status draw_stroke(paint_job *j, const ebpo_paint_input *input, uint
     pen.kind = v->erase ? EBPO_PAINT_ERASES : EBPO_PAINT_PAINTS;
     pen.colour = v->erase ? 0 : layer.colour;
     if (v->colour)
-        (void)paint_read_colour(v->colour, &pen.colour);
+        (void)words_read_colour(v->colour, &pen.colour);
     pen.radius = v->radius;
     pen.spread = v->spread;
     pen.density = (uint32_t)v->density;
@@ -329,7 +316,7 @@ static ebpo_status base_colours(paint_job *j, const ebpo_mesh *mesh, uint8_t **r
     uint32_t base = 0xe6e6e6ff;
     *rgba = NULL;
     if (j->v->base)
-        (void)paint_read_colour(j->v->base, &base);
+        (void)words_read_colour(j->v->base, &base);
     ebpo_status status = ebpo_mesh_colours(mesh, &colours, error);
     if (status != EBPO_OK)
         return status;
@@ -455,10 +442,9 @@ static int check_texts(const paint_values *v)
 {
     uint32_t colour;
     double place[3];
-    if (v->colour && !paint_read_colour(v->colour, &colour))
-        return command_usage("paint", "--colour '%s': expected RRGGBB or RRGGBBAA in hexadecimal",
-                             v->colour);
-    if (v->base && (!paint_read_colour(v->base, &colour) || strlen(v->base) != 6))
+    if (v->colour && !words_read_colour(v->colour, &colour))
+        return command_usage("paint", "--colour '%s': expected " WORDS_COLOUR_EXPECTED, v->colour);
+    if (v->base && (!words_read_colour(v->base, &colour) || strlen(v->base) != 6))
         return command_usage("paint", "--base '%s': expected RRGGBB in hexadecimal", v->base);
     if (v->at && !paint_read_position(v->at, place))
         return command_usage("paint", "--at '%s': expected X,Y,Z", v->at);

@@ -4,6 +4,7 @@
 #define EBPO_TOOLS_HAPTIC_DEVICE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include <ebpo/haptic.h>
@@ -11,6 +12,7 @@
 typedef struct haptic_pose {
     double position[3];
     double rotation[4]; /* a unit quaternion x, y, z, w; 0 0 0 1: not rotated */
+    bool lifted;        /* the pen of the device does not paint */
 } haptic_pose;
 
 /* Feedback for a device. Only a probe sets lo, hi, rgb and `where`; only other tools set the
@@ -18,8 +20,9 @@ typedef struct haptic_pose {
 typedef struct haptic_result {
     haptic_pose proxy; /* the pose of the tool on the surface, see ebpo_haptic_ball_result */
     double force[3], torque[3], normal[3];
-    double depth;  /* as in ebpo_haptic_ball_result; for a probe the distance, or NAN */
-    double lo, hi; /* bounds of the distance */
+    double touch[3]; /* in contact: a point of the tool or of the surface, where they touch */
+    double depth;    /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
+    double lo, hi;   /* bounds of the distance */
     uint64_t face;
     uint32_t flags;
     uint8_t rgb[3]; /* colour of the distance */
@@ -42,8 +45,13 @@ typedef struct haptic_device {
     void *self; /* the first argument of these functions */
 } haptic_device;
 
-/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'. The path '-' means standard
- * input. Returns false after an error, reported on stderr. Call `end` in any case. */
+/* haptic_path.c: reads a line 'x y z' or 'x y z qx qy qz qw' of `length` bytes, which ends with a
+ * zero byte. Returns the number of numbers, 3 or 7; 0: an empty line or a comment; -1: other
+ * text, such as numbers that are not finite. */
+int haptic_pose_read(const char *line, size_t length, haptic_pose *out);
+
+/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
+ * false after an error, reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
 /* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT'.

@@ -46,9 +46,21 @@ static bool make_unit(double q[4])
     return length >= 0x1p-200;
 }
 
-/* Adds a pose of `count` numbers: three of the position, or seven with the rotation. Returns false
- * if there is not enough memory or the rotation is not valid. */
-static bool add_pose(path *p, const double v[7], int count)
+int haptic_pose_read(const char *line, size_t length, haptic_pose *out)
+{
+    double v[7];
+    int count = strlen(line) == length ? read_numbers(line, length, v) : -1;
+    if (count != 3 && count != 7)
+        return count == 0 ? 0 : -1;
+    out->lifted = false;
+    memcpy(out->position, v, sizeof out->position);
+    memcpy(out->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 },
+           sizeof out->rotation);
+    return make_unit(out->rotation) ? count : -1;
+}
+
+/* Adds a pose. Returns false if there is not enough memory. */
+static bool add_pose(path *p, const haptic_pose *added)
 {
     if (p->count == p->capacity) {
         uint64_t more = p->capacity ? 2 * p->capacity : 1024;
@@ -58,11 +70,8 @@ static bool add_pose(path *p, const double v[7], int count)
         p->pose = pose;
         p->capacity = more;
     }
-    haptic_pose *added = &p->pose[p->count++];
-    memcpy(added->position, v, sizeof added->position);
-    memcpy(added->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 },
-           sizeof added->rotation);
-    return make_unit(added->rotation);
+    p->pose[p->count++] = *added;
+    return true;
 }
 
 static bool read_lines(path *p, FILE *in, const char *name)
@@ -72,12 +81,10 @@ static bool read_lines(path *p, FILE *in, const char *name)
     bool ok = true;
     ssize_t length;
     for (uint64_t n = 1; ok && (length = getline(&line, &space, in)) >= 0; n++) {
-        double v[7];
+        haptic_pose pose;
         const char *text = n == 1 ? number_skip_mark(line) : line;
-        int count = strlen(line) == (size_t)length
-                        ? read_numbers(text, (size_t)(line + length - text), v)
-                        : -1;
-        ok = count == 0 || ((count == 3 || count == 7) && add_pose(p, v, count));
+        int count = haptic_pose_read(text, (size_t)(line + length - text), &pose);
+        ok = count == 0 || (count > 0 && add_pose(p, &pose));
         if (!ok)
             fprintf(
                 stderr,

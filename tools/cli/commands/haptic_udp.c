@@ -20,6 +20,7 @@ enum {
     POSITION = 1, /* kinds of packets */
     FEEDBACK = 2,
     END = 3,
+    LIFTED = 4,          /* a position with the pen lifted */
     POSITION_BYTES = 80, /* sizes of packets */
     FEEDBACK_BYTES = 192,
     PACKETS_MAX = 32 /* maximum number of packets taken in a step */
@@ -77,6 +78,7 @@ static uint8_t *put_reals(uint8_t *at, const double *v, int count)
 static bool read_pose(const uint8_t *p, haptic_pose *out)
 {
     double square = 0;
+    out->lifted = get_bytes(p + 6, 2) == LIFTED;
     for (int k = 0; k < 3; k++) {
         out->position[k] = get_real(p + 24 + 8 * k);
         if (!(fabs(out->position[k]) <= 0x1p200))
@@ -104,7 +106,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
         return false;
     if (kind == END && u->known)
         u->ended = true;
-    else if (kind == POSITION && read_pose(p, &pose))
+    else if ((kind == POSITION || kind == LIFTED) && read_pose(p, &pose))
         u->pose = pose;
     else
         return false;

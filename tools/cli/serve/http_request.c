@@ -116,7 +116,8 @@ static int parse_first_line(span line, http_request *out)
         return version.length == 8 && memcmp(version.text, "HTTP/", 5) == 0 ? HTTP_BAD_VERSION
                                                                             : HTTP_BAD_REQUEST;
     out->head_only = span_is(method, "HEAD");
-    if (!out->head_only && !span_is(method, "GET"))
+    out->is_post = out->is_post && span_is(method, "POST");
+    if (!out->head_only && !out->is_post && !span_is(method, "GET"))
         return HTTP_BAD_METHOD;
     return decode_path(target, out);
 }
@@ -143,8 +144,32 @@ static bool is_own_host(span host)
 
 /* Fields that the head has had so far. */
 typedef struct seen_fields {
-    bool host, range, length; /* length: Content-Length */
+    bool range, length; /* length: Content-Length */
+    span host, origin;  /* without text: not seen */
 } seen_fields;
+
+/* Returns true if a page of this server has sent the request. A page of another site cannot change
+ * or omit the field Origin of a POST. */
+static bool is_own_page(const seen_fields *seen)
+{
+    static const char scheme[] = "http://";
+    size_t n = sizeof scheme - 1;
+    return seen->origin.text && seen->origin.length == n + seen->host.length &&
+           memcmp(seen->origin.text, scheme, n) == 0 &&
+           memcmp(seen->origin.text + n, seen->host.text, seen->host.length) == 0;
+}
+
+/* Reads the length of the body. Returns false if it is not a number, or too long. */
+static bool read_length(span value, size_t *out)
+{
+    *out = 0;
+    for (size_t i = 0; i < value.length; i++) {
+        if (!is_digit(value.text[i]) || *out > HTTP_BODY_MAX)
+            return false;
+        *out = 10 * *out + (size_t)(value.text[i] - '0');
+    }
+    return value.length > 0 && *out <= HTTP_BODY_MAX;
+}
 
 /* Returns true if a list of words, separated by commas, contains the word "close". */
 static bool lists_close(span value)
@@ -165,14 +190,20 @@ static bool lists_close(span value)
 static int take_field(span name, span value, http_request *out, seen_fields *seen)
 {
     if (span_is_word(name, "Host")) {
-        if (seen->host)
+        if (seen->host.text)
             return HTTP_BAD_REQUEST;
-        seen->host = true;
+        seen->host = value;
         return is_own_host(value) ? HTTP_OK : HTTP_OTHER_HOST;
     }
-    /* Requests with a body are refused. */
+    if (span_is_word(name, "Origin")) {
+        if (seen->origin.text)
+            return HTTP_BAD_REQUEST;
+        seen->origin = value;
+    }
+    /* Other requests with a body are refused. */
     if (span_is_word(name, "Transfer-Encoding") ||
-        (span_is_word(name, "Content-Length") && (seen->length || !span_is(value, "0"))))
+        (span_is_word(name, "Content-Length") &&
+         (seen->length || !(out->is_post ? read_length(value, &out->body) : span_is(value, "0")))))
         return HTTP_BAD_REQUEST;
     seen->length |= span_is_word(name, "Content-Length");
     if (span_is_word(name, "Connection") && lists_close(value))
@@ -210,11 +241,12 @@ static int parse_field(span line, http_request *out, seen_fields *seen)
     return is_token(name) ? take_field(name, value, out, seen) : HTTP_BAD_REQUEST;
 }
 
-int http_request_parse(const char *head, size_t length, http_request *out)
+int http_request_parse(const char *head, size_t length, bool takes_posts, http_request *out)
 {
     span rest = { head, length }, line;
-    seen_fields seen = { false, false, false };
+    seen_fields seen = { .range = false };
     memset(out, 0, sizeof *out);
+    out->is_post = takes_posts;
     if (!take_line(&rest, &line))
         return HTTP_BAD_REQUEST;
     int status = parse_first_line(line, out);
@@ -225,9 +257,9 @@ int http_request_parse(const char *head, size_t length, http_request *out)
             break;
         status = parse_field(line, out, &seen);
     }
-    if (status == HTTP_OK && (rest.length || !seen.host))
+    if (status == HTTP_OK && (rest.length || !seen.host.text || (out->is_post && !seen.length)))
         return HTTP_BAD_REQUEST;
-    return status;
+    return status == HTTP_OK && out->is_post && !is_own_page(&seen) ? HTTP_FORBIDDEN : status;
 }
 
 /* Reads a number. Numbers of 2^63 and more become 2^63. Returns false if there is no digit. */

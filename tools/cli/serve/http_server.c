@@ -42,8 +42,7 @@ typedef struct connection {
 } connection;
 
 struct http_server {
-    http_find_fn find;
-    void *user;
+    http_service service;
     pthread_mutex_t lock;    /* guards sockets and `open` */
     pthread_cond_t released; /* a slot became free */
     int open;                /* number of open connections */
@@ -84,13 +83,24 @@ static bool send_file(connection *c, int file, uint64_t first, uint64_t count)
     return true;
 }
 
+struct http_stream {
+    const connection *c;
+};
+
+bool http_stream_send(http_stream *stream, const void *bytes, size_t count)
+{
+    return send_bytes(stream->c, bytes, count);
+}
+
 static const char *reason_of(int status)
 {
     switch (status) {
     case HTTP_OK: return "OK";
+    case HTTP_NO_CONTENT: return "No Content";
     case HTTP_PARTIAL: return "Partial Content";
     case HTTP_FOUND: return "Found";
     case HTTP_NOT_MODIFIED: return "Not Modified";
+    case HTTP_FORBIDDEN: return "Forbidden";
     case HTTP_NOT_FOUND: return "Not Found";
     case HTTP_BAD_METHOD: return "Method Not Allowed";
     case HTTP_TOO_SLOW: return "Request Timeout";
@@ -157,11 +167,26 @@ static bool send_content(connection *c, const http_request *request, const http_
                               : send_bytes(c, (const char *)content->bytes + first, (size_t)count);
 }
 
+/* Sends a response of unknown length; the end of the connection ends it. */
+static bool send_stream(connection *c, const http_content *content)
+{
+    char fields[FIELDS_MAX];
+    http_stream stream = { c };
+    snprintf(fields, sizeof fields, "Content-Type: %s\r\nCache-Control: no-store\r\n",
+             content->type);
+    if (send_head(c, HTTP_OK, false, fields))
+        content->stream(c->server->service.user, &stream);
+    return false;
+}
+
 static bool send_response(connection *c, const http_request *request)
 {
+    const http_service *service = &c->server->service;
     http_content content = { .file = -1 };
-    int status = c->server->find(c->server->user, request->path, request->has_query, &content);
+    int status = service->find(service->user, request->path, request->has_query, &content);
     char fields[FIELDS_MAX - 128] = "";
+    if (status == HTTP_OK && content.stream && !request->head_only)
+        return send_stream(c, &content);
     if (status == HTTP_OK) {
         bool sent = send_content(c, request, &content);
         if (content.file >= 0)
@@ -228,6 +253,42 @@ static void end_connection(connection *c)
             break;
 }
 
+/* Receives the rest of the body of a message after its head, and passes it on. Returns the status
+ * code of the response. */
+static int take_message(connection *c, const http_request *request)
+{
+    const http_service *service = &c->server->service;
+    int64_t end = milliseconds_now() + 1000 * HEAD_SECONDS;
+    while (c->received < request->body) {
+        int64_t left = end - milliseconds_now();
+        struct pollfd p = { c->socket, POLLIN, 0 };
+        int ready = left > 0 ? poll(&p, 1, (int)left) : 0;
+        if (ready < 0 && errno == EINTR)
+            continue;
+        ssize_t n =
+            ready > 0 ? recv(c->socket, c->head + c->received, request->body - c->received, 0) : 0;
+        if (n < 0 && (errno == EINTR || errno == EAGAIN))
+            continue;
+        if (n <= 0)
+            return HTTP_TOO_SLOW;
+        c->received += (size_t)n;
+    }
+    int status = service->post(service->user, request->path, c->head, request->body);
+    c->received -= request->body;
+    memmove(c->head, c->head + request->body, c->received);
+    return status;
+}
+
+/* Responds to a message. Returns true if the connection stays open. */
+static bool answer_message(connection *c, const http_request *request)
+{
+    int status = take_message(c, request);
+    bool keeps = request->keeps && status != HTTP_TOO_SLOW;
+    bool sent = status == HTTP_NO_CONTENT ? send_head(c, status, keeps, "")
+                                          : send_status(c, status, keeps, false, "");
+    return sent && keeps;
+}
+
 static void serve_requests(connection *c)
 {
     http_request request;
@@ -235,7 +296,7 @@ static void serve_requests(connection *c)
     for (bool more = true; more;) {
         int status = receive_head(c, &length);
         if (status == HTTP_OK)
-            status = http_request_parse(c->head, length, &request);
+            status = http_request_parse(c->head, length, c->server->service.post, &request);
         if (status == 0)
             return;
         if (status != HTTP_OK) {
@@ -245,7 +306,7 @@ static void serve_requests(connection *c)
         }
         c->received -= length;
         memmove(c->head, c->head + length, c->received);
-        more = send_response(c, &request);
+        more = request.is_post ? answer_message(c, &request) : send_response(c, &request);
     }
     end_connection(c);
 }
@@ -312,29 +373,30 @@ static void end_all(http_server *server)
     pthread_mutex_unlock(&server->lock);
 }
 
-/* Both ends of a pipe. The server ends when a byte has been written to it. */
-static int ending_pipe[2];
+/* Both ends of a pipe. A signal writes a byte to it. */
+static int signal_pipe[2];
 
-static void end_server(int number)
+static void record_signal(int number)
 {
     int saved = errno;
     (void)number;
-    (void)!write(ending_pipe[1], "", 1);
+    (void)!write(signal_pipe[1], "", 1);
     errno = saved;
 }
 
-static bool catch_signals(void)
+int http_server_stop_at_signals(void)
 {
     struct sigaction action, before;
-    if (pipe(ending_pipe) != 0)
-        return false;
+    if (pipe(signal_pipe) != 0)
+        return -1;
     memset(&action, 0, sizeof action);
-    action.sa_handler = end_server;
+    action.sa_handler = record_signal;
     action.sa_flags = (int)SA_RESETHAND; /* a second signal ends the process at once */
     sigemptyset(&action.sa_mask);
-    signal(SIGPIPE, SIG_IGN); /* if a client has left, send returns an error */
-    return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, NULL, &before) == 0 &&
-           (before.sa_handler == SIG_IGN || sigaction(SIGINT, &action, NULL) == 0);
+    if (sigaction(SIGTERM, &action, NULL) != 0 || sigaction(SIGINT, NULL, &before) != 0 ||
+        (before.sa_handler != SIG_IGN && sigaction(SIGINT, &action, NULL) != 0))
+        return -1;
+    return signal_pipe[0];
 }
 
 int http_server_listen(int *port)
@@ -350,7 +412,7 @@ int http_server_listen(int *port)
     setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (bind(listener, (struct sockaddr *)&at, sizeof at) != 0 ||
         listen(listener, CONNECTIONS_MAX) != 0 ||
-        getsockname(listener, (struct sockaddr *)&at, &length) != 0 || !catch_signals()) {
+        getsockname(listener, (struct sockaddr *)&at, &length) != 0) {
         int saved = errno;
         close(listener);
         errno = saved;
@@ -360,31 +422,38 @@ int http_server_listen(int *port)
     return listener;
 }
 
-bool http_server_run(int listener, http_find_fn find, void *user)
+/* Accepts connections until `stop` can be read. Returns false, with errno, after a failure. */
+static bool accept_all(http_server *server, int listener, int stop)
 {
-    static http_server server; /* threads use it until the end */
-    server.find = find;
-    server.user = user;
-    pthread_mutex_init(&server.lock, NULL);
-    pthread_cond_init(&server.released, NULL);
-    for (int i = 0; i < CONNECTIONS_MAX; i++)
-        server.slot[i].socket = -1;
-    fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
     for (bool refused = false;;) {
-        bool full = refused || is_full(&server); /* refused: the system lacks resources */
-        struct pollfd p[2] = { { ending_pipe[0], POLLIN, 0 }, { full ? -1 : listener, POLLIN, 0 } };
+        bool full = refused || is_full(server); /* refused: the system lacks resources */
+        struct pollfd p[2] = { { stop, POLLIN, 0 }, { full ? -1 : listener, POLLIN, 0 } };
         if (poll(p, 2, full ? FULL_MILLISECONDS : -1) < 0 && errno != EINTR)
             return false;
         if (p[0].revents)
-            break;
+            return true;
         int socket = p[1].revents ? accept(listener, NULL, NULL) : -1;
         refused = socket < 0 && p[1].revents;
         if (socket < 0)
             continue;
         fcntl(socket, F_SETFD, FD_CLOEXEC);
         fcntl(socket, F_SETFL, 0);
-        start_connection(&server, socket);
+        start_connection(server, socket);
     }
+}
+
+bool http_server_run(int listener, const http_service *service)
+{
+    static http_server server; /* threads use it until the end */
+    server.service = *service;
+    pthread_mutex_init(&server.lock, NULL);
+    pthread_cond_init(&server.released, NULL);
+    for (int i = 0; i < CONNECTIONS_MAX; i++)
+        server.slot[i].socket = -1;
+    fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
+    signal(SIGPIPE, SIG_IGN);             /* if a client has left, send returns an error */
+    if (!accept_all(&server, listener, service->stop))
+        return false;
     close(listener);
     end_all(&server);
     return true;

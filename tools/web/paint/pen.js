@@ -25,7 +25,7 @@ const FULL_SIZE = 32768, AT_ONCE = 200;
 
 export function addPen({ scene, worker, query }, pipeline) {
   const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // documents by a model's digest; { normal, faces } by a point of a document
-  let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, requested = 0;
+  let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, requested = 0, command; // command(text): sends a command to a device that paints, see live.js
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
   const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
   const positionsOfPoints = (points) => {
@@ -71,7 +71,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     if (!stroke && doc === mine)
       change();
   }
-  const undo = () => inTurn(() => doc.undo()), redo = () => inTurn(() => doc.redo());
+  const undo = () => (command ? command('undo') : inTurn(() => doc.undo())), redo = () => !command && inTurn(() => doc.redo());
 
   // --- layers ---
 
@@ -83,7 +83,11 @@ export function addPen({ scene, worker, query }, pipeline) {
       const eye = make('button', l.visible ? 'Hide' : 'Show', { className: 'small', ariaPressed: String(!l.visible) }), remove = make('button', '✕', { className: 'small',
         ariaLabel: `Remove ${l.title}` });
       const count = doc.state.strokes.filter((s) => s.layer === i).length;
+      for (const input of command ? [name, eye, remove, opacity] : [])
+        input.disabled = true;
       pick.onchange = () => {
+        if (command)
+          command(`layer ${i}`);
         layer = i;
         showLayers();
       };
@@ -121,7 +125,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       draw();
       return;
     }
-    if (!active() || !e.isPrimary || e.button !== 0 || stroke || !scene.pick(e.clientX, e.clientY))
+    if (command || !active() || !e.isPrimary || e.button !== 0 || stroke || !scene.pick(e.clientX, e.clientY))
       return;
     if (!state.info.parts.has('mesh')) {
       complain('the file has no faces to paint on; convert the model with its mesh');
@@ -174,6 +178,47 @@ export function addPen({ scene, worker, query }, pipeline) {
     }
     unsettled--;
     pending--;
+  }
+
+  // --- a device that paints ---
+
+  // Takes new layers and points of a device: an event "paint" of `ebpo haptic --view`.
+  async function receive({ count, layer: at, layers, strokes: parts }) {
+    const strokes = doc.state.strokes.slice(0, count), { opening } = state, { length: before } = doc.state.strokes, fresh = [];
+    for (const { number, points, ...stroke } of parts) {
+      const added = points.map(([face, a, b, x, y, z, size, pressure, time]) => ({ face, weights: [a, b], place: [x, y, z], size, pressure, time }));
+      fresh.push({ ...stroke, points: added });
+      strokes[number] = { ...stroke, points: [...(strokes[number]?.points ?? []), ...added] };
+    }
+    doc.state = doc.saved = { ...doc.state, layers: layers ?? doc.state.layers, strokes };
+    if (layers || at !== layer || strokes.length !== before) {
+      layer = at;
+      showLayers();
+    }
+    draw();
+    await findReach(fresh, () => opening === state.opening);
+    if (opening === state.opening)
+      draw();
+  }
+
+  // Lets the device do what the buttons of the pen otherwise do on this page.
+  function beginLive(send) {
+    command = send;
+    details.open = true;
+    $('penUndo').disabled = false;
+    for (const id of ['penRedo', 'paintOpen'])
+      $(id).hidden = true;
+    const colourChanged = () => command(`colour ${$('penColour').value.slice(1)}`);
+    $('penColour').onchange = colourChanged;
+    details.querySelectorAll('[data-colour]').forEach((b) => b.addEventListener('click', colourChanged));
+    $('penSize').onchange = () => command(`radius ${radius()}`);
+    $('layerAdd').onclick = () => command(`new-layer Layer ${doc.state.layers.length + 1}`);
+    for (const [id, text] of [['penOn', 'paint'], ['eraserOn', 'erase']])
+      $(id).onclick = () => {
+        command(text);
+        $('penOn').ariaPressed = String(id === 'penOn');
+        $('eraserOn').ariaPressed = String(id === 'eraserOn');
+      };
   }
 
   // --- files ---
@@ -308,5 +353,5 @@ export function addPen({ scene, worker, query }, pipeline) {
     fromAddress();
     window.ebpoViewer.paint = { get file() { return doc.file; }, get pending() { return pending; }, openBytes, write: () => writePaint(doc.file) };
   }
-  return { begin, drawing };
+  return { begin, drawing, live: { begin: beginLive, receive } };
 }

@@ -1,0 +1,219 @@
+"""Tests painting by a haptic device while it moves: haptic_paint.py EBPO.
+
+The device is this script, which sends UDP packets, or a recorded path. The model is a cube; the pen moves on its top.
+"""
+import json
+import os
+import re
+import resource
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+POSITION = struct.Struct("<4sHHQQ3d4d")
+RADIUS, STIFFNESS = 0.02, 400
+CUBE = """ply
+format ascii 1.0
+element vertex 8
+property float x
+property float y
+property float z
+element face 12
+property list uchar int vertex_indices
+end_header
+""" + "".join(f"{i & 1} {i >> 1 & 1} {i >> 2}\n" for i in range(8)) + "".join(
+    f"3 {f}\n" for f in ("0 2 3", "0 3 1", "4 5 7", "4 7 6", "0 1 5", "0 5 4", "2 6 7", "2 7 3",
+                         "0 4 6", "0 6 2", "1 3 7", "1 7 5"))
+
+
+def check(condition, *what):
+    if not condition:
+        raise SystemExit("failed: " + " ".join(str(w) for w in what))
+
+
+class Test:
+    def __init__(self, ebpo, folder):
+        self.ebpo, self.folder = ebpo, folder
+        with open(self.at("cube.ply"), "w", encoding="ascii") as out:
+            out.write(CUBE)
+        self.model = self.at("cube.ebpo.h5")
+        self.run("convert", "-q", self.at("cube.ply"), self.model)
+
+    def at(self, name):
+        return os.path.join(self.folder, name)
+
+    def run(self, *words):
+        return subprocess.run([self.ebpo, *words], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+    def strokes(self, paint):
+        return json.loads(self.run("paint", "--json", "--points", paint, self.model))["strokes"]
+
+    def point_count(self, paint):
+        return sum(len(s["points"]) for s in self.strokes(paint))
+
+    def start(self, paint, *more, **how):
+        return subprocess.Popen([self.ebpo, "haptic", "--json", "--paint", paint, "--pen-radius", str(RADIUS), *more,
+                                 self.model], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
+
+
+class Device:
+    """A device that sends its position. time: when it was sent, by position number."""
+
+    def __init__(self, process):
+        line = process.stderr.readline()
+        found = re.search(r"port (\d+)$", line.strip())
+        check(found, "no port:", line)
+        self.to, self.sent = ("127.0.0.1", int(found[1])), 0
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def send(self, at, kind=1):
+        self.sent += 1
+        self.socket.sendto(POSITION.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1), self.to)
+
+    def draw(self, process, seconds, step=None, kind=1):
+        """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""
+        begin, sent, down = time.monotonic(), [], None
+        self.send((0.1, 0.5, 1.2))
+        while (now := time.monotonic() - begin) < seconds and process.poll() is None:
+            z = max(1.2 - now, 1 - RADIUS / 2)
+            if z < 1 and down is None:
+                down = now
+            x = 0.1 + (now - down) * 0.1 if down is not None else 0.1
+            self.send((x, 0.5, z), kind)
+            sent.append((time.monotonic(), x))
+            if step:
+                step(now)
+            time.sleep(0.002)
+        return sent
+
+
+def line(name, points):
+    with open(name, "w", encoding="ascii") as out:
+        out.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in points)
+
+
+def test_replay(t):
+    """A replayed recording paints the same points each time, and the force sets their sizes."""
+    path, count = t.at("path"), 1000
+    line(path, [(0.2 + 0.6 * i / count, 0.5, 1.05 - 0.06 * min(1, i / 200) - 0.02 * i / count) for i in range(count)] +
+         [(0.8, 0.5, 1.03)] * 100 + [(0.8 - 0.3 * i / count, 0.7, 0.985) for i in range(300)])
+    made = []
+    for name in ("a.paint.h5", "b.paint.h5"):
+        p = t.start(t.at(name), "--path", path, "--colour", "00ff0080", "--rate", "2000", "--record", t.at(name + ".path"))
+        out, err = p.communicate(timeout=60)
+        got = json.loads(out)["paint"]
+        check(p.returncode == 0 and err == "" and got["lost_steps"] == 0, p.returncode, err, got)
+        made.append(t.strokes(t.at(name)))
+        check(got["strokes"] == len(made[-1]) == 2 and got["points"] == sum(len(s["points"]) for s in made[-1]), got)
+        path = t.at(name + ".path")
+    check(made[0] == made[1], "two replays differ")
+    first, second = made[0]
+    check(first["colour"] == "#00ff0080", first["colour"])
+    for at, size, pressure in ((p["place"], p["size"] / 2 ** 15, p["pressure"] / 65535) for p in first["points"]):
+        check(at[2] == 1 and abs(at[1] - 0.5) < 1e-9 and 0.2 < at[0] < 0.81, at)
+        check(abs(size - (0.25 + 0.75 * pressure)) < 1e-3, size, pressure)
+    sizes = [p["size"] / 2 ** 15 for p in first["points"]]
+    check(sizes == sorted(sizes) and sizes[0] < 0.7 < 0.99 < sizes[-1], "the width does not follow the force", sizes)
+    steps = [b["place"][0] - a["place"][0] for a, b in zip(first["points"], first["points"][1:])]
+    check(max(steps) < RADIUS / 2 * 1.01, "gaps between points", max(steps))
+    # The pen moves sideways in the air in the second stroke: nothing is painted between the strokes.
+    check(all(abs(p["place"][1] - 0.7) < 1e-9 for p in second["points"]), "paint between two contacts")
+
+
+def test_erase(t):
+    """Painting continues an existing file; an eraser adds an erasing stroke to the layer."""
+    paint = t.at("a.paint.h5")
+    p = t.start(paint, "--path", t.at("path"), "--erase", "--layer", "0", "--rate", "2000")
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0, err)
+    kinds = [s["kind"] for s in t.strokes(paint)]
+    check(kinds == ["paints"] * 2 + ["erases"] * 2, kinds)
+
+
+def test_kill(t):
+    """After a kill, the file contains everything that was touched up to a second before."""
+    for seconds in (1.7, 2.6):
+        paint = t.at(f"killed-{seconds}.paint.h5")
+        p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+        sent = Device(p).draw(p, seconds)
+        p.kill()
+        killed = time.monotonic()
+        p.wait()
+        reached = max((q["place"][0] for s in t.strokes(paint) for q in s["points"]), default=0)
+        wanted = max(x for when, x in sent if when < killed - 1)
+        check(reached >= wanted - RADIUS and wanted > 0.1, f"painted to {reached}, the pen was at {wanted}")
+
+
+def test_second_writer(t):
+    """Another program cannot paint in the same file; the first one continues. SIGINT ends with everything saved."""
+    paint = t.at("one.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    device, second = Device(p), []
+
+    def begin_second(now):
+        if now > 0.5 and not second:
+            second.append(t.start(paint, "--seconds", "1"))
+
+    sent = device.draw(p, 2.5, begin_second)
+    p.send_signal(signal.SIGINT)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and err == "", p.returncode, err)
+    refused, said = second[0].communicate(timeout=60)
+    check(second[0].returncode == 1 and "another program has been changing the file" in said and refused == "", said)
+    points = t.strokes(paint)[-1]["points"]
+    check(json.loads(out)["paint"]["points"] == len(points), "points in the report and in the file differ")
+    check(max(q["place"][0] for q in points) >= sent[-1][1] - RADIUS, "the last points are missing")
+
+
+def test_lifted_pen(t):
+    """A device whose pen is lifted touches, and does not paint."""
+    paint = t.at("lifted.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    device = Device(p)
+    device.draw(p, 0.8, kind=4)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
+
+
+def test_full_disk(t, recovers):
+    """The loop continues when the paint cannot be saved. It is saved when there is space again."""
+    paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--pen-radius", "0.0005", "--full-force", "1",
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+    device = Device(p)
+    device.draw(p, 3)
+    check(p.poll() is None, "the loop ended")
+    saved = t.point_count(paint)  # the file is complete, but old
+    if recovers:
+        resource.prlimit(p.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        device.draw(p, 1)
+    else:
+        p.send_signal(signal.SIGTERM)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    got = json.loads(out)
+    check(got["paint"]["failed_saves"] > 0 and got["haptic"]["steps"] > 2000, got["paint"], got["haptic"]["steps"])
+    check(err.count("the device continues") == 1 and ("saved again" in err) == recovers, err)
+    check(p.returncode == (0 if recovers else 1) and ("failure" in got["paint"]) != recovers, p.returncode, err)
+    now = t.point_count(paint)
+    check(now > saved if recovers else now == saved, saved, now)
+
+
+def main(ebpo):
+    with tempfile.TemporaryDirectory() as folder:
+        t = Test(ebpo, folder)
+        test_replay(t)
+        test_erase(t)
+        test_kill(t)
+        test_second_writer(t)
+        test_lifted_pen(t)
+        test_full_disk(t, True)
+        test_full_disk(t, False)
+
+
+main(*sys.argv[1:])

@@ -1,0 +1,527 @@
+/* Two paints are in memory. The pen paints into `drawn`. `saved` belongs to the file. A thread
+ * copies new strokes from `drawn` to `saved` under a lock, and then saves `saved` without the lock,
+ * so that a slow disk does not delay the pen. Strokes that were copied before are equal in both,
+ * except that the last stroke may be longer in `drawn`. */
+#include "cli/commands/haptic_paint.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/numbers.h"
+#include "cli/tool_clock.h"
+#include "cli/words.h"
+
+/* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
+enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
+
+/* Seconds to wait for another program that changes the file. */
+static const double LOCK_SECONDS = 1;
+
+/* The pen is lifted when it was not in contact for this time. Shorter gaps do not end a stroke. */
+static const double LIFT_MS = 30;
+
+struct haptic_paint {
+    haptic_pen pen;
+    uint32_t colour; /* of the pen when it does not erase */
+    ebpo_context *context;
+    /* Used by the thread that paints. */
+    ebpo_paint_drawing *drawing; /* NULL: the pen is lifted */
+    double touched;              /* time of the last sample in contact */
+    ebpo_error error;            /* first error of painting */
+    /* Under the lock. */
+    pthread_mutex_t lock;
+    ebpo_paint *drawn;
+    uint64_t finished; /* number of strokes of `drawn` that will not change */
+    uint64_t changes;  /* number of changes of `drawn` */
+    uint64_t epoch;    /* number of removed strokes */
+    uint64_t layer_changes;
+    /* Used by the thread that saves. */
+    ebpo_paint *saved;
+    uint64_t copied; /* number of strokes of `saved` that will not change */
+    uint64_t copied_changes, saved_changes;
+    uint64_t strokes_before, points_before; /* numbers of strokes and points in the opened file */
+    ebpo_error save_error;                  /* of the last save */
+    haptic_painted result;
+    pthread_t saver;
+    atomic_bool ended;
+};
+
+static ebpo_paint_info info_of(const ebpo_paint *paint)
+{
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ebpo_paint_get_info(paint, &info);
+    return info;
+}
+
+/* --- saving --- */
+
+/* Adds the layers of `drawn` that `saved` does not have. The caller has the lock. */
+static ebpo_status copy_layers(haptic_paint *p, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    uint64_t count = info_of(p->drawn).layer_count;
+    for (uint64_t i = info_of(p->saved).layer_count; i < count && status == EBPO_OK; i++) {
+        ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+        ebpo_paint_get_layer(p->drawn, i, &layer);
+        status = ebpo_paint_add_layer(p->saved, &layer, NULL, error);
+    }
+    return status;
+}
+
+/* Makes `saved` equal to `drawn`. The caller has the lock. */
+static ebpo_status copy_strokes(haptic_paint *p, ebpo_error *error)
+{
+    ebpo_status status = copy_layers(p, error);
+    uint64_t count = info_of(p->drawn).stroke_count;
+    for (uint64_t i = info_of(p->saved).stroke_count; i > p->copied && status == EBPO_OK; i--)
+        status = ebpo_paint_remove_stroke(p->saved, i - 1, error);
+    for (uint64_t i = p->copied; i < count && status == EBPO_OK; i++) {
+        ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+        ebpo_paint_get_stroke(p->drawn, i, &stroke);
+        status = ebpo_paint_add_stroke(p->saved, &stroke, error);
+    }
+    if (status == EBPO_OK) {
+        p->copied = p->finished;
+        p->copied_changes = p->changes;
+    }
+    return status;
+}
+
+/* Saves the paint if it has changed. Reports the first of successive failures. */
+static ebpo_status save_paint(haptic_paint *p)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t begin = tool_clock();
+    pthread_mutex_lock(&p->lock);
+    ebpo_status status = p->changes == p->saved_changes ? EBPO_OK : copy_strokes(p, &error);
+    bool changed = p->changes != p->saved_changes;
+    pthread_mutex_unlock(&p->lock);
+    if (!changed)
+        return EBPO_OK;
+    if (status == EBPO_OK)
+        status = ebpo_paint_checkpoint(p->saved, &error);
+    if (status == EBPO_OK) {
+        p->saved_changes = p->copied_changes;
+        p->result.saves++;
+        p->result.save_seconds_max =
+            fmax(p->result.save_seconds_max, 1e-9 * (double)(tool_clock() - begin));
+        if (p->save_error.status != EBPO_OK)
+            fprintf(stderr, "ebpo haptic: %s: saved again\n", p->pen.path);
+        p->save_error = (ebpo_error)EBPO_ERROR_INIT;
+        return EBPO_OK;
+    }
+    if (p->save_error.status == EBPO_OK)
+        fprintf(stderr,
+                "ebpo haptic: %s; the device continues, the paint stays in memory, and saving is "
+                "tried again every half second\n",
+                error.message);
+    p->save_error = error;
+    p->result.failed_saves++;
+    return status;
+}
+
+static void *save_often(void *user)
+{
+    haptic_paint *p = user;
+    for (uint64_t due = tool_clock() + SAVE_NS; !atomic_load(&p->ended);) {
+        tool_wait_until(tool_clock() + POLL_NS);
+        if (tool_clock() >= due) {
+            due = tool_clock() + SAVE_NS;
+            (void)save_paint(p);
+        }
+    }
+    return NULL;
+}
+
+/* --- painting --- */
+
+/* Reports the first error. */
+static void report_painting(haptic_paint *p, const ebpo_error *error)
+{
+    if (p->error.status == EBPO_OK)
+        fprintf(stderr,
+                "ebpo haptic: %s: painting failed: %s; the device continues, and later contacts "
+                "are painted if possible\n",
+                p->pen.path, error->message);
+    if (p->error.status == EBPO_OK)
+        p->error = *error;
+}
+
+/* Lifts the pen, which ends a stroke. The caller has the lock. */
+static void lift_pen(haptic_paint *p)
+{
+    if (!p->drawing)
+        return;
+    ebpo_paint_drawing_free(p->drawing);
+    p->drawing = NULL;
+    p->finished = info_of(p->drawn).stroke_count;
+}
+
+/* Begins a stroke. The caller has the lock. */
+static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
+{
+    ebpo_paint_pen pen = p->pen.pen;
+    pen.pressure_step = 0x1p-4;
+    pen.seed = 1 + info_of(p->drawn).stroke_count;
+    pen.time = p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
+    return ebpo_paint_drawing_new(p->drawn, p->context, &pen, &p->drawing, error);
+}
+
+static bool is_touching(const haptic_sample *s)
+{
+    return s->flags & EBPO_HAPTIC_CONTACT && !s->lifted;
+}
+
+static ebpo_paint_input input_of(const haptic_paint *p, const haptic_sample *s)
+{
+    ebpo_paint_input input = { .time = fmin(s->time, UINT32_MAX) };
+    memcpy(input.place, s->touch, sizeof input.place);
+    input.pressure = fmin(1, p->pen.stiffness * s->depth / p->pen.full_force);
+    return input;
+}
+
+/* Paints successive steps in contact. The caller has the lock. */
+static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64_t count)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t before = info_of(p->drawn).point_count;
+    ebpo_status status = p->drawing ? EBPO_OK : begin_stroke(p, &error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_drawing_add(p->drawing, input, count, NULL, &error);
+    p->changes += info_of(p->drawn).point_count > before;
+    if (status != EBPO_OK)
+        report_painting(p, &error);
+}
+
+void haptic_paint_take(void *user, const haptic_sample *samples, uint64_t count)
+{
+    enum { MOST = 256 };
+    haptic_paint *p = user;
+    ebpo_paint_input input[MOST];
+    pthread_mutex_lock(&p->lock);
+    for (uint64_t i = 0; i < count;) {
+        uint64_t n = 0;
+        if (!is_touching(&samples[i])) {
+            if (samples[i].time - p->touched > LIFT_MS)
+                lift_pen(p);
+            i++;
+            continue;
+        }
+        for (; n < MOST && i < count && is_touching(&samples[i]); n++, i++)
+            input[n] = input_of(p, &samples[i]);
+        p->touched = samples[i - 1].time;
+        paint_contact(p, input, n);
+    }
+    pthread_mutex_unlock(&p->lock);
+}
+
+/* --- commands --- */
+
+/* Removes the last stroke of this run. Returns false if there is none. The caller has the lock. */
+static bool undo_stroke(haptic_paint *p)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t count = info_of(p->drawn).stroke_count;
+    if (count == p->strokes_before ||
+        ebpo_paint_remove_stroke(p->drawn, count - 1, &error) != EBPO_OK)
+        return false;
+    p->finished = count - 1;
+    if (p->copied > p->finished)
+        p->copied = p->finished;
+    p->changes++;
+    p->epoch++;
+    return true;
+}
+
+static bool add_layer(haptic_paint *p, const char *title)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+    layer.title = title;
+    if (p->pen.pen.kind == EBPO_PAINT_PAINTS)
+        layer.colour = p->pen.pen.colour;
+    if (ebpo_paint_add_layer(p->drawn, &layer, &p->pen.pen.layer, &error) != EBPO_OK)
+        return false;
+    p->changes++;
+    p->layer_changes++;
+    return true;
+}
+
+static bool choose_number(haptic_paint *p, const char *text)
+{
+    char *end;
+    unsigned long number = strtoul(text, &end, 10);
+    if (*text < '0' || *text > '9' || *end || number >= info_of(p->drawn).layer_count)
+        return false;
+    p->pen.pen.layer = number;
+    return true;
+}
+
+static bool set_radius(haptic_paint *p, const char *text)
+{
+    const char *end;
+    double radius = number_read(text, text + strlen(text), &end);
+    if (end == text || *end || !(radius >= 0x1p-200 && radius <= 0x1p200))
+        return false;
+    p->pen.pen.radius = radius;
+    return true;
+}
+
+static bool set_colour(haptic_paint *p, const char *text)
+{
+    uint32_t colour;
+    if (!words_read_colour(text, &colour))
+        return false;
+    p->colour = colour;
+    p->pen.pen.kind = EBPO_PAINT_PAINTS;
+    p->pen.pen.colour = colour;
+    return true;
+}
+
+/* Sets the kind of the pen; its colour is that before erasing. */
+static bool set_kind(haptic_paint *p, ebpo_paint_kind kind)
+{
+    p->pen.pen.kind = kind;
+    p->pen.pen.colour = kind == EBPO_PAINT_ERASES ? 0 : p->colour;
+    return true;
+}
+
+bool haptic_paint_command(haptic_paint *p, const char *text)
+{
+    size_t word = strcspn(text, " ");
+    const char *value = text[word] ? text + word + 1 : "";
+    char name[16] = "";
+    if (word < sizeof name)
+        memcpy(name, text, word);
+    pthread_mutex_lock(&p->lock);
+    lift_pen(p);
+    bool done = strcmp(text, "undo") == 0        ? undo_stroke(p)
+                : strcmp(text, "paint") == 0     ? set_kind(p, EBPO_PAINT_PAINTS)
+                : strcmp(text, "erase") == 0     ? set_kind(p, EBPO_PAINT_ERASES)
+                : strcmp(name, "colour") == 0    ? set_colour(p, value)
+                : strcmp(name, "radius") == 0    ? set_radius(p, value)
+                : strcmp(name, "layer") == 0     ? choose_number(p, value)
+                : strcmp(name, "new-layer") == 0 ? add_layer(p, value)
+                                                 : false;
+    pthread_mutex_unlock(&p->lock);
+    return done;
+}
+
+/* --- news for pages --- */
+
+static void write_text(FILE *f, const char *name, const char *text)
+{
+    fprintf(f, "\"%s\":\"", name);
+    for (; text && *text; text++)
+        if (*text == '"' || *text == '\\')
+            fprintf(f, "\\%c", *text);
+        else if ((unsigned char)*text >= ' ')
+            fputc(*text, f);
+    fputs("\",", f);
+}
+
+static void write_layers(const haptic_paint *p, FILE *f)
+{
+    uint64_t count = info_of(p->drawn).layer_count;
+    fputs("\"layers\":[", f);
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+        ebpo_paint_get_layer(p->drawn, i, &layer);
+        fputs(i ? ",{" : "{", f);
+        write_text(f, "title", layer.title);
+        write_text(f, "author", layer.author);
+        write_text(f, "date", layer.date);
+        write_text(f, "description", layer.description);
+        fprintf(f, "\"colour\":%lu,\"opacity\":%u,\"visible\":%s}", (unsigned long)layer.colour,
+                (unsigned)layer.opacity, layer.visible ? "true" : "false");
+    }
+    fputs("],", f);
+}
+
+/* Writes the points of a stroke from number `first` on, at most `most`. Returns their number. */
+static uint64_t write_stroke(const ebpo_paint_stroke *s, uint64_t number, uint64_t first,
+                             uint64_t most, FILE *f)
+{
+    uint64_t end = s->point_count - first < most ? s->point_count : first + most;
+    fprintf(f,
+            "{\"number\":%llu,\"layer\":%llu,\"erases\":%s,\"colour\":[%u,%u,%u,%u],"
+            "\"radius\":%.17g,\"time\":%llu,\"points\":[",
+            (unsigned long long)number, (unsigned long long)s->layer,
+            s->kind == EBPO_PAINT_ERASES ? "true" : "false", s->colour >> 24 & 255,
+            s->colour >> 16 & 255, s->colour >> 8 & 255, s->colour & 255, s->radius,
+            (unsigned long long)s->time);
+    for (uint64_t i = first; i < end; i++) {
+        const ebpo_paint_point *q = &s->points[i];
+        fprintf(f, "%s[%lu,%lu,%lu,%.17g,%.17g,%.17g,%u,%u,%lu]", i > first ? "," : "",
+                (unsigned long)q->face, (unsigned long)q->weight[0], (unsigned long)q->weight[1],
+                q->place[0], q->place[1], q->place[2], q->size, q->pressure,
+                (unsigned long)q->time);
+    }
+    fputs("]}", f);
+    return end - first;
+}
+
+/* Writes new points, at most MOST in one event. The caller has the lock. */
+static void write_strokes(const haptic_paint *p, haptic_paint_cursor *at, FILE *f)
+{
+    enum { MOST = 4096 };
+    uint64_t count = info_of(p->drawn).stroke_count, room = MOST;
+    const char *comma = "";
+    fputs("\"strokes\":[", f);
+    for (uint64_t i = at->strokes ? at->strokes - 1 : 0; i < count && room; i++) {
+        ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+        ebpo_paint_get_stroke(p->drawn, i, &stroke);
+        if (i >= at->strokes)
+            at->points = 0;
+        at->strokes = i + 1;
+        if (stroke.point_count == at->points)
+            continue;
+        fputs(comma, f);
+        uint64_t written = write_stroke(&stroke, i, at->points, room, f);
+        at->points += written;
+        room -= written;
+        comma = ",";
+    }
+    fputs("]", f);
+}
+
+void haptic_paint_write_news(haptic_paint *p, haptic_paint_cursor *at, FILE *out)
+{
+    pthread_mutex_lock(&p->lock);
+    ebpo_paint_info info = info_of(p->drawn);
+    ebpo_paint_stroke last = EBPO_PAINT_STROKE_INIT;
+    if (at->epoch != p->epoch && at->strokes > 0)
+        at->strokes = at->points = 0; /* everything is sent again */
+    if (info.stroke_count)
+        ebpo_paint_get_stroke(p->drawn, info.stroke_count - 1, &last);
+    if (at->epoch != p->epoch || at->layer_changes != p->layer_changes ||
+        at->strokes != info.stroke_count || at->points != last.point_count) {
+        fprintf(out, "event: paint\ndata: {\"count\":%llu,\"layer\":%llu,",
+                (unsigned long long)at->strokes, (unsigned long long)p->pen.pen.layer);
+        if (at->layer_changes != p->layer_changes || at->epoch != p->epoch)
+            write_layers(p, out);
+        write_strokes(p, at, out);
+        fputs("}\n\n", out);
+        at->epoch = p->epoch;
+        at->layer_changes = p->layer_changes;
+    }
+    pthread_mutex_unlock(&p->lock);
+}
+
+/* --- opening and closing --- */
+
+/* Sets the layer and the colour of the pen. Adds a layer if there is none. */
+static ebpo_status choose_layer(haptic_paint *p, ebpo_error *error)
+{
+    ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+    ebpo_status status = EBPO_OK;
+    ebpo_paint_pen *pen = &p->pen.pen;
+    if (info_of(p->saved).layer_count == 0) {
+        layer.title = "Touched";
+        if (!p->pen.default_colour)
+            layer.colour = pen->colour;
+        status = ebpo_paint_add_layer(p->saved, &layer, NULL, error);
+    }
+    uint64_t layers = info_of(p->saved).layer_count;
+    if (p->pen.default_layer)
+        pen->layer = layers - 1;
+    if (status == EBPO_OK && pen->layer >= layers) {
+        *error = (ebpo_error){ .status = EBPO_E_ARGUMENT, .offset = -1 };
+        snprintf(error->message, sizeof error->message,
+                 "%.200s: layer %llu not found; the file has %llu layers, counted from 0",
+                 p->pen.path, (unsigned long long)pen->layer, (unsigned long long)layers);
+        return EBPO_E_ARGUMENT;
+    }
+    ebpo_paint_get_layer(p->saved, pen->layer, &layer);
+    p->colour = p->pen.default_colour ? layer.colour : pen->colour;
+    pen->colour = pen->kind == EBPO_PAINT_ERASES ? 0 : p->colour;
+    return status;
+}
+
+static ebpo_status open_paints(haptic_paint *p, const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status =
+        ebpo_paint_open_to_change(p->pen.path, file, LOCK_SECONDS, NULL, &p->saved, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_model(p->saved, file, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_points(p->saved, p->context, NULL, error);
+    if (status == EBPO_OK)
+        status = choose_layer(p, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_checkpoint(p->saved, error);
+    return status == EBPO_OK ? ebpo_paint_open(p->pen.path, &p->drawn, error) : status;
+}
+
+static void free_paint(haptic_paint *p)
+{
+    ebpo_paint_drawing_free(p->drawing);
+    ebpo_paint_free(p->drawn);
+    ebpo_paint_free(p->saved);
+    ebpo_context_free(p->context);
+    pthread_mutex_destroy(&p->lock);
+    free(p);
+}
+
+static ebpo_status fail_memory(ebpo_error *error)
+{
+    *error = (ebpo_error){ .status = EBPO_E_MEMORY, .offset = -1 };
+    snprintf(error->message, sizeof error->message,
+             "not enough memory or threads for painting; close other programs");
+    return EBPO_E_MEMORY;
+}
+
+ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const ebpo_file *file,
+                              ebpo_model *model, ebpo_error *error)
+{
+    haptic_paint *p = calloc(1, sizeof *p);
+    *out = NULL;
+    if (!p)
+        return fail_memory(error);
+    pthread_mutex_init(&p->lock, NULL);
+    p->pen = *pen;
+    p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_context_new(model, &p->context, error);
+    if (status == EBPO_OK)
+        status = open_paints(p, file, error);
+    if (status != EBPO_OK) {
+        free_paint(p);
+        return status;
+    }
+    p->copied = p->finished = p->strokes_before = info_of(p->drawn).stroke_count;
+    p->points_before = info_of(p->drawn).point_count;
+    if (command_thread(&p->saver, save_often, p) != 0) {
+        free_paint(p);
+        return fail_memory(error);
+    }
+    *out = p;
+    return EBPO_OK;
+}
+
+ebpo_status haptic_paint_close(haptic_paint *p, haptic_painted *out, ebpo_error *error)
+{
+    if (!p)
+        return EBPO_OK;
+    atomic_store(&p->ended, true);
+    pthread_join(p->saver, NULL);
+    pthread_mutex_lock(&p->lock);
+    lift_pen(p);
+    pthread_mutex_unlock(&p->lock);
+    ebpo_status status = save_paint(p);
+    const ebpo_error *last = status != EBPO_OK ? &p->save_error : &p->error;
+    if (last->status != EBPO_OK)
+        *error = *last;
+    status = last->status;
+    *out = p->result;
+    out->strokes = info_of(p->saved).stroke_count - p->strokes_before;
+    out->points = info_of(p->saved).point_count - p->points_before;
+    free_paint(p);
+    return status;
+}
