@@ -1076,9 +1076,8 @@ async function drawsSurface(browser, address) {
   await settled(page);
   assert.ok(Math.abs(Math.hypot(...(await look(page)).box) / size - 1) < 0.1, 'the size of the model remains without perspective');
   await page.keyboard.press('s'); // turntable
-  const eye = () => page.evaluate(() => window.ebpoViewer.scene.place.eye.join()), before = await eye();
-  await page.waitForTimeout(500);
-  assert.notEqual(await eye(), before);
+  const before = await page.evaluate(() => window.ebpoViewer.scene.place.eye.join());
+  await page.waitForFunction((eye) => window.ebpoViewer.scene.place.eye.join() !== eye, before);
   await page.close();
 }
 
