@@ -259,6 +259,7 @@ void ebpo_batch_begin(ebpo_batch *b)
     const ebpo_model *m = b->context->model;
     ebpo_box box = ebpo_model_box(m);
     b->pending_home = EBPO_NO_SUBTREE;
+    b->context->deep_pending = false;
     if (b->as_given)
         return;
     if (m->whole && b->searches_around && are_scattered(&box, b->points, b->count))

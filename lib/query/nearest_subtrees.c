@@ -92,14 +92,16 @@ static ebpo_status read_levels(ebpo_model *m, int level, ebpo_error *error)
 ebpo_status ebpo_deep_bounds_make(ebpo_model *m, ebpo_error *error)
 {
     ebpo_status status = EBPO_E_LIMIT;
+    ebpo_error why = EBPO_ERROR_INIT;
     if (!m->skeletons || atomic_exchange(&m->deep_begun, true))
         return EBPO_OK;
     for (int level = last_deep_level(m); level > m->top->cut_level && status == EBPO_E_LIMIT;
          level--)
-        status = read_levels(m, level, error);
-    if (status == EBPO_E_PENDING)
-        m->deep_begun = false;
-    return status == EBPO_E_PENDING ? status : EBPO_OK;
+        status = read_levels(m, level, &why);
+    if (status != EBPO_E_PENDING)
+        return EBPO_OK;
+    m->deep_begun = false;
+    return ebpo_fail_with(error, &why);
 }
 
 void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
@@ -481,7 +483,8 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
 }
 
 /* Returns true if the deep bounds have less than a quarter of the bytes of the subtrees that this
- * search may have to load without them. (With deep bounds, it loads about a third.) */
+ * search may have to load without them. (With deep bounds, it loads about a third.) Returns false
+ * if the bytes of the deep bounds are not known, because their chunks could not be located. */
 static bool deep_bounds_pay(const searching *g)
 {
     uint32_t needed[EBPO_CACHE_AHEAD];
@@ -492,16 +495,26 @@ static bool deep_bounds_pay(const searching *g)
     for (int level = last_deep_level(m); level > m->top->cut_level; level--)
         ebpo_hint_level(&levels, level, EBPO_PART_MESH);
     double subtree_bytes = (double)m->file->in.source.size / (double)m->top->below_count;
-    return (double)ebpo_hints_bytes(&levels) < 0.25 * subtree_bytes * (double)subtrees;
+    bool known = !levels.failed;
+    double bytes = (double)ebpo_hints_bytes(&levels);
+    return known && bytes < 0.25 * subtree_bytes * (double)subtrees;
 }
 
-/* For a remote file, reads deep bounds as soon as they pay. */
+/* For a remote file, reads deep bounds as soon as they pay. If their bytes are not available yet,
+ * the other points of the batch that need them wait for the next pass without reading them again. A
+ * query with a deadline does not read them, because the read could take longer. */
 static ebpo_status improve_bounds(searching *g, ebpo_error *error)
 {
     ebpo_model *m = g->c->model;
-    bool wanted = g->n->found && !g->ranking.far && !m->deep_begun && m->skeletons &&
-                  ebpo_input_prefetches(&m->file->in);
-    return wanted && deep_bounds_pay(g) ? ebpo_deep_bounds_make(m, error) : EBPO_OK;
+    bool wanted = g->n->found && !g->n->deadline && !g->ranking.far && !m->deep_begun &&
+                  m->skeletons && ebpo_input_prefetches(&m->file->in);
+    if (!wanted || !deep_bounds_pay(g))
+        return EBPO_OK;
+    if (g->c->deep_pending) /* the batch keeps the error of its first pending point */
+        return EBPO_E_PENDING;
+    ebpo_status status = ebpo_deep_bounds_make(m, error);
+    g->c->deep_pending = status == EBPO_E_PENDING;
+    return status;
 }
 
 /* Handles a subtree without skeleton that leaves the queue for the first time. If deep bounds

@@ -82,6 +82,7 @@ struct ebpo_context {
     uint32_t query_number; /* of the current query */
     /* numbers of subtrees that distance queries searched, and that all queries loaded */
     uint64_t searched, loaded;
+    bool deep_pending; /* in this pass over a batch, bytes of deep bounds were not available yet */
     ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */
     ebpo_polytope *cutting;         /* [2] temporary envelopes, which are too large for a small
                                      * stack; NULL before the first use */

@@ -482,7 +482,8 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
         return EBPO_OK;
     if (ebpo_node_is_subtree_root(&node)) {
         uint32_t below = ebpo_entry_value(node.entry);
-        if (!may_search(c, below))
+        /* A ray that waits has no result in this round, so it only marks subtrees. */
+        if (!may_search(c, below) || c->waits)
             return EBPO_OK;
         ebpo_status status = ebpo_model_enter(c->context, &node, error);
         if (status == EBPO_OK)

@@ -571,6 +571,40 @@ START_TEST(test_collision_visits_few_subtrees)
 }
 END_TEST
 
+/* Counts the calls of a progress function. */
+static bool count_call(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)stage, (void)done, (void)total;
+    ++*(int *)user;
+    return true;
+}
+
+/* Two flat boxes whose cells are apart are apart at once, although the balls around their cells
+ * intersect. A search of some thousand pairs of nodes would report its progress. */
+START_TEST(test_flat_models_are_apart_at_once)
+{
+    enum { CUT = 4 };
+    int calls = 0;
+    int32_t found = -1;
+    query_model m;
+    ebpo_face_pair pair;
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    query_model_make(&m, "flat box",
+                     ebpo_test_box((double[]){ 0, 0, 0 }, (double[]){ 10, 10, 0.1 }, 32),
+                     &query_variants[0]);
+    ebpo_model *part = open_part(&m, CUT, NULL);
+    ebpo_collider *parts = meet(part, part);
+    options.pose_b.translation[2] = 0.25;
+    options.progress = (ebpo_progress){ count_call, &calls };
+    ASSERT_OK(ebpo_collide_first(parts, &options, &pair, &found, error));
+    ck_assert_int_eq(found, 0);
+    ck_assert_int_eq(calls, 0);
+    ebpo_collider_free(parts);
+    ebpo_model_free(part);
+    query_model_free(&m);
+}
+END_TEST
+
 /* A model that takes up to half of the budget is loaded completely; its memory is returned
  * afterwards. */
 START_TEST(test_small_models_load_whole)
@@ -604,6 +638,7 @@ TEST_SUITE(collide_parts)
     tcase_add_loop_test(tests, test_partly_loaded_collision_matches_whole, 0, NAMES * NAMES);
     tcase_add_test(tests, test_collision_shares_one_budget);
     tcase_add_test(tests, test_collision_visits_few_subtrees);
+    tcase_add_test(tests, test_flat_models_are_apart_at_once);
     tcase_add_test(tests, test_small_models_load_whole);
     Suite *suite = suite_create("collide_parts");
     suite_add_tcase(suite, tests);

@@ -9,6 +9,7 @@
 
 #include "check_main.h"
 #include "counted_source.h"
+#include "query/query_model.h"
 #include "scratch.h"
 #include "solids.h"
 #include "two_layouts.h"
@@ -110,6 +111,40 @@ START_TEST(test_remote_axis_query_bytes)
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
     ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
     ck_assert(a.distance == b.distance);
+}
+END_TEST
+
+/* Returns true if a cold distance query of a remote file reads deep bounds. */
+static bool reads_deep_bounds(uint64_t deadline_ns)
+{
+    static const double p[3] = { 0.05, 0.02, 0.01 };
+    counted_source c;
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_distance_options how = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result distance;
+    ebpo_model *model;
+    ebpo_context *context;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    how.deadline_ns = deadline_ns;
+    ck_assert(ebpo_model_new(far, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert(ebpo_distance(context, p, &how, &distance, NULL) == EBPO_OK);
+    bool begun = model->deep_begun;
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    counted_close(&c, far);
+    return begun;
+}
+
+/* A query with a deadline does not begin to read deep bounds, because it could not stop the read.
+ */
+START_TEST(test_deadline_reads_no_deep_bounds)
+{
+    const uint64_t hour = UINT64_C(3600000000000);
+    ck_assert(reads_deep_bounds(0));
+    ck_assert(!reads_deep_bounds(hour));
 }
 END_TEST
 
@@ -349,6 +384,7 @@ TEST_SUITE(round_trips)
     tcase_add_unchecked_fixture(large, make_large, free_large);
     tcase_add_test(large, test_remote_deep_query_round_trips);
     tcase_add_test(large, test_remote_axis_query_bytes);
+    tcase_add_test(large, test_deadline_reads_no_deep_bounds);
     tcase_add_test(large, test_remote_rays_round_trips);
     tcase_add_test(large, test_remote_radius_query_round_trips);
     tcase_add_test(large, test_remote_box_query_round_trips);

@@ -265,6 +265,12 @@ double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
            (double)(1u << cell.level);
 }
 
+double ebpo_posed_shortest_side(const ebpo_posed_subtrees *s, ebpo_cell cell)
+{
+    const double *size = s->model->info->box_size;
+    return fmin(size[0], fmin(size[1], size[2])) * s->posing.scale / (double)(1u << cell.level);
+}
+
 /* --- envelopes --- */
 
 /* Cuts an envelope by the planes of a node. */

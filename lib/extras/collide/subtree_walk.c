@@ -71,6 +71,8 @@ typedef struct subtree_pair_search {
     ebpo_error *error;
 } subtree_pair_search;
 
+static const char stage[] = "pairs of subtrees"; /* for the progress function */
+
 /* --- pairs of nodes --- */
 
 /* Returns the sum of the error bounds of both nodes' envelopes. */
@@ -301,7 +303,6 @@ static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a
 
 /* A pair of nodes. */
 typedef struct waiting_nodes {
-    double apart; /* of the nodes, as subtree_pair.apart */
     double bound; /* lower bound of subtree_pair.apart of all pairs of subtrees below the nodes */
     ebpo_posed_node node[2];
     uint32_t rank[2]; /* if both nodes are roots of subtrees: ranks of the subtrees */
@@ -325,11 +326,18 @@ EBPO_HEAP(nearest, waiting_nodes, comes_before)
  * of `apart`, then of their ranks. Most pairs are never needed, and their envelopes are not
  * computed. */
 typedef struct nearest_pairs {
+    const ebpo_collision *collision;
     subtree_pair_search search;
     double least; /* as in apart_bound */
     waiting_nodes *heap;
     uint64_t count, capacity;
+    uint64_t steps; /* number of pairs that have left the heap */
+    uint64_t found; /* number of pairs of subtrees found so far */
+    bool late;      /* the deadline passed before the next pair was found */
 } nearest_pairs;
+
+/* Number of steps after which the deadline and the progress function are tested. */
+enum { STEPS_AT_A_TIME = 4096 };
 
 /* Returns the length of the diagonal of a model's smallest subtrees. */
 static double least_diagonal(const ebpo_posed_subtrees *s)
@@ -338,8 +346,23 @@ static double least_diagonal(const ebpo_posed_subtrees *s)
     return ebpo_posed_diagonal(s, (ebpo_cell){ .level = level });
 }
 
-/* Adds a pair of nodes to the heap, unless their cells are in balls that are certainly apart.
- * bound: bound of the nodes that contain them. */
+/* Returns true if the cells of two nodes are in balls that are certainly apart, or are certainly
+ * apart themselves. apart: of the nodes, as subtree_pair.apart. sum: of their diagonals. The cells
+ * certainly have a common point if the middles are closer than half the sum of the shortest sides.
+ */
+static bool nodes_apart(const subtree_pair_search *f, const ebpo_posed_node node[2], double apart,
+                        double sum)
+{
+    double sides = 0, slack = slack_of(f, node);
+    if ((apart - 1) * sum > 0x1p-40 * sum + 4 * slack)
+        return true;
+    for (int i = 0; i < 2; i++)
+        sides += ebpo_posed_shortest_side(f->side[i], node[i].cell);
+    return apart * sum >= sides && cells_apart(f, node);
+}
+
+/* Adds a pair of nodes to the heap, unless their cells are certainly apart. bound: bound of the
+ * nodes that contain them. */
 static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], double bound)
 {
     const subtree_pair_search *f = &p->search;
@@ -349,14 +372,12 @@ static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], d
             return EBPO_OK;
         added.ends = added.ends && ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
     }
-    double sum = diagonals_of(f, node);
-    added.apart = apart_of(f, node);
-    if ((added.apart - 1) * sum > 0x1p-40 * sum + 4 * slack_of(f, node))
+    double sum = diagonals_of(f, node), apart = apart_of(f, node);
+    if (nodes_apart(f, node, apart, sum))
         return EBPO_OK;
     for (int i = 0; added.ends && i < 2; i++)
         added.rank[i] = f->side[i]->rank[ebpo_entry_value(node[i].entry)];
-    added.bound =
-        added.ends ? added.apart : fmax(bound, apart_bound(f, added.apart, sum, p->least));
+    added.bound = added.ends ? apart : fmax(bound, apart_bound(f, apart, sum, p->least));
     if (!ebpo_grow(&p->heap, &p->capacity, p->count + 1, sizeof *p->heap))
         return ebpo_fail_memory(f->error, (p->count + 1) * sizeof *p->heap);
     nearest_add(p->heap, p->count++, &added);
@@ -364,45 +385,66 @@ static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], d
 }
 
 /* Begins with the roots of both trees. The caller frees p->heap, even after a failure. */
-static ebpo_status begin_nearest(nearest_pairs *p, ebpo_posed_subtrees *a, ebpo_posed_subtrees *b,
-                                 double max_coordinate, ebpo_error *error)
+static ebpo_status begin_nearest(nearest_pairs *p, const ebpo_collision *q, ebpo_posed_subtrees *a,
+                                 ebpo_posed_subtrees *b, ebpo_error *error)
 {
     ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
-    *p = (nearest_pairs){ .search = { NULL, { a, b }, max_coordinate, false, error },
+    *p = (nearest_pairs){ .collision = q,
+                          .search = { NULL, { a, b }, q->max_coordinate, false, error },
                           .least = least_diagonal(a) + least_diagonal(b) };
     return push_nodes(p, root, 0);
 }
 
-/* Finds the next pair of subtrees. *more: false if there are no more pairs. */
-static ebpo_status next_nearest(nearest_pairs *p, subtree_pair *out, bool *more)
+/* Divides a node of a pair, and adds the new pairs to the heap. */
+static ebpo_status divide_nodes(nearest_pairs *p, const waiting_nodes *pair)
 {
-    /* the cells of nodes with a smaller value of `apart` are not tested, as they nearly always
-     * have a common point */
-    static const double tested = 0.5;
     const subtree_pair_search *f = &p->search;
     ebpo_status status = EBPO_OK;
-    while (status == EBPO_OK && p->count) {
+    bool is_root[2];
+    for (int i = 0; i < 2; i++)
+        is_root[i] = ebpo_entry_kind_of(pair->node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
+    int divided = divided_of(f, pair->node, is_root);
+    ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        part[divided] = ebpo_posed_child(f->side[divided], &pair->node[divided], octant);
+        status = push_nodes(p, part, pair->bound);
+    }
+    return status;
+}
+
+/* Tests the deadline and the progress function after some steps. Sets p->late. */
+static ebpo_status count_step(nearest_pairs *p)
+{
+    if (++p->steps % STEPS_AT_A_TIME)
+        return EBPO_OK;
+    p->late = ebpo_collision_is_late(p->collision);
+    return ebpo_progress_step(&p->collision->options.progress, stage, p->found, 0, p->search.error)
+               ? EBPO_OK
+               : EBPO_E_CANCELLED;
+}
+
+/* Finds the next pair of subtrees. *more: false if there are no more pairs, or after the deadline
+ * (p->late). */
+static ebpo_status next_nearest(nearest_pairs *p, subtree_pair *out, bool *more)
+{
+    ebpo_status status = EBPO_OK;
+    *more = false;
+    while (status == EBPO_OK && p->count && !p->late) {
         waiting_nodes next = nearest_take(p->heap, p->count--);
-        bool is_root[2], apart = next.apart >= tested && cells_apart(f, next.node);
-        if (!apart && next.ends)
-            status = envelopes_apart(f, next.node, &apart);
-        if (status != EBPO_OK || apart)
-            continue;
-        if (next.ends) {
-            *out = pair_of(f, next.node);
+        bool apart = true;
+        if (!next.ends)
+            status = divide_nodes(p, &next);
+        else
+            status = envelopes_apart(&p->search, next.node, &apart);
+        if (status == EBPO_OK && !apart) {
+            *out = pair_of(&p->search, next.node);
             *more = true;
+            p->found++;
             return EBPO_OK;
         }
-        for (int i = 0; i < 2; i++)
-            is_root[i] = ebpo_entry_kind_of(next.node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
-        int divided = divided_of(f, next.node, is_root);
-        ebpo_posed_node part[2] = { next.node[0], next.node[1] };
-        for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-            part[divided] = ebpo_posed_child(f->side[divided], &next.node[divided], octant);
-            status = push_nodes(p, part, next.bound);
-        }
+        if (status == EBPO_OK)
+            status = count_step(p);
     }
-    *more = false;
     return status;
 }
 
@@ -551,8 +593,6 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
 }
 
 /* --- state of all threads --- */
-
-static const char stage[] = "pairs of subtrees"; /* for the progress function */
 
 /* Number of consecutive pairs of subtrees that a thread searches at a time. In most cases these
  * pairs have the same first subtree, which the thread loads once. */
@@ -820,10 +860,12 @@ static ebpo_status search_first_parts(gathering_parts *g, nearest_pairs *pairs, 
 {
     const ebpo_collision *q = g->collision;
     subtree_walk *w = &g->walk[0];
-    for (uint64_t i = 0;; i++) {
+    for (;;) {
         subtree_pair pair;
         bool more;
         ebpo_status status = next_nearest(pairs, &pair, &more);
+        if (pairs->late)
+            *found = -1;
         if (status != EBPO_OK || !more)
             return status;
         count_pair(g, &pair, visited);
@@ -838,7 +880,7 @@ static ebpo_status search_first_parts(gathering_parts *g, nearest_pairs *pairs, 
             *out = face_pair_of(q, &w->stored[0]);
             return EBPO_OK;
         }
-        if (!ebpo_progress_step(&q->options.progress, stage, i, 0, error))
+        if (!ebpo_progress_step(&q->options.progress, stage, pairs->found - 1, 0, error))
             return EBPO_E_CANCELLED;
     }
 }
@@ -857,7 +899,7 @@ ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, in
             status = ebpo_fail_memory(error, g.subtrees[i].count);
     }
     if (status == EBPO_OK)
-        status = begin_nearest(&pairs, &g.subtrees[0], &g.subtrees[1], q->max_coordinate, error);
+        status = begin_nearest(&pairs, q, &g.subtrees[0], &g.subtrees[1], error);
     if (status == EBPO_OK)
         status = search_first_parts(&g, &pairs, visited, out, found, error);
     free(pairs.heap);
