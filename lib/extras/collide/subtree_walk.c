@@ -303,6 +303,7 @@ static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a
 
 /* A pair of nodes. */
 typedef struct waiting_nodes {
+    double apart; /* of the nodes, as subtree_pair.apart */
     double bound; /* lower bound of subtree_pair.apart of all pairs of subtrees below the nodes */
     ebpo_posed_node node[2];
     uint32_t rank[2]; /* if both nodes are roots of subtrees: ranks of the subtrees */
@@ -346,23 +347,19 @@ static double least_diagonal(const ebpo_posed_subtrees *s)
     return ebpo_posed_diagonal(s, (ebpo_cell){ .level = level });
 }
 
-/* Returns true if the cells of two nodes are in balls that are certainly apart, or are certainly
- * apart themselves. apart: of the nodes, as subtree_pair.apart. sum: of their diagonals. The cells
- * certainly have a common point if the middles are closer than half the sum of the shortest sides.
+/* Returns true if the cells of a pair are certainly apart. They have a common point if the middles
+ * are closer than half the sum of the shortest sides; this quick test is sufficient for most pairs.
  */
-static bool nodes_apart(const subtree_pair_search *f, const ebpo_posed_node node[2], double apart,
-                        double sum)
+static bool waiting_apart(const subtree_pair_search *f, const waiting_nodes *pair)
 {
-    double sides = 0, slack = slack_of(f, node);
-    if ((apart - 1) * sum > 0x1p-40 * sum + 4 * slack)
-        return true;
+    double sides = 0;
     for (int i = 0; i < 2; i++)
-        sides += ebpo_posed_shortest_side(f->side[i], node[i].cell);
-    return apart * sum >= sides && cells_apart(f, node);
+        sides += ebpo_posed_shortest_side(f->side[i], pair->node[i].cell);
+    return pair->apart * diagonals_of(f, pair->node) >= sides && cells_apart(f, pair->node);
 }
 
-/* Adds a pair of nodes to the heap, unless their cells are certainly apart. bound: bound of the
- * nodes that contain them. */
+/* Adds a pair of nodes to the heap, unless their cells are in balls that are certainly apart.
+ * bound: bound of the nodes that contain them. */
 static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], double bound)
 {
     const subtree_pair_search *f = &p->search;
@@ -372,12 +369,14 @@ static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], d
             return EBPO_OK;
         added.ends = added.ends && ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
     }
-    double sum = diagonals_of(f, node), apart = apart_of(f, node);
-    if (nodes_apart(f, node, apart, sum))
+    double sum = diagonals_of(f, node);
+    added.apart = apart_of(f, node);
+    if ((added.apart - 1) * sum > 0x1p-40 * sum + 4 * slack_of(f, node))
         return EBPO_OK;
     for (int i = 0; added.ends && i < 2; i++)
         added.rank[i] = f->side[i]->rank[ebpo_entry_value(node[i].entry)];
-    added.bound = added.ends ? apart : fmax(bound, apart_bound(f, apart, sum, p->least));
+    added.bound =
+        added.ends ? added.apart : fmax(bound, apart_bound(f, added.apart, sum, p->least));
     if (!ebpo_grow(&p->heap, &p->capacity, p->count + 1, sizeof *p->heap))
         return ebpo_fail_memory(f->error, (p->count + 1) * sizeof *p->heap);
     nearest_add(p->heap, p->count++, &added);
@@ -431,12 +430,12 @@ static ebpo_status next_nearest(nearest_pairs *p, subtree_pair *out, bool *more)
     *more = false;
     while (status == EBPO_OK && p->count && !p->late) {
         waiting_nodes next = nearest_take(p->heap, p->count--);
-        bool apart = true;
-        if (!next.ends)
-            status = divide_nodes(p, &next);
-        else
+        bool apart = waiting_apart(&p->search, &next);
+        if (!apart && next.ends)
             status = envelopes_apart(&p->search, next.node, &apart);
-        if (status == EBPO_OK && !apart) {
+        else if (!apart)
+            status = divide_nodes(p, &next);
+        if (status == EBPO_OK && !apart && next.ends) {
             *out = pair_of(&p->search, next.node);
             *more = true;
             p->found++;
