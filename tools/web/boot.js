@@ -44,8 +44,10 @@
   const parsed = new Promise((done) => addEventListener('DOMContentLoaded', done, { once: true }));
   const begin = () => (boot.app ??= parsed.then(() => import('./app.js')).catch((error) => {
     boot.over();
-    document.documentElement.classList.add('opening');
-    document.getElementById('openingText').textContent = `The page's code could not be run (${error.message}); reload the page`;
+    if (document.getElementById('error').hidden) { // app.js has not explained the error
+      document.documentElement.classList.add('opening');
+      document.getElementById('openingText').textContent = `The page's code could not be run (${error.message}); reload the page`;
+    }
     reportError(error);
   }));
 
