@@ -134,7 +134,7 @@ test('a server that stalls in the middle of a body', () => fails((reply, n, resp
 test('bytes changed during transfer are detected', () => fails((reply, n) => {
   if (n === 1)
     reply.body = Buffer.from(reply.body).fill(0, 3000, 3010);
-}, 'FORMAT', /checksum differs/));
+}, 'FORMAT', /the checksum of the object's header differs/));
 test('no server', async () => {
   const url = await serve(undefined, (address) => address);
   await assert.rejects(readAll(url), (error) => error instanceof EbpoError && error.code === 'NETWORK' && /request failed/.test(error.message));
