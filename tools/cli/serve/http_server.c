@@ -452,9 +452,10 @@ bool http_server_run(int listener, const http_service *service)
         server.slot[i].socket = -1;
     fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
     signal(SIGPIPE, SIG_IGN);             /* if a client has left, send returns an error */
-    if (!accept_all(&server, listener, service->stop))
-        return false;
+    bool accepted = accept_all(&server, listener, service->stop);
+    int saved = errno;
     close(listener);
     end_all(&server);
-    return true;
+    errno = saved;
+    return accepted;
 }
