@@ -207,6 +207,63 @@ def test_full_disk(t, recovers):
     check(now > saved if recovers else now == saved, saved, now)
 
 
+def request(port, first, *fields):
+    """Sends a request to the viewer. Returns (first bytes of the response, socket)."""
+    s = socket.create_connection(("127.0.0.1", port), timeout=20)
+    lines = (first + " HTTP/1.1", f"Host: 127.0.0.1:{port}", *fields)
+    s.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+    return s.recv(4096), s
+
+
+def press(port, x, z=0.99):
+    body = f"press {x} 0.5 {z}"
+    head, s = request(port, "POST /device", f"Origin: http://127.0.0.1:{port}", f"Content-Length: {len(body)}\r\n\r\n{body}")
+    s.close()
+    check(b" 204 " in head, head)
+    time.sleep(0.2)
+
+
+def ends(page):
+    """Returns true if the server ends the connection in a few seconds."""
+    end = time.monotonic() + 5
+    while time.monotonic() < end:
+        try:
+            if not page.recv(65536):
+                return True
+        except ConnectionError:
+            return True
+    return False
+
+
+def test_view(t):
+    """Other sites get no events and cannot frame the page. The pen is lifted when the last page has left. If the
+    server fails, the device continues."""
+    paint, viewer = t.at("view.paint.h5"), t.at("viewer")
+    os.mkdir(viewer)
+    with open(os.path.join(viewer, "index.html"), "w", encoding="ascii") as out:
+        out.write("<p>the page</p>")
+    p = t.start(paint, "--view", "--viewer", viewer, "--port", "0", "--device", "viewer", "--seconds", "9")
+    port = int(re.search(r"127\.0\.0\.1:(\d+)/", p.stderr.readline())[1])
+    for site, status in (("cross-site", b" 403 "), ("same-site", b" 403 "), ("same-origin", b" 200 ")):
+        head, page = request(port, "GET /live", "Sec-Fetch-Site: " + site)
+        check(status in head and b"\r\nContent-Security-Policy: frame-ancestors 'self'\r\n" in head, site, head)
+    press(port, 0.4, 1.05)
+    press(port, 0.4)
+    page.close()
+    time.sleep(0.3)
+    page = request(port, "GET /live")[1]
+    press(port, 0.45)
+    unlimited = resource.prlimit(p.pid, resource.RLIMIT_NOFILE, (1, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+    socket.create_connection(("127.0.0.1", port)).close()
+    ended = ends(page)
+    resource.prlimit(p.pid, resource.RLIMIT_NOFILE, unlimited)
+    p.send_signal(signal.SIGTERM)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and "the server of the viewer cannot run: Invalid argument" in err, p.returncode, err)
+    check(ended, "the connection of a page stays open after the server has failed")
+    check(json.loads(out)["paint"]["strokes"] == 2, "the pen was not lifted", out)
+
+
 def main(ebpo):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
@@ -215,6 +272,7 @@ def main(ebpo):
         test_kill(t)
         test_second_writer(t)
         test_lifted_pen(t)
+        test_view(t)
         test_full_disk(t, True)
         test_full_disk(t, False)
 
