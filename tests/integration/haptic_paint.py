@@ -125,6 +125,24 @@ def test_replay(t):
     check(all(abs(p["place"][1] - 0.7) < 1e-9 for p in second["points"]), "paint between two contacts")
 
 
+def test_gap(t):
+    """A pen that crosses a gap in less than the time of a lift paints on both sides, and not through the air."""
+    path, paint, faces = t.at("gap"), t.at("gap.paint.h5"), CUBE.split("end_header\n")[1].splitlines()
+    with open(t.at("two.ply"), "w", encoding="ascii") as out:
+        out.write(CUBE.split("end_header")[0].replace("vertex 8", "vertex 16").replace("face 12", "face 24") + "end_header\n")
+        out.writelines(f"{x + 1.3 * far:g} {y} {z}\n" for far in (0, 1) for x, y, z in (map(int, v.split()) for v in faces[:8]))
+        out.writelines(f"3 {' '.join(str(int(i) + 8 * far) for i in f.split()[1:])}\n" for far in (0, 1) for f in faces[8:])
+    model = t.at("two.ebpo.h5")
+    t.run("convert", "-q", t.at("two.ply"), model)
+    line(path, [(1.1 - 0.11 * min(1, i / 100), 0.2, 0.5) for i in range(150)] +
+         [(0.99 + 0.32 * i / 20, 0.2 + 0.6 * i / 20, 0.5) for i in range(20)] + [(1.31, 0.8, 0.5)] * 150)
+    t.run("haptic", "--path", path, "--paint", paint, "--pen-radius", str(RADIUS), model)
+    strokes = json.loads(t.run("paint", "--json", "--points", paint, model))["strokes"]
+    places = [q["place"] for s in strokes for q in s["points"]]
+    check({round(p[0], 6) for p in places} == {1, 1.3}, places)
+    check(all(p[1] < 0.3 or p[1] > 0.7 for p in places), "paint along the way through the air", places)
+
+
 def test_erase(t):
     """Painting continues an existing file; an eraser adds an erasing stroke to the layer."""
     paint = t.at("a.paint.h5")
@@ -268,6 +286,7 @@ def main(ebpo):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
         test_replay(t)
+        test_gap(t)
         test_erase(t)
         test_kill(t)
         test_second_writer(t)
