@@ -350,6 +350,8 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     return status;
 }
 
+void ebpo_publish_unlock(int fd) { (void)flock(fd, LOCK_UN); }
+
 /* Exchanges the names of the temporary file and the target. Then the previous file has the
  * temporary name. Returns false on failure, with errno. ENOENT: the target is missing. */
 static bool exchange_files(const ebpo_publish *publish)

@@ -90,6 +90,11 @@ FILE *ebpo_publish_stream(ebpo_publish *publish);
  */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
+/* Releases the lock that showed that the temporary file was in use. Needed if a copy of publish.fd
+ * stays open after the commit, because readers that lock files, such as the HDF5 library, could not
+ * open the published file. */
+void ebpo_publish_unlock(int fd);
+
 /* Same as ebpo_publish_commit for two files that belong together. On success, both files are
  * replaced. On failure, no file is replaced, with two exceptions. If only the sync of a folder
  * fails, both files are replaced. On file systems without atomic exchange, the first file may be

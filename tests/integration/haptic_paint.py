@@ -2,6 +2,7 @@
 
 The device is this script, which sends UDP packets, or a recorded path. The model is a cube; the pen moves on its top.
 """
+import fcntl
 import json
 import os
 import re
@@ -124,6 +125,24 @@ def test_replay(t):
     check(all(abs(p["place"][1] - 0.7) < 1e-9 for p in second["points"]), "paint between two contacts")
 
 
+def test_gap(t):
+    """A pen that crosses a gap in less than the time of a lift paints on both sides, and not through the air."""
+    path, paint, faces = t.at("gap"), t.at("gap.paint.h5"), CUBE.split("end_header\n")[1].splitlines()
+    with open(t.at("two.ply"), "w", encoding="ascii") as out:
+        out.write(CUBE.split("end_header")[0].replace("vertex 8", "vertex 16").replace("face 12", "face 24") + "end_header\n")
+        out.writelines(f"{x + 1.3 * far:g} {y} {z}\n" for far in (0, 1) for x, y, z in (map(int, v.split()) for v in faces[:8]))
+        out.writelines(f"3 {' '.join(str(int(i) + 8 * far) for i in f.split()[1:])}\n" for far in (0, 1) for f in faces[8:])
+    model = t.at("two.ebpo.h5")
+    t.run("convert", "-q", t.at("two.ply"), model)
+    line(path, [(1.1 - 0.11 * min(1, i / 100), 0.2, 0.5) for i in range(150)] +
+         [(0.99 + 0.32 * i / 20, 0.2 + 0.6 * i / 20, 0.5) for i in range(20)] + [(1.31, 0.8, 0.5)] * 150)
+    t.run("haptic", "--path", path, "--paint", paint, "--pen-radius", str(RADIUS), model)
+    strokes = json.loads(t.run("paint", "--json", "--points", paint, model))["strokes"]
+    places = [q["place"] for s in strokes for q in s["points"]]
+    check({round(p[0], 6) for p in places} == {1, 1.3}, places)
+    check(all(p[1] < 0.3 or p[1] > 0.7 for p in places), "paint along the way through the air", places)
+
+
 def test_erase(t):
     """Painting continues an existing file; an eraser adds an erasing stroke to the layer."""
     paint = t.at("a.paint.h5")
@@ -149,7 +168,7 @@ def test_kill(t):
 
 
 def test_second_writer(t):
-    """Another program cannot paint in the same file; the first one continues. SIGINT ends with everything saved."""
+    """Other programs can read the file, but not paint in it; the first one continues. SIGINT ends with all saved."""
     paint = t.at("one.paint.h5")
     p = t.start(paint, "--device", "udp:0", "--seconds", "9")
     device, second = Device(p), []
@@ -157,6 +176,8 @@ def test_second_writer(t):
     def begin_second(now):
         if now > 0.5 and not second:
             second.append(t.start(paint, "--seconds", "1"))
+            with open(paint, "rb") as reader:
+                fcntl.flock(reader, fcntl.LOCK_SH | fcntl.LOCK_NB)  # as the HDF5 library does
 
     sent = device.draw(p, 2.5, begin_second)
     p.send_signal(signal.SIGINT)
@@ -204,14 +225,73 @@ def test_full_disk(t, recovers):
     check(now > saved if recovers else now == saved, saved, now)
 
 
+def request(port, first, *fields):
+    """Sends a request to the viewer. Returns (first bytes of the response, socket)."""
+    s = socket.create_connection(("127.0.0.1", port), timeout=20)
+    lines = (first + " HTTP/1.1", f"Host: 127.0.0.1:{port}", *fields)
+    s.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+    return s.recv(4096), s
+
+
+def press(port, x, z=0.99):
+    body = f"press {x} 0.5 {z}"
+    head, s = request(port, "POST /device", f"Origin: http://127.0.0.1:{port}", f"Content-Length: {len(body)}\r\n\r\n{body}")
+    s.close()
+    check(b" 204 " in head, head)
+    time.sleep(0.2)
+
+
+def ends(page):
+    """Returns true if the server ends the connection in a few seconds."""
+    end = time.monotonic() + 5
+    while time.monotonic() < end:
+        try:
+            if not page.recv(65536):
+                return True
+        except ConnectionError:
+            return True
+    return False
+
+
+def test_view(t):
+    """Other sites get no events and cannot frame the page. The pen is lifted when the last page has left. If the
+    server fails, the device continues."""
+    paint, viewer = t.at("view.paint.h5"), t.at("viewer")
+    os.mkdir(viewer)
+    with open(os.path.join(viewer, "index.html"), "w", encoding="ascii") as out:
+        out.write("<p>the page</p>")
+    p = t.start(paint, "--view", "--viewer", viewer, "--port", "0", "--device", "viewer", "--seconds", "9")
+    port = int(re.search(r"127\.0\.0\.1:(\d+)/", p.stderr.readline())[1])
+    for site, status in (("cross-site", b" 403 "), ("same-site", b" 403 "), ("same-origin", b" 200 ")):
+        head, page = request(port, "GET /live", "Sec-Fetch-Site: " + site)
+        check(status in head and b"\r\nContent-Security-Policy: frame-ancestors 'self'\r\n" in head, site, head)
+    press(port, 0.4, 1.05)
+    press(port, 0.4)
+    page.close()
+    time.sleep(0.3)
+    page = request(port, "GET /live")[1]
+    press(port, 0.45)
+    unlimited = resource.prlimit(p.pid, resource.RLIMIT_NOFILE, (1, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+    socket.create_connection(("127.0.0.1", port)).close()
+    ended = ends(page)
+    resource.prlimit(p.pid, resource.RLIMIT_NOFILE, unlimited)
+    p.send_signal(signal.SIGTERM)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and "the server of the viewer cannot run: Invalid argument" in err, p.returncode, err)
+    check(ended, "the connection of a page stays open after the server has failed")
+    check(json.loads(out)["paint"]["strokes"] == 2, "the pen was not lifted", out)
+
+
 def main(ebpo):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
         test_replay(t)
+        test_gap(t)
         test_erase(t)
         test_kill(t)
         test_second_writer(t)
         test_lifted_pen(t)
+        test_view(t)
         test_full_disk(t, True)
         test_full_disk(t, False)
 

@@ -178,6 +178,7 @@ static void remember_version(ebpo_paint_file *f, char *path, int fd)
     free(f->path);
     f->path = path;
     f->fd = fd;
+    ebpo_publish_unlock(fd);
     f->version = ebpo_file_version_of(fd);
 }
 

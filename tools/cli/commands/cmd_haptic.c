@@ -353,6 +353,8 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
     pen.dated = v->device != NULL;
     pen.stiffness = v->stiffness;
     pen.full_force = full_force(j);
+    pen.rate = v->rate;
+    pen.diagonal = model_diagonal(ebpo_file_info(j->file));
     return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
 }
 

@@ -21,6 +21,13 @@
 /* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
 enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
 
+/* Maximum number of steps that are painted while the lock is held. */
+enum { SLICE = 16 };
+
+/* Shortest step of the pen, as a share of the model's diagonal. It bounds the work for a movement
+ * with a thin pen. */
+static const double SHORTEST_STEP = 1e-5;
+
 /* Seconds to wait for another program that changes the file. */
 static const double LOCK_SECONDS = 1;
 
@@ -29,7 +36,9 @@ static const double LIFT_MS = 30;
 
 struct haptic_paint {
     haptic_pen pen;
-    uint32_t colour; /* of the pen when it does not erase */
+    uint32_t colour;   /* of the pen when it does not erase */
+    double step_least; /* minimum length of a step of the pen */
+    double lost_ms;    /* time between two steps in contact above which steps were lost */
     ebpo_context *context;
     /* Used by the thread that paints. */
     ebpo_paint_drawing *drawing; /* NULL: the pen is lifted */
@@ -168,6 +177,9 @@ static void lift_pen(haptic_paint *p)
 static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
 {
     ebpo_paint_pen pen = p->pen.pen;
+    double reach = fmax(pen.radius, pen.spread);
+    pen.step = fmax(reach / 2, p->step_least);
+    pen.within = fmax(reach, p->step_least); /* nothing is painted through the air */
     pen.pressure_step = 0x1p-4;
     pen.seed = 1 + info_of(p->drawn).stroke_count;
     pen.time = p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
@@ -200,26 +212,36 @@ static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64
         report_painting(p, &error);
 }
 
+/* Takes the next step, or steps in contact without a long gap. Returns their number. The caller has
+ * the lock. */
+static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_t count)
+{
+    ebpo_paint_input input[SLICE];
+    uint64_t n = 0;
+    bool touches = is_touching(&samples[0]);
+    if (samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS))
+        lift_pen(p);
+    if (!touches)
+        return 1;
+    /* Between two touches with a long gap, steps were lost. */
+    for (p->touched = samples[0].time; n < SLICE && n < count && is_touching(&samples[n]) &&
+                                       samples[n].time - p->touched <= p->lost_ms;
+         n++) {
+        input[n] = input_of(p, &samples[n]);
+        p->touched = samples[n].time;
+    }
+    paint_contact(p, input, n);
+    return n;
+}
+
 void haptic_paint_take(void *user, const haptic_sample *samples, uint64_t count)
 {
-    enum { MOST = 256 };
     haptic_paint *p = user;
-    ebpo_paint_input input[MOST];
-    pthread_mutex_lock(&p->lock);
     for (uint64_t i = 0; i < count;) {
-        uint64_t n = 0;
-        if (!is_touching(&samples[i])) {
-            if (samples[i].time - p->touched > LIFT_MS)
-                lift_pen(p);
-            i++;
-            continue;
-        }
-        for (; n < MOST && i < count && is_touching(&samples[i]); n++, i++)
-            input[n] = input_of(p, &samples[i]);
-        p->touched = samples[i - 1].time;
-        paint_contact(p, input, n);
+        pthread_mutex_lock(&p->lock);
+        i += take_some(p, samples + i, count - i);
+        pthread_mutex_unlock(&p->lock);
     }
-    pthread_mutex_unlock(&p->lock);
 }
 
 /* --- commands --- */
@@ -487,6 +509,8 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
         return fail_memory(error);
     pthread_mutex_init(&p->lock, NULL);
     p->pen = *pen;
+    p->step_least = SHORTEST_STEP * pen->diagonal;
+    p->lost_ms = fmax(LIFT_MS, 1500 / pen->rate);
     p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
     ebpo_status status = ebpo_context_new(model, &p->context, error);
     if (status == EBPO_OK)

@@ -17,6 +17,8 @@ typedef struct haptic_pen {
     bool default_layer;  /* pen.layer is the topmost one */
     bool dated;          /* strokes have the time at which they begin */
     double stiffness, full_force;
+    double diagonal; /* of the model's box */
+    double rate;     /* steps per second */
 } haptic_pen;
 
 /* Results of painting. */

@@ -104,6 +104,14 @@ static char *make_news(haptic_view *view, uint64_t *taken, haptic_paint_cursor *
     return NULL;
 }
 
+/* Lifts the pen of a page that is the device. */
+static void lift_pen(haptic_view *view)
+{
+    pthread_mutex_lock(&view->pose_lock);
+    view->pose.lifted = true;
+    pthread_mutex_unlock(&view->pose_lock);
+}
+
 /* An http_stream_fn. */
 static void stream_news(void *user, http_stream *stream)
 {
@@ -137,7 +145,8 @@ static void stream_news(void *user, http_stream *stream)
         (void)http_stream_send(stream, "event: end\ndata: {}\n\n", 21);
     else if (!atomic_load(&view->ended))
         fprintf(stderr, "ebpo haptic: a page of the viewer has left; the device continues\n");
-    atomic_fetch_sub(&view->pages, 1);
+    if (atomic_fetch_sub(&view->pages, 1) == 1)
+        lift_pen(view);
 }
 
 /* --- the server --- */

@@ -200,6 +200,8 @@ static int take_field(span name, span value, http_request *out, seen_fields *see
             return HTTP_BAD_REQUEST;
         seen->origin = value;
     }
+    if (span_is_word(name, "Sec-Fetch-Site"))
+        out->is_foreign |= !span_is(value, "same-origin") && !span_is(value, "none");
     /* Other requests with a body are refused. */
     if (span_is_word(name, "Transfer-Encoding") ||
         (span_is_word(name, "Content-Length") &&

@@ -32,10 +32,11 @@ enum {
 };
 
 typedef struct http_request {
-    bool head_only; /* method HEAD */
-    bool is_post;   /* method POST, from a page of this server */
-    size_t body;    /* number of bytes of the body; 0 for other methods */
-    bool keeps;     /* the connection stays open after the response */
+    bool head_only;  /* method HEAD */
+    bool is_post;    /* method POST, from a page of this server */
+    size_t body;     /* number of bytes of the body; 0 for other methods */
+    bool keeps;      /* the connection stays open after the response */
+    bool is_foreign; /* the browser says that a page of another site or port has sent it */
     bool has_query;
     char path[HTTP_PATH_MAX]; /* decoded, without the query; begins with '/' */
     char range[64];           /* value of Range; "": none, or too long */

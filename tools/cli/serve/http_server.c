@@ -119,10 +119,13 @@ static const char *reason_of(int status)
 static bool send_head(const connection *c, int status, bool keeps, const char *fields)
 {
     char text[FIELDS_MAX + 512];
+    /* A page that sends messages must not be in a page of another site, which could lead clicks. */
+    const char *frames =
+        c->server->service.post ? "Content-Security-Policy: frame-ancestors 'self'\r\n" : "";
     int n = snprintf(text, sizeof text,
-                     "HTTP/1.1 %d %s\r\n%sX-Content-Type-Options: nosniff\r\n"
+                     "HTTP/1.1 %d %s\r\n%s%sX-Content-Type-Options: nosniff\r\n"
                      "Cross-Origin-Resource-Policy: same-origin\r\nConnection: %s\r\n\r\n",
-                     status, reason_of(status), fields, keeps ? "keep-alive" : "close");
+                     status, reason_of(status), fields, frames, keeps ? "keep-alive" : "close");
     return n > 0 && (size_t)n < sizeof text && send_bytes(c, text, (size_t)n);
 }
 
@@ -185,6 +188,8 @@ static bool send_response(connection *c, const http_request *request)
     http_content content = { .file = -1 };
     int status = service->find(service->user, request->path, request->has_query, &content);
     char fields[FIELDS_MAX - 128] = "";
+    if (status == HTTP_OK && content.stream && request->is_foreign)
+        status = HTTP_FORBIDDEN;
     if (status == HTTP_OK && content.stream && !request->head_only)
         return send_stream(c, &content);
     if (status == HTTP_OK) {
@@ -452,9 +457,10 @@ bool http_server_run(int listener, const http_service *service)
         server.slot[i].socket = -1;
     fcntl(listener, F_SETFL, O_NONBLOCK); /* accept must not wait if the client has left */
     signal(SIGPIPE, SIG_IGN);             /* if a client has left, send returns an error */
-    if (!accept_all(&server, listener, service->stop))
-        return false;
+    bool accepted = accept_all(&server, listener, service->stop);
+    int saved = errno;
     close(listener);
     end_all(&server);
-    return true;
+    errno = saved;
+    return accepted;
 }

@@ -24,7 +24,8 @@ typedef struct http_content {
     const void *bytes; /* must stay valid until the server ends */
     uint64_t size;
     char tag[64];          /* version, in quotes; "": none */
-    http_stream_fn stream; /* not NULL: makes the bytes; `user` of the service is its argument */
+    http_stream_fn stream; /* not NULL: makes the bytes, only for pages of this server; `user` of
+                            * the service is its argument */
 } http_content;
 
 /* Finds the content of a decoded path. Called by several threads. Returns the status code of the
