@@ -221,8 +221,30 @@ def test_full_disk(t, recovers):
     check(got["paint"]["failed_saves"] > 0 and got["haptic"]["steps"] > 2000, got["paint"], got["haptic"]["steps"])
     check(err.count("the device continues") == 1 and ("saved again" in err) == recovers, err)
     check(p.returncode == (0 if recovers else 1) and ("failure" in got["paint"]) != recovers, p.returncode, err)
+    check(("the paint since the last save is lost" in err) != recovers, err)
     now = t.point_count(paint)
     check(now > saved if recovers else now == saved, saved, now)
+
+
+def test_saved_elsewhere(t):
+    """If the paint file cannot be saved at the end, the paint is saved beside it, or in the folder for temporary files."""
+    folder, other = t.at("folder"), t.at("other")
+    for name in (folder, other):
+        os.mkdir(name)
+    for moved in (False, True):
+        paint = os.path.join(folder, f"{moved}.paint.h5")
+        p = t.start(paint, "--device", "udp:0", "--seconds", "9", env={**os.environ, "TMPDIR": other})
+        Device(p).draw(p, 0.8)
+        if moved:
+            os.rename(folder, t.at("moved"))
+        else:
+            os.utime(paint)  # as if another program had changed it
+        p.send_signal(signal.SIGTERM)
+        out, err = p.communicate(timeout=60)
+        made = f"{other if moved else folder}/{moved}.paint.h5.unsaved-{p.pid}"
+        check(p.returncode == 1 and f"the paint is in {made} instead" in err, p.returncode, err)
+        got = json.loads(out)["paint"]
+        check(got["points"] == t.point_count(made) > 0, got)
 
 
 def request(port, first, *fields):
@@ -291,6 +313,7 @@ def main(ebpo):
         test_kill(t)
         test_second_writer(t)
         test_lifted_pen(t)
+        test_saved_elsewhere(t)
         test_view(t)
         test_full_disk(t, True)
         test_full_disk(t, False)

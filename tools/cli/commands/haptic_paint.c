@@ -4,6 +4,7 @@
  * except that the last stroke may be longer in `drawn`. */
 #include "cli/commands/haptic_paint.h"
 
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -529,6 +530,31 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     return EBPO_OK;
 }
 
+/* Saves the paint to a new file beside its own file, or else in the folder for temporary files.
+ * Appends to the message where it is, or that it is lost. */
+static void save_elsewhere(const haptic_paint *p, ebpo_error *error)
+{
+    enum { MESSAGE = sizeof error->message };
+    const char *name = strrchr(p->pen.path, '/'), *folder = getenv("TMPDIR");
+    char path[2][PATH_MAX], where[2 * PATH_MAX + 64] = "; the paint since the last save is lost";
+    ebpo_error ignored = EBPO_ERROR_INIT;
+    int saved = 0;
+    name = name ? name + 1 : p->pen.path;
+    folder = folder && *folder ? folder : "/tmp";
+    snprintf(path[0], PATH_MAX, "%s.unsaved-%ld", p->pen.path, (long)getpid());
+    snprintf(path[1], PATH_MAX, "%s/%s.unsaved-%ld", folder, name, (long)getpid());
+    while (saved < 2 && ebpo_paint_save(p->saved, path[saved], &ignored) != EBPO_OK)
+        saved++;
+    if (saved < 2)
+        snprintf(where, sizeof where, "; the paint is in %s instead", path[saved]);
+    /* The place is more important than the end of a long message. */
+    size_t length = strnlen(where, MESSAGE - 1), at = strlen(error->message);
+    if (at > MESSAGE - 1 - length)
+        at = MESSAGE - 1 - length;
+    memcpy(error->message + at, where, length);
+    error->message[at + length] = 0;
+}
+
 ebpo_status haptic_paint_close(haptic_paint *p, haptic_painted *out, ebpo_error *error)
 {
     if (!p)
@@ -542,6 +568,8 @@ ebpo_status haptic_paint_close(haptic_paint *p, haptic_painted *out, ebpo_error 
     const ebpo_error *last = status != EBPO_OK ? &p->save_error : &p->error;
     if (last->status != EBPO_OK)
         *error = *last;
+    if (status != EBPO_OK)
+        save_elsewhere(p, error);
     status = last->status;
     *out = p->result;
     out->strokes = info_of(p->saved).stroke_count - p->strokes_before;

@@ -64,7 +64,9 @@ void haptic_paint_write_news(haptic_paint *paint, haptic_paint_cursor *cursor, F
 bool haptic_paint_command(haptic_paint *paint, const char *text);
 
 /* Saves the rest, and frees the object, which may be NULL. Returns the error of the last save or,
- * if points could not be painted, of painting. */
+ * if points could not be painted, of painting. If the last save fails, the paint is saved to
+ * <path>.unsaved-<process>, beside the file or in $TMPDIR; the message says where, or that it is
+ * lost. */
 ebpo_status haptic_paint_close(haptic_paint *paint, haptic_painted *out, ebpo_error *error);
 
 #endif
