@@ -320,11 +320,13 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     if (status == EBPO_OK && out->info.parts & EBPO_PART_COLOURS)
         status = ebpo_build_gray_colours(b, out, error);
     bool border = !b->solid && b->options->parts & EBPO_PART_BORDER;
+    out->info.border_inside = b->capped;
+    ebpo_capped_free(b->capped); /* the border makes another tree of caps */
+    b->capped = NULL;
     if (status == EBPO_OK && border && !ebpo_progress_stage(&b->options->progress, "border", error))
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK && border)
         status = ebpo_build_border(out, b->threads, error);
-    out->info.border_inside = b->capped;
     return status == EBPO_OK && b->options->parts & EBPO_PART_SURFACE
                ? ebpo_build_surface(out, b->threads, &b->options->progress, error)
                : status;

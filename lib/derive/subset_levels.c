@@ -402,13 +402,21 @@ static void add_colour(descent *d)
             d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
 }
 
+/* Returns true if the next leaf has no faces, as leaves of a surface with holes may have. Such a
+ * leaf stays a leaf, because a pruned node has faces. */
+static bool next_leaf_is_empty(const descent *d)
+{
+    uint64_t rank = d->kept.next[EBPO_LEAF];
+    return d->from.leaf_new && d->from.leaf_new[rank] == 0 && d->from.leaf_ref_count[rank] == 0;
+}
+
 /* Copies the next leaf. If the part of the parent's envelope in the leaf's cell is within max_error
  * of the model, the leaf becomes a pruned node without planes. Otherwise, if the leaf is outside
  * the box, it becomes a pruned node with the leaf's planes. Returns the type of the copy. */
 static ebpo_node_type copy_leaf(descent *d, ebpo_cell cell)
 {
     bool close_enough = is_close_enough(d);
-    if (!close_enough && intersects_box(d->c, cell)) {
+    if (next_leaf_is_empty(d) || (!close_enough && intersects_box(d->c, cell))) {
         kept_take(&d->kept, EBPO_LEAF);
         return EBPO_LEAF;
     }

@@ -328,13 +328,22 @@ typedef struct interval {
     double lo, hi;
 } interval;
 
+/* Returns true if the node may be without faces: in a surface with holes, a leaf without faces may
+ * be the source of a pruned node, and a file without the mesh does not tell such leaves apart. */
+static bool may_lack_faces(const ebpo_model *m, const ebpo_node *node)
+{
+    return m->info->border_inside && node->cell.level > 0 &&
+           (node->pruned || (node->type == EBPO_LEAF && !(m->info->parts & EBPO_PART_MESH)));
+}
+
 /* Improves the interval by the envelopes at or below `node`. `lower`: lower bound of the distance
  * to `node`. */
 static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, ebpo_error *error)
 {
     if (lower > v->hi || ebpo_node_is_uniform(&node))
         return EBPO_OK;
-    v->hi = fmin(v->hi, ebpo_rank_cell_end(&v->ranking, node.cell));
+    if (!may_lack_faces(v->c->model, &node))
+        v->hi = fmin(v->hi, ebpo_rank_cell_end(&v->ranking, node.cell));
     if (node.cell.level >= v->o->level || node.type != EBPO_GRAY || node.pruned ||
         (v->deadline && ebpo_clock() > v->deadline)) {
         v->lo = fmin(v->lo, lower);

@@ -561,11 +561,14 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
 
 /* --- node by node: EBP 2017, 4.2 --- */
 
-/* Returns true if envelopes contain the inside. Those of a surface with holes contain the points
- * that are inside with the threshold 1/2, or with a greater one. */
-static bool envelopes_hold(const ebpo_model *m)
+/* Returns true if envelopes contain the inside. The envelopes of a surface with holes contain the
+ * points that are inside with the threshold 1/2 or a greater threshold. They decide nothing about
+ * the winding number of the mesh with its caps, which a query with c->undecided computes. */
+static bool envelopes_hold(const ebpo_context *c)
 {
-    return !m->holes || (m->info->border_inside && m->holes->rule.threshold >= 0.5);
+    const ebpo_model *m = c->model;
+    return !m->holes ||
+           (m->info->border_inside && m->holes->rule.threshold >= 0.5 && !c->undecided);
 }
 
 /* Returns true if the query tests the envelopes of nodes on the way down. */
@@ -576,7 +579,7 @@ static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
      * with a level or deadline use envelopes. */
     bool proves_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
-    if (o->envelopes == EBPO_ENVELOPES_SKIP || !proves_result || !envelopes_hold(c->model))
+    if (o->envelopes == EBPO_ENVELOPES_SKIP || !proves_result || !envelopes_hold(c))
         return false;
     return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
            o->deadline_ns;
@@ -593,10 +596,16 @@ typedef struct inside_query {
     ebpo_position position; /* shifted position of p */
 } inside_query;
 
-/* Sets the result "undecided", with the diagonal of the cell as bound of p's distance. */
+/* Sets the result "undecided", with a bound of p's distance: the diagonal of the cell. In a surface
+ * with holes, a pruned node and a leaf may be without faces. But the parent has faces, so the bound
+ * is the parent's diagonal. */
 static void give_maybe(const inside_query *query, ebpo_cell cell, ebpo_inside_result *out)
 {
-    *out = (ebpo_inside_result){ EBPO_MAYBE, 0, ebpo_cell_diagonal(&query->box, cell) };
+    const ebpo_info *info = query->context->model->info;
+    bool may_lack_faces =
+        info->border_inside && cell.level > 0 && (info->pruned || !(info->parts & EBPO_PART_MESH));
+    *out = (ebpo_inside_result){ EBPO_MAYBE, 0,
+                                 ebpo_cell_diagonal(&query->box, cell) * (may_lack_faces ? 2 : 1) };
 }
 
 /* Returns true if the query tests envelopes and p is outside the envelope of the node. */
@@ -869,7 +878,7 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
                                  ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    if (!envelopes_hold(m))
+    if (!envelopes_hold(context))
         return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     inside_query query = {
@@ -936,8 +945,9 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return inside_whole(context, points, count, o->done, out, error);
-    context->planes = envelopes_hold(m) && (o->level >= 0 || o->deadline_ns ||
-                                            o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned);
+    context->planes =
+        envelopes_hold(context) &&
+        (o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned);
     ebpo_batch batch = { .context = context,
                          .points = points,
                          .count = count,

@@ -22,7 +22,8 @@ enum { DEEPEST = 6, LIMIT = 1 << 17 };
 static ebpo_status keep_nodes(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
                               ebpo_held_levels *out, ebpo_error *error)
 {
-    ebpo_box box = ebpo_root_box(ebpo_file_info(file));
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_box box = ebpo_root_box(info);
     out->node = ebpo_alloc_zero(nodes->node_count, sizeof *out->node);
     if (!out->node)
         return ebpo_fail_memory(error, nodes->node_count * sizeof *out->node);
@@ -34,6 +35,9 @@ static ebpo_status keep_nodes(const ebpo_file *file, const ebpo_subtree_nodes *n
         ebpo_cell_bounds(&box, ebpo_cell_of_octcode(nodes->octcodes[i]), n->low, n->high);
         n->children = nodes->children[i];
         n->has_faces = nodes->types[i] == EBPO_GRAY || nodes->types[i] == EBPO_LEAF;
+        n->may_lack_faces =
+            i > 0 && info->border_inside &&
+            (nodes->types[i] == EBPO_LEAF || (info->pruned && n->children == EBPO_NO_CHILDREN));
         n->winding = nodes->windings ? nodes->windings[i] : 0;
     }
     return EBPO_OK;
@@ -126,7 +130,8 @@ void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], i
         const ebpo_held_node *n = &levels->node[w.node];
         if (!(w.lower < lower))
             continue;
-        upper = fmin(upper, distance_to_far_corner(n, p));
+        if (!n->may_lack_faces)
+            upper = fmin(upper, distance_to_far_corner(n, p));
         if (n->children == EBPO_NO_CHILDREN || visits-- <= 0)
             lower = w.lower;
         else

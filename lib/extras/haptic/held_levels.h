@@ -11,9 +11,10 @@
 
 typedef struct ebpo_held_node {
     double low[3], high[3];
-    uint32_t children; /* index of the first of eight children, or EBPO_NO_CHILDREN */
-    int32_t winding;   /* winding number of a cell without faces */
-    bool has_faces;    /* there are faces within `slack` of the cell */
+    uint32_t children;   /* index of the first of eight children, or EBPO_NO_CHILDREN */
+    int32_t winding;     /* winding number of a cell without faces */
+    bool has_faces;      /* there are faces within `slack` of the cell, unless may_lack_faces */
+    bool may_lack_faces; /* a leaf or pruned node of a surface with holes */
 } ebpo_held_node;
 
 typedef struct ebpo_held_levels {
