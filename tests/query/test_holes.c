@@ -577,6 +577,23 @@ START_TEST(test_marks_take_few_terms)
 }
 END_TEST
 
+/* Bounds of a distance by the nodes of a level contain the distance of the whole model. */
+static void check_bounds(const holed *part, const holed *whole, const double p[3], int level)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result exact, r;
+    options.level = level;
+    model_must(ebpo_distance(whole->context, p, NULL, &exact, &error), "distance", &error);
+    for (int way = 0; way < WAYS; way++) {
+        model_must(ebpo_distance(part->context_of[way], p, &options, &r, &error), "bounds", &error);
+        double hi = fmax(fabs(r.lo), fabs(r.hi));
+        ck_assert_msg(hi >= fabs(exact.distance) * (1 - 1e-12),
+                      "(%a %a %a), way %d, level %d: at most %g, but %g", p[0], p[1], p[2], way,
+                      level, hi, exact.distance);
+    }
+}
+
 /* A subset keeps the border: its results are those of the whole file, or it refuses. */
 START_TEST(test_subset_keeps_border)
 {
@@ -606,6 +623,7 @@ START_TEST(test_subset_keeps_border)
                           (int)status, (int)r.where, (int)whole.where);
             same += status == EBPO_OK;
         }
+        check_bounds(&part, &h, p, 1 + (int)(i % 5));
     }
     ck_assert_uint_gt(same, 0);
     holed_free(&part);
