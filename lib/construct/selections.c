@@ -428,23 +428,28 @@ static void choose_at_random(clustering *c, uint64_t seed)
     }
 }
 
+/* Makes medoid m, at the squared distance d, one of the two nearest medoids of candidate i if it is
+ * nearer than one of them. */
+static void compare_medoid(clustering *c, int i, int m, float d)
+{
+    if (d < c->first[i]) {
+        c->second[i] = c->first[i];
+        c->runner_up[i] = c->nearest[i];
+        c->first[i] = d;
+        c->nearest[i] = m;
+    } else if (d < c->second[i]) {
+        c->second[i] = d;
+        c->runner_up[i] = m;
+    }
+}
+
 /* Finds the two nearest medoids of candidate i. */
 static void assign_medoids(clustering *c, int i)
 {
     c->first[i] = c->second[i] = INFINITY;
     c->nearest[i] = c->runner_up[i] = 0;
-    for (int m = 0; m < c->wanted; m++) {
-        float d = distance_between(c, i, c->medoid[m]);
-        if (d < c->first[i]) {
-            c->second[i] = c->first[i];
-            c->runner_up[i] = c->nearest[i];
-            c->first[i] = d;
-            c->nearest[i] = m;
-        } else if (d < c->second[i]) {
-            c->second[i] = d;
-            c->runner_up[i] = m;
-        }
-    }
+    for (int m = 0; m < c->wanted; m++)
+        compare_medoid(c, i, m, distance_between(c, i, c->medoid[m]));
 }
 
 /* Computes the change of the cost by the removal of each medoid. */
@@ -484,20 +489,11 @@ static void swap_medoid(clustering *c, int m, int h)
     c->chosen[c->medoid[m]] = false;
     c->chosen[h] = true;
     c->medoid[m] = h;
-    for (int i = 0; i < c->count; i++) {
-        float d = row[i];
+    for (int i = 0; i < c->count; i++)
         if (c->nearest[i] == m || c->runner_up[i] == m)
             assign_medoids(c, i);
-        else if (d < c->first[i]) {
-            c->second[i] = c->first[i];
-            c->runner_up[i] = c->nearest[i];
-            c->first[i] = d;
-            c->nearest[i] = m;
-        } else if (d < c->second[i]) {
-            c->second[i] = d;
-            c->runner_up[i] = m;
-        }
-    }
+        else
+            compare_medoid(c, i, m, row[i]);
     sum_removals(c);
 }
 
