@@ -9,26 +9,15 @@ import re
 import resource
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import tempfile
 import time
 
-POSITION = struct.Struct("<4sHHQQ3d4d")
+sys.dont_write_bytecode = True
+from haptic_udp import CUBE, PLACE
+
 RADIUS, STIFFNESS = 0.02, 400
-CUBE = """ply
-format ascii 1.0
-element vertex 8
-property float x
-property float y
-property float z
-element face 12
-property list uchar int vertex_indices
-end_header
-""" + "".join(f"{i & 1} {i >> 1 & 1} {i >> 2}\n" for i in range(8)) + "".join(
-    f"3 {f}\n" for f in ("0 2 3", "0 3 1", "4 5 7", "4 7 6", "0 1 5", "0 5 4", "2 6 7", "2 7 3",
-                         "0 4 6", "0 6 2", "1 3 7", "1 7 5"))
 
 
 def check(condition, *what):
@@ -73,7 +62,7 @@ class Device:
 
     def send(self, at, kind=1):
         self.sent += 1
-        self.socket.sendto(POSITION.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1), self.to)
+        self.socket.sendto(PLACE.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1), self.to)
 
     def draw(self, process, seconds, step=None, kind=1):
         """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""

@@ -103,4 +103,5 @@ def main(ebpo):
         assert p.returncode == 1 and "no device has sent its position in 2 seconds (1 invalid packets" in err, err
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    main(*sys.argv[1:])
