@@ -86,8 +86,8 @@ typedef struct moving {
     const ebpo_mesh *mesh; /* sorted along the Morton curve */
     const uint32_t *final; /* [vertex] final index */
     uint32_t *face_at;     /* [final index] face of `mesh` */
-    /* result; out->vertex_source first contains vertices of `mesh`, which move_vertices replaces by
-     * source indices */
+    /* result. Before move_vertices runs, out->vertex_source contains indices of vertices of `mesh`;
+     * move_vertices replaces them by source indices. */
     ebpo_tree *out;
 } moving;
 

@@ -25,7 +25,7 @@ bool ebpo_text_is_utf8(const char *text)
             return false;
         if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
             (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90))
-            return false; /* not the shortest encoding, a surrogate, or beyond Unicode */
+            return false; /* a longer encoding than needed, a surrogate, or beyond Unicode */
         for (p++; more; more--, p++)
             if (*p < 0x80 || *p > 0xbf)
                 return false;
@@ -116,7 +116,7 @@ bool ebpo_is_date(const char *text)
 /* --- streams into memory --- */
 
 #ifdef EBPO_HAVE_FOPENCOOKIE
-/* Appends bytes that stdio writes to s->text. This is the `write` function of fopencookie. */
+/* Appends to s->text what stdio writes. This is the `write` function of fopencookie. */
 static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
 {
     ebpo_text_stream *s = cookie;

@@ -255,7 +255,7 @@ void ebpo_choose_origin(const ebpo_info *info, double origin[3])
                                      fabs(info->box_origin[k] + info->box_size[k])));
     }
     for (int k = 0; k < 3 && largest > 16 * size; k++) {
-        /* readers keep a translation as float32 */
+        /* The exported file stores `origin` as a translation, which programs read as float32. */
         float middle = (float)(info->box_origin[k] + info->box_size[k] / 2);
         origin[k] = isfinite(middle) ? (double)middle : 0;
     }

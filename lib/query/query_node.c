@@ -1,5 +1,5 @@
 /* Goes from a node of a model to its children, in the top of the tree (levels 0 to the cut level)
- * and in subtrees, and computes bounds of distances from envelopes.
+ * and in subtrees. Computes bounds of distances with the envelopes of nodes.
  *
  * Cursors (geometry/cursor.h) get nodes from an accel (the nodes of one subtree, accel.h) or from a
  * context (the nodes of the model; a context loads subtrees on demand). Nodes of a subtree are
@@ -81,7 +81,7 @@ static ebpo_status uniform_winding(void *holder, const ebpo_node *uniform, int32
 
 const ebpo_node_source ebpo_accel_source = { accel_children, copy_accel_planes, uniform_winding };
 
-/* Returns the node of the top for an entry of its table. */
+/* Returns the node for an entry of the table of the tree's top. */
 static ebpo_node top_node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, model->info->rule);
@@ -118,7 +118,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    /* For some pruned nodes, only the subtree's table shows that the node is pruned. */
+    /* In the table of a loaded subtree, the kind SUBTREE_ROOT marks pruned nodes. */
     if (ebpo_node_is_subtree_root(node))
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
@@ -231,18 +231,19 @@ static void describe_cut(const ebpo_info *info, char *out, size_t capacity)
     size_t used = 0;
     out[0] = 0;
     if (info->cut_levels)
-        used =
-            (size_t)snprintf(out, capacity, "it was cut to levels 0 to %d", info->cut_levels - 1);
+        used = (size_t)snprintf(out, capacity, "the file was cut to levels 0 to %d",
+                                info->cut_levels - 1);
     if (info->boxed && used < capacity)
         snprintf(out + used, capacity - used, "%s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g",
-                 used ? " and to the box" : "it was cut to the box", b[0], b[1], b[2], b[3], b[4],
-                 b[5]);
+                 used ? " and to the box" : "the file was cut to the box", b[0], b[1], b[2], b[3],
+                 b[4], b[5]);
     used = strlen(out);
     if (info->kept_error > 0 && used < capacity)
         snprintf(out + used, capacity - used, "%s %.9g",
-                 used ? " and to an error of" : "it was cut to an error of", info->kept_error);
+                 used ? " and to an error of" : "the file was cut to an error of",
+                 info->kept_error);
     if (!out[0])
-        snprintf(out, capacity, "it is a part of another file");
+        snprintf(out, capacity, "the file is a part of another file");
 }
 
 ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error)
@@ -252,7 +253,7 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error
     describe_cut(model->info, cut, sizeof cut);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
-        "%.120s: the query needs nodes omitted below level %d at %.6g %.6g %.6g "
+        "%.120s: the file omits nodes that the query needs, below level %d at %.6g %.6g %.6g "
         "(%s); query with a level (--max-level), or make a larger part of the original "
         "with `ebpo subset` or `ebpo fetch`",
         model->file->in.shown, cell.level, ebpo_cell_face(&box, 0, cell.level, cell.at[0]),
@@ -268,7 +269,8 @@ typedef struct checking {
     ebpo_box box;
 } checking;
 
-/* Fails at the first pruned node at or below a node for which `matters` is true. */
+/* Visits `node` and its descendants. Does not visit the descendants of a node for which `matters`
+ * is false. Fails at the first pruned node. */
 static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;

@@ -1,11 +1,12 @@
 /* Computes points and planes in integers of any size. Every new point is the intersection of a
- * plane and the line through two points. So its coordinates are fractions of integers with one
- * denominator.
+ * plane and the line through two points. So its coordinates are fractions of integers with a
+ * common denominator.
  *
  * Each point also has its coordinates rounded to the nearest double. Rounding keeps the order, so
- * different rounded coordinates decide comparisons. Equal points have equal rounded coordinates,
- * which are the key of the hash table. A turn (the orientation of three points) is first computed
- * in doubles with an error bound, and in integers only if its sign is not certain. */
+ * if two rounded coordinates differ, the exact ones compare in the same way. Equal points have
+ * equal rounded coordinates, which are the key of the hash table. A turn (the orientation of three
+ * points) is first computed in doubles with an error bound, and in integers only if its sign is not
+ * certain. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/exact_point.h"
@@ -100,8 +101,8 @@ void ebpo_exact_plane_along(ebpo_exact_plane *out, int axis, const ebpo_exact_po
     set_minor(out->n[3], p->x[u], q->x[v], p->x[v], q->x[u]);
 }
 
-/* Computes a number with the sign of the side of the plane on which the point is: the distance from
- * the plane times a positive factor. */
+/* Computes the signed distance of the point from the plane, times a positive factor. Its sign says
+ * on which side of the plane the point is. */
 static void set_height(mpz_t out, const ebpo_exact_plane *plane, const ebpo_exact_point *p)
 {
     mpz_mul(out, plane->n[3], p->x[3]);
@@ -121,12 +122,10 @@ int ebpo_exact_side(const ebpo_exact_plane *plane, const ebpo_exact_point *p)
 
 /* --- intersections --- */
 
-/* Returns true if `rounded` is exactly x / w * 2^unit. The fraction x / w is reduced. */
+/* Returns true if `rounded` is exactly x / w * 2^unit. */
 static bool is_double(const mpz_t x, const mpz_t w, double rounded, int unit)
 {
     mpz_t value, other;
-    if (mpz_popcount(w) != 1)
-        return false; /* the denominator is not a power of two */
     int least = ebpo_common_unit(&rounded, 1, unit);
     mpz_inits(value, other, NULL);
     ebpo_set_integer(value, rounded, least);
@@ -155,7 +154,10 @@ static void reduce_point(ebpo_exact_point *p)
 
 static void round_point(ebpo_exact_point *p, int unit)
 {
-    p->exact = true;
+    /* The four numbers of p->x have no common divisor. So if x[3] is divisible by a
+     * prime other than 2, at least one fraction x[k] / x[3] keeps this prime in its denominator,
+     * and is not a double. */
+    p->exact = mpz_popcount(p->x[3]) == 1;
     for (int k = 0; k < 3; k++) {
         p->at[k] = ebpo_round_quotient(p->x[k], p->x[3], unit) + 0.0;
         p->exact = p->exact && is_double(p->x[k], p->x[3], p->at[k], unit);
@@ -200,10 +202,12 @@ int ebpo_exact_order(const ebpo_exact_point *p, const ebpo_exact_point *q)
     return order;
 }
 
-/* Returns the sign of the turn by rounded coordinates, or EBPO_SIGN_UNKNOWN. A coordinate with an
- * absolute value of at most m has an error of at most 2^-53 m + 2^-1075. So a difference has an
- * error of at most 2^-51 (m + 2^-1000). The sum of the errors of all products and roundings is
- * below `bound`. */
+/* Computes the turn in doubles from rounded coordinates. Returns its sign if the error cannot
+ * change it, and otherwise EBPO_SIGN_UNKNOWN. Let m be the largest absolute value of the
+ * coordinates on an axis. The error of each rounded coordinate is at most
+ * 2^-53 m + 2^-1075. The error of a computed difference of two coordinates is below
+ * 2^-51 (m + 2^-1000). most_u and most_v are m + 2^-1000 for the axes u and v. The sum of the
+ * errors of all products and roundings is below `bound`. */
 static int filter_turn(int u, int v, const double a[3], const double b[3], const double c[3])
 {
     double bu = b[u] - a[u], bv = b[v] - a[v], cu = c[u] - a[u], cv = c[v] - a[v];
@@ -238,7 +242,8 @@ int ebpo_exact_turn(int axis, const ebpo_exact_point *a, const ebpo_exact_point 
     return sign;
 }
 
-/* Computes (coordinate k of p - at) * x[3] in units of 2^unit. p has the unit `point_unit`.
+/* Subtracts the number `at` from coordinate k of p, and multiplies the difference by the
+ * denominator p->x[3]. The result is an integer in units of 2^unit. p has the unit `point_unit`;
  * unit <= point_unit, and `at` is a multiple of 2^unit. */
 static void set_difference(mpz_t out, const ebpo_exact_point *p, int k, double at, int point_unit,
                            int unit)

@@ -2,10 +2,10 @@
  *
  * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so each end is
  * computed from the correct edge. The point where an edge pierces a plane is computed in
- * double-double arithmetic, in which an ebpo_pair is a number: the sum of two doubles. If
+ * double-double arithmetic: each number is an ebpo_pair, the sum of two doubles. If
  * coordinates are too large or too small for the error bounds of double-double arithmetic, the
  * point is computed exactly with GMP and rounded once.
- * Neither the order of the faces nor the order of their corners changes a bit of the points.
+ * The coordinates of the points have the same bits for any order of the faces and of their corners.
  * Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are pure and can
  * be called from any thread. */
 #include "core/strict_fp.h"
@@ -37,9 +37,8 @@ static void sort_corners(const double **corner, int n)
         }
 }
 
-/* Returns the piercing of the edge between two corners of `face` with the plane of the face
- * `plane`.
- */
+/* Returns the edge of `face` between the corners `from` and `to`, and the plane through the three
+ * points `plane`, in sorted order. */
 static piercing piercing_of(const double face[3][3], int from, int to, const double plane[3][3])
 {
     piercing p = { { face[from], face[to] }, { plane[0], plane[1], plane[2] } };
@@ -50,18 +49,19 @@ static piercing piercing_of(const double face[3][3], int from, int to, const dou
 
 /* --- the point, in double-double arithmetic --- */
 
-/* Sets *height to the signed distance of `point` from the plane through `from`, times the normal's
- * length. products: [k] sum of the absolute values of the two products in normal[k]. Returns the
- * sum of the absolute values of the products in *height, for the error bound. */
-static double height_over(const ebpo_pair normal[3], const double products[3], const double *from,
-                          const double *point, ebpo_pair *height)
+/* Sets *height to the signed distance of `point` from a plane, times the length of the plane's
+ * normal. `origin` is a point of the plane. normal[k] is the difference of two products, and
+ * magnitude[k] is the sum of the absolute values of the two products. For the error bound, returns
+ * the sum over k of magnitude[k] * |point[k] - origin[k]|. */
+static double height_over(const ebpo_pair normal[3], const double magnitude[3],
+                          const double *origin, const double *point, ebpo_pair *height)
 {
     ebpo_pair d[3];
     double sum = 0;
-    ebpo_pair_differences(from, point, d);
+    ebpo_pair_differences(origin, point, d);
     *height = ebpo_pair_dot(normal, d);
     for (int k = 0; k < 3; k++)
-        sum += products[k] * fabs(d[k].head);
+        sum += magnitude[k] * fabs(d[k].head);
     return sum;
 }
 
@@ -71,16 +71,16 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
     ebpo_pair e[3], f[3], normal[3], height[2]; /* e, f: two edges of the face in the plane */
-    double products[3], most = 0;
+    double magnitude[3], most = 0;
     ebpo_pair_differences(p->plane[0], p->plane[1], e);
     ebpo_pair_differences(p->plane[0], p->plane[2], f);
     ebpo_pair_cross(e, f, normal);
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        products[k] = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
+        magnitude[k] = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
     }
     for (int i = 0; i < 2; i++)
-        most = fmax(most, height_over(normal, products, p->plane[0], p->end[i], &height[i]));
+        most = fmax(most, height_over(normal, magnitude, p->plane[0], p->end[i], &height[i]));
     ebpo_pair difference = ebpo_pair_subtract(height[0], height[1]);
     *share = ebpo_pair_divide(height[0], difference);
     return most <= 0x1p30 * fabs(difference.head) && fabs(difference.head) >= 0x1p-600;
@@ -198,7 +198,7 @@ typedef struct edge {
     bool ends_in_plane;       /* corner `to` is in the plane */
 } edge;
 
-/* Returns the feature of the edge's face that contains the piercing point. */
+/* Returns the corner or edge of the face on which the piercing point is. */
 static ebpo_feature feature_of(const edge *e)
 {
     if (e->ends_in_plane)
@@ -245,15 +245,18 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
     ebpo_pair_kind kind;
     if (!ebpo_prepare_pair(a, b, &t, &kind))
         return;
-    bool reversed = t.flipped_a !=
-                    t.flipped_b; /* the intervals below run against the direction of the result */
-    edge of_a[2], of_b[2];       /* the edges from t.a[0] and t.b[0] to corners 1 and 2 */
+    /* of_a: the edges of A from corner t.a[0] to the corners t.a[1] and t.a[2]; of_b likewise */
+    edge of_a[2], of_b[2];
     for (int i = 0; i < 2; i++) {
         of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
         of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };
     }
-    /* On the common line, the interval of A begins at of_a[1] and ends at of_a[0]; the interval of
-     * B begins at of_b[0] and ends at of_b[1]. */
+    /* The direction of the common line is the cross product of the two planes' normals, which
+     * ebpo_prepare_pair may have flipped. A line in this direction enters A through the edge
+     * of_a[1] and leaves it through of_a[0]. It enters B through of_b[0] and leaves it through
+     * of_b[1]. `out` has the direction of the original normals. Flipping one normal reverses the
+     * direction. */
+    bool reversed = t.flipped_a != t.flipped_b;
     set_end(&of_a[1], &of_b[0], ebpo_compare_ends(a, b, &t, 2, 1), &out[reversed]);
     set_end(&of_a[0], &of_b[1], -ebpo_compare_ends(a, b, &t, 1, 2), &out[!reversed]);
 }

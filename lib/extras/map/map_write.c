@@ -35,8 +35,8 @@ enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 /* The state of statistics while values are added. Percentiles are computed separately. */
 typedef struct map_sums {
     ebpo_map_stats stats; /* only counts, min and max are set */
-    /* Sums of the values in each bin, of their absolute values, and of their squares. A sum of
-     * squares has the square of the bin's unit. */
+    /* Sums of the values in each bin, of their absolute values, and of their squares. The unit of
+     * a sum of squares is the square of the bin's unit. */
     ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
 } map_sums;
 
@@ -69,8 +69,8 @@ static map_sums *map_sums_new(void)
     return s;
 }
 
-/* Adds a value to the bin for its absolute value, in the unit of this bin. square: adds the square
- * of the value. */
+/* Adds a value to one of the bins. The absolute value selects the bin, and the value is converted
+ * to the bin's unit. square: adds the square of the value. */
 static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
@@ -110,8 +110,8 @@ static void map_sums_add(map_sums *s, const double *values, uint64_t count)
     }
 }
 
-/* Returns the statistics if no value is finite: counts, and NAN in all members that are distances.
- */
+/* Returns the statistics of a map in which no value is finite: the counts of s, and NAN in all
+ * members that are distances. */
 static ebpo_map_stats stats_of_nothing(const ebpo_map_stats *s)
 {
     ebpo_map_stats out = *s;
@@ -149,8 +149,8 @@ static int compare_values(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Sorts values and computes their percentiles. The p-th percentile is the smallest of the values
- * for which at least p percent of all values are less or equal. */
+/* Sorts values and computes their percentiles. The p-th percentile is the first value in sorted
+ * order that has at least p percent of all values at or before it. */
 static void pick_percentiles(double *values, uint64_t count, double out[EBPO_MAP_PERCENTILES])
 {
     qsort(values, count, sizeof *values, compare_values);

@@ -113,9 +113,10 @@ typedef struct ebpo_findings_options {
 
 /*
  * Checks a mesh as ebpo_mesh_check does, and passes every counted finding to `take`. Findings are
- * sorted by kind, then by the lowest face, then by the vertices. Besides the memory of checking,
- * the mesh's workspace provides about 80 bytes per finding during sorting and 16 bytes per finding
- * afterwards; with `ply`, it also provides at most 13 bytes per face and vertex.
+ * sorted by kind, then by the lowest face, then by the vertices. The function takes memory from the
+ * mesh's workspace: as much as ebpo_mesh_check, plus about 80 bytes per finding during sorting and
+ * 16 bytes per finding afterwards. With `ply`, it takes at most 13 bytes more for each face and for
+ * each vertex.
  *
  * take     may be NULL. Even if `take` returns false, the file `ply` is complete
  * report   receives the result of ebpo_mesh_check; may be NULL

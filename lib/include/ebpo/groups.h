@@ -84,8 +84,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_groups_get(const ebpo_mesh_groups *
  * same index as the group. A vertex may be in several groups. Components made from groups are never
  * cavities, and their member `closed` is not computed: use ebpo_mesh_check for their meshes.
  *
- * mesh   the mesh that was read with the groups. It may have been oriented and welded, but no holes
- *        may have been filled. Mesh and groups are borrowed until ebpo_components_free
+ * mesh   the mesh that was read with the groups. Orienting and welding it before this call is
+ *        allowed, but filling holes is not. Mesh and groups are borrowed until ebpo_components_free
  * out    freed by ebpo_components_free
  *
  * EBPO_E_ARGUMENT: `groups` is NULL, or was not read with this mesh. EBPO_E_FORMAT, EBPO_E_IO.

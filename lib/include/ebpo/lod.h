@@ -146,11 +146,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
 
 /*
  * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets the
- * normal of the plane. A polygon on a cell face is only a step between two envelopes. It gets the
- * mean normal, weighted by area, of nearby polygons that are on planes and face roughly the same
- * way as the cell face. If there are no such polygons, the polygon gets the normal of the cell
- * face. Cell faces of the root cell count as planes of the envelope. Use the normals for images
- * only: they are rounded and guarantee nothing about the solid.
+ * normal of the plane. The direction of a polygon on a cell face does not follow the surface,
+ * because the polygon only closes the envelope. So it gets the mean of the normals of nearby
+ * polygons on planes, weighted by area. Nearby polygons whose normals are more than 107 degrees
+ * away from the normal of the cell face are not included, because they are on the opposite side of
+ * the solid. If no nearby polygon is included, the polygon gets the normal of the cell face. Cell
+ * faces of the root cell are treated as planes of the envelope. Use the normals for images only:
+ * they are rounded and guarantee nothing about the solid.
  *
  * info  metadata of the level's file
  * mesh  mesh returned with the nodes
@@ -185,14 +187,15 @@ typedef struct ebpo_surface_mesh {
     double error;
 
     /*
-     * Greatest error of the patches in the image of an observer, in pixels; see
+     * Greatest error of the patches, in pixels of the observer's image; see
      * ebpo_view_stream_surface (view.h). NAN without an observer.
      */
     double pixels;
 
     /*
-     * Number of patches in the mesh, and number of faces of the model in the mesh. Faces of the
-     * model replace the finest patches if the option `faces` of ebpo_view_stream_surface is true.
+     * Number of simplified patches in the mesh, and number of original faces in the mesh. The mesh
+     * has original faces only if the option `faces` of ebpo_view_stream_surface is true. They
+     * replace the finest patches.
      */
     uint64_t patches, faces;
 } ebpo_surface_mesh;
@@ -201,8 +204,9 @@ typedef struct ebpo_surface_mesh {
 EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
 
 /*
- * Lists the patches of a level, and the patches of coarser levels that have no patches below their
- * nodes. Together these patches replace all faces of the model.
+ * Lists the patches of a level. Some parts of the model have patches only at coarser levels; for
+ * such a part, lists the patch of its deepest level. Together these patches replace all faces of
+ * the model.
  *
  * patches  [*count] indices of patches, ascending; freed by free()
  *
@@ -215,8 +219,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_surface_select(const ebpo_surface *surfa
                                                        ebpo_error *error);
 
 /*
- * Joins patches of any levels to one mesh without cracks. No patch may belong to a node above the
- * node of another patch. Vertices on the borders of finer patches are replaced by vertices of
+ * Joins patches of any levels to one mesh without cracks. The nodes of two patches must not be
+ * ancestor and descendant. Vertices on the borders of finer patches are replaced by vertices of
  * coarser patches.
  *
  * info     metadata of the file or tree

@@ -88,9 +88,9 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
     if (!has_stat && errno == ENOENT)
         return true; /* the entry was removed meanwhile */
     bool is_folder = has_stat && S_ISDIR(st.st_mode);
-    /* An entry of unknown type may be a folder, which cannot be searched, so the entry is reported
-     * here. An entry with the name of a model is not reported here but added; the error is reported
-     * when the model is opened. */
+    /* Without `st`, the type of the entry is unknown. If the entry has the name of a model, it is
+     * added, and opening the model reports the error. Otherwise it may be a folder that should be
+     * searched, and is reported as unread. */
     if (!has_stat && !is_model_name(name))
         return report_unread(f, folder, below, name);
     if (!is_folder && !is_model_name(name))

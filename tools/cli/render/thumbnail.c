@@ -21,7 +21,9 @@ typedef struct drawing {
     bool closed;
 } drawing;
 
-/* Returns the deepest level whose patches have at most FACES_MAX triangles, or -1. */
+/* Starts at level 0, and goes one level deeper as long as the deeper level has patches and these
+ * have at most FACES_MAX triangles together. Returns the last level, or -1 if level 0 has no
+ * patches. */
 static int patch_level(const ebpo_surface *table)
 {
     uint64_t triangles[EBPO_LEVELS_MAX] = { 0 };
@@ -63,19 +65,19 @@ static ebpo_status load_mesh(drawing *d, const ebpo_file *file, ebpo_error *erro
     return status == EBPO_OK ? ebpo_mesh_colours(&d->mesh, &d->colours, error) : status;
 }
 
-/* Loads the envelopes of the deepest level with at most NODES_MAX nodes; if there is none, of level
- * 0. */
+/* Loads the envelopes of the deepest level with at most NODES_MAX nodes, or the envelopes of level
+ * 0 if all levels have more. */
 static ebpo_status load_level(drawing *d, const ebpo_file *file, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
     ebpo_lod_nodes nodes;
-    uint64_t closed = 0; /* leaves and black nodes of coarser levels */
+    uint64_t ended = 0; /* leaves and black nodes at levels up to i */
     int level = 0;
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
-        closed += l->leaf_count + l->black_count;
-        if (closed + l->gray_count > NODES_MAX)
+        ended += l->leaf_count + l->black_count;
+        if (ended + l->gray_count > NODES_MAX)
             break;
         level = i;
     }
