@@ -284,7 +284,8 @@ static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t 
 
 START_TEST(test_lod_cancel_leaves_nothing)
 {
-    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 120, 60), DEFAULT, 0);
+    const uint32_t around = ebpo_test_scale() < 1 ? 120 : 300;
+    ebpo_file *file = build(ebpo_test_torus(2, 0.7, around, around / 2), DEFAULT, 0);
     bool go_on = false;
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
     options.threads = 1;
