@@ -1,10 +1,10 @@
 /* Cuts convex polytopes with any number of faces, by the method of geometry/polytope.c (BP 2008,
  * section 3.4.3) on arrays that grow. A shape is the list of the polytope's faces with their
  * vertices. A cut builds a second shape, which replaces the first shape if the cut succeeds. The
- * new face in the cutting plane is called the cap, and the edges of the other faces on this plane
- * are called the rim. A vertex that is nearer to the cutting plane than a tolerance counts as a
- * vertex on the plane. If rounding errors would make the new shape inconsistent, the cut is
- * refused; so the polytope is never too small. */
+ * new face in the cutting plane is called the cap. The rim consists of the edges that the other
+ * faces have in the cutting plane. A vertex that is nearer to the cutting plane than a tolerance
+ * counts as a vertex on the plane. If rounding errors would make the new shape inconsistent, the
+ * cut is refused; so the polytope is never too small. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

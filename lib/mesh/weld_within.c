@@ -1,4 +1,4 @@
-/* Decides which vertices that are within a distance of each other are joined. Vertices are visited
+/* Joins vertices that are within a distance of each other. Vertices are visited
  * in ascending order of x, y and z. A vertex stays if no earlier vertex that stays is within the
  * distance. Every other vertex is replaced by the nearest vertex that stays. A grid of cells finds
  * neighbours, and exact arithmetic decides close comparisons. */
@@ -36,9 +36,9 @@ typedef struct grouping {
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
     uint32_t *map;   /* [vertex_count] vertex that replaces each vertex */
-    /* [mask + 1] for each hash, the last remaining vertex in the cells with this hash */
+    /* [mask + 1] head of the list of the vertices that stay, in cells with the same hash */
     uint32_t *slots;
-    uint32_t *chain; /* [vertex_count] previous remaining vertex in the same slot */
+    uint32_t *chain; /* [vertex_count] next vertex of this list */
     uint64_t mask;
     /* [threads] largest squared distance of a vertex from the vertex that replaces it */
     double *moved;
@@ -258,8 +258,8 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
                               g->distance, 2 * g->extent);
     if (g->distance < LEAST_DISTANCE || g->extent / g->distance > MAX_CELLS)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "a weld distance of %g is less than the spacing of coordinates up "
-                              "to %g; weld vertices of equal positions only",
+                              "a weld distance of %g is too small beside coordinates of size %g; "
+                              "weld vertices of equal positions only",
                               g->distance, 2 * g->extent);
     return EBPO_OK;
 }

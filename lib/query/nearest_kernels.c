@@ -1,6 +1,7 @@
 /* Implements the kernel that finds the nearest face of one accel (acceleration structure of a
- * subtree). The kernel walks from node to node of the hierarchy over blocks of faces, eight
- * children or eight faces at a time, in single precision.
+ * subtree). Faces are in blocks of eight, and a hierarchy of nodes with up to eight children is
+ * above the blocks. The kernel walks through the nodes, and tests eight children or faces at a time
+ * in single precision.
  *
  * The walk drops only nodes and faces that are certainly farther than the best upper bound. All
  * other faces become candidates, which nearest.c compares.
@@ -49,14 +50,16 @@ EBPO_EIGHT f8 near_by_cylinders(const ebpo_bound_cylinder *cylinder, const near_
         twice[k] = f8_sub(boxes->low[k], boxes->minus_high[k]);
         part[k] = f8_mul(twice[k], f8_mul(f8_from_shorts(cylinder->axis[k]), f8_all(0x1p-16f)));
     }
-    /* position of the middle relative to the point */
+    /* along: scalar product of the axis and the vector from the point to the box's centre */
     f8 along = f8_add(f8_add(part[0], part[1]), part[2]), step = f8_all(cylinder->along_step),
        from = f8_mul(f8_from_shorts(cylinder->from), step),
        to = f8_mul(f8_from_shorts(cylinder->to), step),
        radius = f8_mul(f8_from_shorts(cylinder->radius), f8_all(cylinder->aside_step));
     f8 over = f8_max3(f8_add(along, from), f8_sub(f8_sub(zero, along), to), zero);
-    /* away2: square of the distance of the middle, minus a margin, so that the root of the
-     * difference of away2 and along^2 is a lower bound even if both squares are large */
+    /* away2: square of the distance of the box's centre from the point. The distance of the centre
+     * from the line through the point along the axis is the root of away2 - along^2. If both
+     * squares are large, their difference has a large error, so away2 is reduced by a margin: the
+     * root is a lower bound. */
     f8 away2 = f8_mul(near_square_sum(twice), f8_all(0.25f * (1 - 0x1p-19f))),
        aside2 = f8_max(f8_sub(away2, f8_mul(along, along)), zero),
        aside = f8_max(f8_sub(f8_sqrt(aside2), radius), zero);
@@ -166,13 +169,14 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
 }
 
 /* Computes bounds of the distances of eight faces: the computed distance minus and plus a margin.
- * The margin is 2^-16 r, where r is the sum of the absolute coordinates of a corner and two edges,
- * plus EBPO_NEAR_UNDERFLOW for the underflow of squares. The height of a "sturdy" face is at least
- * an eighth of the face's longest edge. For a sturdy face, the computed distance is the distance to
- * the face's plane if the point projects into the face, otherwise the distance to the face's edges.
- * For other faces, the computed distance is always the distance to the edges. No point of a face is
- * farther from the edges than the face's height, so for these faces the height is subtracted from
- * the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces". */
+ * The margin is 2^-16 r + EBPO_NEAR_UNDERFLOW. r is the sum of the absolute coordinates of a corner
+ * and two edges; the second term is for the underflow of squares. The height of a "sturdy" face is
+ * at least an eighth of the face's longest edge. For a sturdy face, the computed distance is the
+ * distance to the face's plane if the point projects into the face, otherwise the distance to the
+ * face's edges. For other faces, the computed distance is always the distance to the edges. No
+ * point of a face is farther from the edges than the face's height, so for these faces the height
+ * is subtracted from the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces".
+ */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;
@@ -208,8 +212,8 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 
 /* --- the walk --- */
 
-/* Visits a block, whose parent is `node`. First lowers the limit to the least upper bound of the
- * eight faces, so that most of the faces are known to be farther. Adds the remaining faces to the
+/* Visits a block, whose parent is `node`. First lowers the limit to the smallest of the upper
+ * bounds of the eight faces. Then adds the faces whose lower bounds are not above the limit to the
  * candidates. */
 EBPO_EIGHT void near_block_in(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
@@ -246,8 +250,8 @@ static __attribute__((noinline)) void near_doubles(ebpo_near_search *g, uint32_t
     near_block_in(g, block, node, true);
 }
 
-/* Visits a block. The two functions that do the work are not inlined, because their code is long,
- * and engines of WebAssembly compile it at the first query. */
+/* Visits a block. The two functions that do the work are not inlined here. Their code is long, and
+ * one copy of each is enough: engines of WebAssembly compile each copy at the first query. */
 EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node)
 {
     if (g->s->wide)
@@ -310,9 +314,9 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
 }
 
 /* Visits the first block (g->first_block), if there is one. Returns the node where the walk begins.
- * Without a first block, the walk begins at the root. With a first block, the walk begins at the
- * lowest node above this block compared with which the search is small (NEAR_SMALL). Above this
- * node, the search hardly ever needs another child. */
+ * Without a first block, the walk begins at the root. Otherwise the walk begins at an ancestor of
+ * the block: the lowest one that is large compared with the search (NEAR_SMALL). Nodes outside this
+ * ancestor are hardly ever needed. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
 {
     const ebpo_bound *bound = g->s->bound;
@@ -320,7 +324,8 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g)
     if (g->first_block == EBPO_NO_BLOCK)
         return g->s->root_bound;
     near_block(g, g->first_block, node);
-    if (g->late) /* with a deadline, all unvisited nodes must be below nodes on the stack */
+    if (g->late) /* with a deadline, each unvisited node must be a descendant of a node on the stack
+                  */
         return g->s->root_bound;
     while (node != g->s->root_bound && g->limit2 > bound[node].cylinder_limit2 * NEAR_SMALL)
         node = bound[node].parent;

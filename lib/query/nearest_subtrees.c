@@ -110,7 +110,8 @@ void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
         return;
     uint64_t more = loaded - NEW_NEEDED;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
-        (void)!ebpo_deep_bounds_make(m, NULL); /* of a local file: never pending */
+        (void)!ebpo_deep_bounds_make(
+            m, NULL); /* The file is local, so the result is never EBPO_E_PENDING. */
 }
 
 /* A search for the least lower bound among the deepest nodes of the deep bounds. */
@@ -194,8 +195,9 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
 /* --- the search --- */
 
 /* Values of ebpo_ranked.what: what an entry of the queue stands for. NODE: a node of the top, or a
- * subtree that has not left the queue yet. OWNED: the faces that the subtree owns; if it has no
- * skeleton, all its faces. SHARED: the subtree's shared faces, which other subtrees own. */
+ * subtree that has not left the queue yet. OWNED: the faces that the subtree owns (see "bounds from
+ * skeletons" below), or all its faces if the subtree has no skeleton. SHARED: the subtree's shared
+ * faces, which other subtrees own. */
 enum { NODE = 0, OWNED, SHARED };
 
 typedef struct searching {
@@ -297,10 +299,10 @@ static unsigned list_needed(const searching *g, uint32_t below, double limit,
 /* Before a subtree of a remote file is entered, sends prefetch hints for it and for other new
  * subtrees that the search probably needs, so that one round trip fetches all of them. The result
  * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
- * first 3/16 of this interval are requested (in the first half, if there are deep bounds). For 60
- * points anywhere in the box of a model of 4.3 million faces, a query takes 11.5 round trips and
- * 999 kB without these hints, 6.9 and 1,040 kB with 3/16, 6.0 and 1,103 kB with 1/2. For far
- * points, whose bounds are keys (point_bounds.h), no hints are sent. */
+ * first 3/16 of this interval are requested (in the first half, if there are deep bounds). Measured
+ * for 60 points anywhere in the box of a model of 4.3 million faces, per query: 11.5 round trips
+ * and 999 kB without these hints; 6.9 round trips and 1,040 kB with 3/16; 6.0 round trips and 1,103
+ * kB with 1/2. For far points, whose bounds are keys (point_bounds.h), no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
@@ -335,8 +337,9 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
     g->new_loads += g->c->loaded > loaded && is_new;
-    /* A better bound of this subtree would help later queries, if the subtree had no face that is
-     * nearer than the limit, or if many subtrees are at about this distance. */
+    /* A better bound of this subtree would help later queries in two cases: the subtree had no face
+     * nearer than the limit, or the limit is larger than the subtree's cell, so that many subtrees
+     * are at similar distances. */
     bool needs_bounds =
         g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
     if (g->c->loaded > loaded && needs_bounds)
@@ -355,8 +358,8 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
  * these owners has no skeleton, S itself is searched.
  *
  * So the nearest face is found: its nearest point is in the cell of some S, and S or the face's
- * owner is searched. All bounds that lead to this search are at most the face's distance. The queue
- * may return S and the owner in any order. */
+ * owner is searched. The bounds of all entries that lead from S to the owner are at most the
+ * distance of the face. The queue may return S and the owner in any order. */
 
 /* Returns the bounds (distances, or keys for a far point) of a skeleton. */
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
@@ -366,8 +369,9 @@ static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skele
 }
 
 /* Adds the owned faces of a subtree to the queue, unless this query has already done that. `lower`:
- * bound of the queue's current entry. (The bounds of entries that leave the queue only increase, so
- * a second entry of the same faces would not have a lower bound.) */
+ * bound of the queue's current entry. (Entries leave the queue in ascending
+ * order of their bounds. So a later entry of the same faces could only have the same or a larger
+ * bound, and is not needed.) */
 static ebpo_status add_owned(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
@@ -380,8 +384,8 @@ static ebpo_status add_owned(searching *g, uint32_t below, double lower, ebpo_er
     return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
-/* A walk to the subtrees that may own shared faces of a subtree S: subtrees whose cells intersect a
- * box around these faces, and which precede S, depth first. */
+/* A walk to the subtrees that may own shared faces of a subtree S. These subtrees precede S in
+ * depth-first order, and their cells intersect a box around the shared faces. */
 typedef struct owners {
     searching *g;
     uint64_t code;                /* octcode of S */
@@ -393,8 +397,9 @@ typedef struct owners {
     ebpo_status status;
 } owners;
 
-/* Returns true if the box o->shared intersects the cell, enlarged by 1/128 of its size. (A node may
- * also list faces that are near its cell, within 1/256 of its size: format-spec, section 7.) */
+/* Returns true if the box o->shared intersects the enlarged cell. A node may also list faces
+ * outside its cell, within 1/256 of the cell's size (format-spec, section 7). The cell is enlarged
+ * by 1/128, so that rounding errors do not matter. */
 static bool cell_intersects(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];
@@ -482,9 +487,10 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
     return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
-/* Returns true if the deep bounds have less than a quarter of the bytes of the subtrees that this
- * search may have to load without them. (With deep bounds, it loads about a third.) Returns false
- * if the bytes of the deep bounds are not known, because their chunks could not be located. */
+/* Compares the bytes of the deep bounds with the bytes of all subtrees that this search may have to
+ * load. Returns true if the deep bounds have less than a quarter of these bytes. (With deep bounds,
+ * the search loads about a third of these subtrees.) Returns false if the bytes of the deep bounds
+ * are not known, because their chunks could not be located. */
 static bool deep_bounds_pay(const searching *g)
 {
     uint32_t needed[EBPO_CACHE_AHEAD];
@@ -500,9 +506,10 @@ static bool deep_bounds_pay(const searching *g)
     return known && bytes < 0.25 * subtree_bytes * (double)subtrees;
 }
 
-/* For a remote file, reads deep bounds as soon as they pay. If their bytes are not available yet,
- * the other points of the batch that need them wait for the next pass without reading them again. A
- * query with a deadline does not read them, because the read could take longer. */
+/* For a remote file, reads deep bounds as soon as they pay. If the source of bytes
+ * returns EBPO_E_PENDING, this point and all later points of the batch that need deep bounds wait
+ * for the next call; only the first of them requests the bytes. A query with a deadline does not
+ * read them, because the read could take longer. */
 static ebpo_status improve_bounds(searching *g, ebpo_error *error)
 {
     ebpo_model *m = g->c->model;

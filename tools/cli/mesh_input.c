@@ -186,9 +186,9 @@ void mesh_input_warn(const char *command, const char *path, const mesh_input *in
     const ebpo_mesh *m = &input->as_read;
     if (m->polygons_guessed)
         fprintf(stderr,
-                "ebpo %s: %s: warning: %llu of %llu polygons %s and got the triangles of least "
-                "area, a guess (the first one begins at face %llu); triangulate such polygons in "
-                "the program that wrote them\n",
+                "ebpo %s: %s: warning: %llu of %llu polygons %s and got triangles of least area, "
+                "which may be wrong (from face %llu on); triangulate such polygons in the program "
+                "that wrote them\n",
                 command, path, (unsigned long long)m->polygons_guessed,
                 (unsigned long long)m->polygons_triangulated,
                 m->polygons_guessed == 1 ? "crosses itself" : "cross themselves",

@@ -16,7 +16,8 @@
  * A *catalogue* is a list of entries, each with the path, the box and the digest (content_sha256)
  * of a model. *Parts* are files of one model that was cut; *caps* are faces that close a part where
  * it was cut. A query opens a model only if its box shows that the model can contribute to the
- * result. Distances and rays use the entry's model at `surface`, or at `path` if `surface` is NULL.
+ * result. Distances and rays use the file that the member `surface` of the entry names, or the
+ * file `path` if `surface` is NULL.
  * Results are those of the models (query.h) and do not depend on the budget. docs/guide/clusters.md
  * describes the file format and the results of parts.
  *
@@ -54,8 +55,8 @@ typedef struct ebpo_catalogue_entry {
     const char *surface;
 
     /*
-     * For a part: path of an .npy file of face indices. For each face of the part that is used for
-     * distances and rays, the file has the face's index in the whole model. Must not be empty.
+     * For a part: path of an .npy file of face indices. Element i is the index, in the whole
+     * model, of face i of the file that distances and rays use. Must not be empty.
      * NULL: results give the indices of faces in the part.
      */
     const char *numbers;
@@ -175,9 +176,9 @@ EBPO_API void ebpo_catalogue_entry_of(const ebpo_file *file, const char *path,
 EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
 /*
- * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin with the
- * folder of `path` (compared as bytes) become relative to it; other paths are unchanged. When the
- * catalogue is read again, relative paths are based on that folder.
+ * Writes the catalogue as a JSON file, which is replaced atomically. A model's path that begins
+ * with the bytes of the path of the catalogue's folder is written relative to this folder; other
+ * paths are unchanged. When the catalogue is read again, relative paths begin at its folder.
  *
  * EBPO_E_ARGUMENT: a path is not UTF-8. EBPO_E_IO.
  *
@@ -363,9 +364,10 @@ typedef struct ebpo_catalogue_query_options {
  * is inside any model. Otherwise it is on a face if it is on a face of any model.
  *
  * If the models are parts of one model, the rule is applied to the sum of the winding numbers. The
- * result is exactly the result for the whole model, also for points on caps. EBPO_E_LIMIT: each of
- * 64 rays from a point on a cap hits an edge or runs along a face. EBPO_E_ABSENT: a point is on a
- * cap, and the catalogue has no surface of any part.
+ * result is exactly the result for the whole model, also for points on caps. For such points, the
+ * function counts the crossings of a ray with the faces. EBPO_E_LIMIT: each of 64 rays hits an edge
+ * or runs along a face. EBPO_E_ABSENT: a point is on a cap, and the member `surface` is NULL for
+ * all parts.
  *
  * EBPO_E_NOT_SOLID: a model is a surface.
  *
@@ -396,9 +398,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 /*
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
  * have the same rounded t, the first of them in the catalogue is used. Exception: the nearest hits
- * of several models may all have t = INFINITY (ebpo_ray_hit). These hits are compared by their t
- * for a longer direction: the direction of the ray, multiplied by a power of two. The returned t
- * stays INFINITY.
+ * of several models may all have t = INFINITY (ebpo_ray_hit). To compare these hits,
+ * their t are computed again with the ray's direction multiplied by a power of two. The returned t
+ * is INFINITY nevertheless.
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -60,8 +60,9 @@ typedef struct ebpo_haptic_options {
     size_t struct_size;
 
     /*
-     * Radius of the ball in the model's unit, at least 0. 0: the ball is a point. `faces` must be
-     * large enough for all faces within the radius plus `search_radius` of the device. A step tests
+     * Radius of the ball in the model's unit, at least 0. 0: the ball is a point. The option
+     * `faces` must be at least the number of faces whose distance from the device is at most the
+     * radius plus `search_radius`. A step tests
      * at most 512 of these faces, in the order in which the ball may touch them. If there are more
      * faces, the next steps test the remaining faces.
      */
@@ -126,9 +127,9 @@ typedef struct ebpo_haptic_options {
  *
  * model      must outlive the object. Contexts may use the model at the same time. The model's
  *            budget limits loading (ebpo_model_options.memory)
- * position   three finite doubles. Ball: outside the solid, and no face may be within the radius
- *            plus 1.5 times `skin` of the position. Tool: each point of the tool must meet these
- *            conditions, with radius 0. Probe: any position
+ * position   three finite doubles. Ball: outside the solid, and the distance from every
+ *            face must be greater than the radius plus 1.5 times `skin`. Tool: each point of the
+ * tool must meet these conditions, with radius 0. Probe: any position
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
@@ -203,11 +204,13 @@ typedef struct ebpo_haptic_ball_result {
     double normal[3];
 
     /*
-     * In contact: length of the vector from proxy to device. With EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_PATH_UNFINISHED: length of the part of this vector by which faces hold the proxy
-     * back. Without contact: minus the distance from the ball to the nearest face, or minus
-     * `search_radius` if no face is within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face
-     * that was not tested may be nearer.
+     * In contact: length of the vector from proxy to device. With EBPO_HAPTIC_WAITING
+     * or EBPO_HAPTIC_PATH_UNFINISHED, not only faces hold the proxy back. In this case, `depth` is
+     * the length of the vector's component in the directions in which faces hold it back. Without
+     * contact:
+     * minus the distance from the ball to the nearest face, or minus `search_radius` if no face is
+     * within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face that was not tested may be
+     * nearer.
      */
     double depth;
 
@@ -233,11 +236,11 @@ typedef struct ebpo_haptic_ball_result {
  * boxes were loaded.
  *
  * The force is the force of a spring (stiffness times the vector from device to proxy), minus
- * damping times the device velocity. If the spring pushes the device away from a face, the
- * component of the force towards that face is at most 1e-7 of the length of the force. If needed,
- * the force is reduced to limit the energy. For any motion, the total energy given to the device is
- * at most the energy taken from the device, plus stiffness times the square of the longest step of
- * the device.
+ * damping times the device velocity. If the spring pushes the device away from a face, damping does
+ * not turn the force towards the face: the component of the force towards the face is at most 1e-7
+ * of the force's length. If needed, the force is reduced to limit the energy. For any motion, the
+ * total energy given to the device is at most the energy taken from the device, plus stiffness
+ * times the square of the longest step of the device.
  *
  * Threads: one at a time per object.
  */
@@ -360,8 +363,8 @@ typedef struct ebpo_haptic_tool_result {
 /*
  * Computes one haptic step of a tool with the device at `position`, rotated by the quaternion
  * `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or comes closer
- * than half of `skin` to a face; as for a ball, exact arithmetic ensures this. A tool has no
- * collisions between its points. So the points must be closer to each other than the size of the
+ * than half of `skin` to a face; as for a ball, exact arithmetic ensures this. The space
+ * between the points is not tested. So the points must be closer to each other than the size of the
  * smallest details of the model that the user is to feel.
  *
  * A rotation counts as a length: its angle times the arm of the tool. The arm is the root mean
@@ -371,10 +374,11 @@ typedef struct ebpo_haptic_tool_result {
  * times arm^2 for angles. As in ebpo_haptic_step_ball, force and torque are reduced to limit the
  * energy; here, too, rotations count as lengths.
  *
- * Time is bounded as in ebpo_haptic_step_ball. A point takes almost no time if it has not moved far
- * enough since its last test to be near a face. If many points are near faces, and their tests
- * exceed the work limit of a step, the next steps continue the tests (EBPO_HAPTIC_PATH_UNFINISHED).
- * The tool does not move until all tests are done.
+ * Time is bounded as in ebpo_haptic_step_ball. Testing a point measures its distance from the
+ * nearest face. Until the point has moved by this distance, its next tests take almost no time. If
+ * many points are near faces, and their tests exceed the work limit of a step, the next steps
+ * continue the tests (EBPO_HAPTIC_PATH_UNFINISHED). The tool does not move until all tests are
+ * done.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of

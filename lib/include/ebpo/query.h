@@ -65,11 +65,10 @@ typedef struct ebpo_model_options {
     size_t struct_size;
 
     /*
-     * Maximum memory of the model in bytes, including its caches and buffers for loading. If
-     * `memory` is 0, a local file has no limit. A remote file (http.h) has a limit of 256 MiB if
-     * `cut_level` is -1, and otherwise no limit. A remote file larger than 2 MiB is loaded subtree
-     * by subtree if `memory` is 0. If such a file has a table of subtrees
-     * (ebpo_info.subtree_level), it is loaded subtree by subtree for any value of `memory`.
+     * Maximum memory of the model in bytes, including its caches and buffers for loading. 0: no
+     * limit, except for a remote file (http.h) with a `cut_level` of -1, whose limit is then 256
+     * MiB. A remote file larger than 2 MiB is loaded subtree by subtree if `memory` is 0, or if it
+     * has a table of subtrees (ebpo_info.subtree_level).
      *
      * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
      * per loading thread) and contexts. A context contains results; for distances, it also contains
@@ -195,8 +194,8 @@ typedef struct ebpo_model_plan {
 
 /*
  * Estimates memory use for a budget from the counts in the file header; reads no chunks. If a cut
- * level and a budget are given, the estimate can succeed although ebpo_model_new fails because the
- * levels exceed the budget.
+ * level and a budget are given, the estimate can succeed even if ebpo_model_new fails. The reason
+ * is that only ebpo_model_new tests if the levels fit into the budget.
  *
  * EBPO_E_LIMIT: the budget is too small; the message names a sufficient budget.
  *
@@ -400,9 +399,10 @@ typedef struct ebpo_inside_options {
     size_t struct_size;
 
     /*
-     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. The
-     * envelopes of a surface contain its faces, but not its inside. So for a surface, the result in
-     * every cell of a gray node or leaf is EBPO_MAYBE. EBPO_LEVEL_ALL: exact results.
+     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. If
+     * the model is a surface and ebpo_info.border_inside is false, the envelopes do not contain the
+     * inside. Then the result in every cell of a gray node or leaf is EBPO_MAYBE. EBPO_LEVEL_ALL:
+     * exact results.
      */
     int level;
 
@@ -876,9 +876,10 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  * and C at the face's corners a, b and c. The weights depend on the position of the point p. Labels
  * are averaged like all other values.
  *
- * The weights are computed in doubles, without fused operations. Let e = b - a, f = c - a and d = p
- * - a. These three vectors are multiplied by one power of two, so that the greatest absolute
- * coordinate of e and f is at least 1 and less than 2. Scalar products add x, y, z in this order.
+ * The weights are computed in doubles, without fused operations. The
+ * three vectors e = b - a, f = c - a and d = p - a are multiplied by one power of two, so that the
+ * greatest absolute coordinate of e and f is at least 1 and less than 2. Scalar products add x, y,
+ * z in this order.
  *
  *     D   = (e.e)(f.f) - (e.f)(e.f)
  *     w_b = ((f.f)(d.e) - (e.f)(d.f)) / D, or 0 if negative
@@ -888,8 +889,8 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  * Each weight is divided by the sum of the three weights. If D is at most 2^-900, the face counts
  * as a face without area, and only its longest edge is used. (If several of the edges ab, ac and bc
  * are longest, the first in this order is used.) Let q be the point of this edge that is nearest to
- * p. The weights of the edge's two corners interpolate linearly at q. The weight of the third
- * corner is 0.
+ * p. The weights of the edge's two corners are those of linear interpolation at q. The weight of
+ * the third corner is 0.
  *
  * The value is the sum (w_a A + w_b B) + w_c C. Corners with weight 0 are omitted from the sum. The
  * sum is clamped to the range from the least to the greatest value of the remaining corners. At a
@@ -1067,12 +1068,11 @@ typedef struct ebpo_mass {
 
     /*
      * A surface with EBPO_PART_BORDER is measured with the caps that format-spec/border.md defines
-     * for each loop of the border. Other caps would change `integral` and the centroid of the
-     * winding number by at most these members (INFINITY: no bound). This is true if the other caps
-     * of each loop satisfy two conditions. First, they are in the convex hull of the loop. Second,
-     * they form a closed mesh with the reversed caps of border.md. All winding numbers of this mesh
-     * are -w, 0 or w, where w is the weight of the loop (border.md). 0 if the file has no
-     * EBPO_PART_BORDER.
+     * for each loop of the border. Other caps would change `integral` and `centroid` by at most
+     * these members (INFINITY: no bound), if they satisfy two conditions for each loop. First, the
+     * other caps are in the convex hull of the loop. Second, the other caps and the reversed caps
+     * of border.md form a closed mesh. Its winding numbers are only -w, 0 and w, where w is the
+     * weight of the loop (border.md). 0 if the file has no EBPO_PART_BORDER.
      */
     double caps_integral, caps_centroid;
 } ebpo_mass;

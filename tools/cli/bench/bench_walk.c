@@ -1,5 +1,5 @@
-/* Simulates a walk along the surface of a mesh, for points of a continuous path. The walk has a
- * position in a face, and a direction in the plane of this face. */
+/* Simulates a walk along the surface of a mesh, which returns the points of a continuous path. The
+ * walk has a position in a face, and a direction in the plane of this face. */
 #include "cli/bench/bench_walk.h"
 
 #include <math.h>
@@ -110,9 +110,9 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
     return -1;
 }
 
-/* Returns another face at the edge of the walk's face from vertex a to vertex b; UINT64_MAX: there
- * is none. Prefers a face whose edge leads from b to a. *third: the vertex of the returned face
- * that is neither a nor b. */
+/* The walk's face has an edge from vertex a to vertex b. Returns another face at this edge, or
+ * UINT64_MAX if there is none. Prefers a face whose edge leads from b to a. *third: the vertex of
+ * the returned face that is neither a nor b. */
 static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
@@ -241,7 +241,7 @@ static void turn_walker(walker *w)
         place_on_face(w);
     subtract_vectors(w->p, w->corner[0], off);
     add_scaled(w->p, -dot_product(off, w->n),
-               w->n); /* keeps d in the face's plane in spite of rounding errors */
+               w->n); /* keeps p in the face's plane in spite of rounding errors */
     for (int k = 0; k < 3; k++)
         w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
     if (!normalise_vector(w->side))

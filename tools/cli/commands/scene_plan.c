@@ -6,7 +6,8 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* State while needs are printed. The need of a model is the data that queries on the scene can use.
+/* State of the command while it prints needs. A model's need is the data that queries on the scene
+ * can use.
  */
 typedef struct plan {
     const scene_values *v;
@@ -188,9 +189,11 @@ static void report_packed(pack *p)
         json_finish(&p->j);
     } else if (!p->v->quiet) {
         char bytes[32], whole[32];
-        fprintf(stderr, "%s of %s in %s/packed.scene.json, for times from %g to %g\n",
+        fprintf(stderr,
+                "packed %s of the models' %s for times from %g to %g; the scene is "
+                "%s/packed.scene.json\n",
                 words_bytes(bytes, sizeof bytes, p->bytes),
-                words_bytes(whole, sizeof whole, p->source_bytes), p->v->out, p->v->from, p->v->to);
+                words_bytes(whole, sizeof whole, p->source_bytes), p->v->from, p->v->to, p->v->out);
     }
 }
 
