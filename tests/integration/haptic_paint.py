@@ -190,6 +190,23 @@ def test_lifted_pen(t):
     check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
 
 
+def test_unplugged(t):
+    """A device whose positions are missing for a time does not paint along the way to its next position."""
+    paint = t.at("unplugged.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    device = Device(p)
+    device.draw(p, 0.6)
+    time.sleep(0.4)
+    for x in (0.7, 0.72, 0.74, 0.76):
+        for _ in range(20):
+            device.send((x, 0.5, 0.98))
+            time.sleep(0.002)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    strokes = [[q["place"][0] for q in s["points"]] for s in t.strokes(paint)]
+    check(p.returncode == 0 and len(strokes) == 2 and max(strokes[0]) < 0.3 and min(strokes[1]) > 0.6, err, strokes)
+
+
 def test_full_disk(t, recovers):
     """The loop continues when the paint cannot be saved. It is saved when there is space again."""
     paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
@@ -302,6 +319,7 @@ def main(ebpo):
         test_kill(t)
         test_second_writer(t)
         test_lifted_pen(t)
+        test_unplugged(t)
         test_saved_elsewhere(t)
         test_view(t)
         test_full_disk(t, True)

@@ -26,12 +26,21 @@ enum {
     PACKETS_MAX = 32 /* maximum number of packets taken in a step */
 };
 
+/* Seconds after the last position at which the forces begin to decrease, and at which they are 0
+ * and the pen is lifted: the device may be unplugged. As in samples/haptic_link.h. */
+static const double HOLD_SECONDS = 0.05, ZERO_SECONDS = 0.1;
+
+/* After a silence the pen stays lifted for this time, until the proxy has followed the device. */
+enum { SETTLE_NS = 50000000 };
+
 typedef struct udp {
     int socket;
     bool known;                /* a valid packet has arrived; `device` is its sender */
     bool ended;                /* the device has sent a packet END */
     struct sockaddr_in device; /* address of the device */
     uint64_t sequence, tag;    /* from the last valid packet; each feedback repeats both numbers */
+    uint64_t arrived;          /* tool_clock at the last valid packet */
+    uint64_t resumed;          /* tool_clock at the last valid packet after a silence */
     uint64_t ignored;          /* number of invalid packets */
     haptic_pose pose;          /* the last position */
 } udp;
@@ -93,6 +102,13 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
     return square >= 0.25 && square <= 4;
 }
 
+/* Returns the share of the force that the device gets: less than 1 if its positions are late. */
+static double force_share(const udp *u)
+{
+    double seconds = 1e-9 * (double)(tool_clock() - u->arrived);
+    return fmax(0, fmin(1, (ZERO_SECONDS - seconds) / (ZERO_SECONDS - HOLD_SECONDS)));
+}
+
 /* Processes a packet. Returns false if it is not valid, is not from the device, or is older than a
  * packet processed before. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
@@ -114,6 +130,9 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
     u->device = *from;
     u->sequence = sequence;
     u->tag = get_bytes(p + 16, 8);
+    if (force_share(u) == 0)
+        u->resumed = tool_clock();
+    u->arrived = tool_clock();
     return true;
 }
 
@@ -169,6 +188,7 @@ static bool read_position(void *self, uint64_t step, haptic_pose *out)
     (void)step;
     take_all(u);
     *out = u->pose;
+    out->lifted |= force_share(u) == 0 || tool_clock() - u->resumed < SETTLE_NS;
     return !u->ended;
 }
 
@@ -176,13 +196,18 @@ static void write_result(void *self, const haptic_result *a)
 {
     udp *u = self;
     uint8_t bytes[FEEDBACK_BYTES], *at = bytes;
+    double share = force_share(u), force[3], torque[3];
+    for (int k = 0; k < 3; k++) {
+        force[k] = share * a->force[k];
+        torque[k] = share * a->torque[k];
+    }
     memcpy(at, "EBPT", 4);
     at = put_bytes(at + 4, VERSION, 2);
     at = put_bytes(at, FEEDBACK, 2);
     at = put_bytes(at, u->sequence, 8);
     at = put_bytes(at, u->tag, 8);
-    at = put_reals(at, a->force, 3);
-    at = put_reals(at, a->torque, 3);
+    at = put_reals(at, force, 3);
+    at = put_reals(at, torque, 3);
     at = put_reals(at, a->proxy.position, 3);
     at = put_reals(at, a->proxy.rotation, 4);
     at = put_reals(at, &a->depth, 1);
@@ -216,9 +241,11 @@ static void end_udp(void *self)
 static bool read_name(const char *name, struct sockaddr_in *out)
 {
     char address[64] = "127.0.0.1", *after;
-    const char *port = name + 4, *colon = strrchr(port, ':');
-    if (strncmp(name, "udp:", 4) != 0)
+    const char *port, *colon;
+    if (!name || strncmp(name, "udp:", 4) != 0)
         return false;
+    port = name + 4;
+    colon = strrchr(port, ':');
     if (colon) {
         if (colon - port >= (ptrdiff_t)sizeof address)
             return false;
