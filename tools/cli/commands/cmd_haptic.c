@@ -37,6 +37,9 @@ typedef struct values {
 /* Returns true if the page of the viewer is the device. */
 static bool is_page(const char *device) { return device && strcmp(device, "viewer") == 0; }
 
+/* Returns true if the device is a 3D mouse. */
+static bool is_mouse(const char *device) { return device && strcmp(device, "spacenav") == 0; }
+
 typedef struct job {
     const values *v;
     const char *name; /* FILE, the operand */
@@ -278,6 +281,14 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
     return status;
 }
 
+/* Opens a 3D mouse, which begins outside of the model. Returns false after an error, reported on
+ * stderr. */
+static bool open_mouse(job *j)
+{
+    return !is_mouse(j->v->device) ||
+           haptic_spacenav_open(&j->device, ebpo_file_info(j->file), j->v->rate, tool_radius(j));
+}
+
 static ebpo_status make_haptic(job *j, const double start[3], ebpo_error *error)
 {
     const values *v = j->v;
@@ -482,6 +493,8 @@ static int run_job(job *j, uint64_t memory)
     ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
     if (status == EBPO_OK)
         status = open_model(j, memory, &error);
+    if (status == EBPO_OK && !open_mouse(j))
+        return EXIT_FAILED;
     if (status == EBPO_OK)
         status = play_empty(j, &error);
     if (status == EBPO_OK)
@@ -546,9 +559,10 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
     if (v->path && v->device)
         return command_usage("haptic", "--path and --device cannot be used together: both move the "
                                        "tool");
-    if (v->device && !is_page(v->device) && !haptic_udp_named(v->device))
+    if (v->device && !is_page(v->device) && !is_mouse(v->device) && !haptic_udp_named(v->device))
         return command_usage("haptic",
-                             "--device '%s': expected udp:PORT, udp:ADDRESS:PORT or viewer",
+                             "--device '%s': expected udp:PORT, udp:ADDRESS:PORT, spacenav or "
+                             "viewer",
                              v->device);
     if (is_page(v->device) && !v->view)
         return command_usage("haptic", "--device viewer needs --view");
@@ -593,7 +607,7 @@ static int run_haptic(void *given, const char **operand)
         return EXIT_USAGE;
     bool prepared = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
                     (!v->path || haptic_path_open(&j.device, v->path)) &&
-                    (!v->device || is_page(v->device) || haptic_udp_open(&j.device, v->device));
+                    (!haptic_udp_named(v->device) || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
     haptic_view_end(j.view);
     (void)haptic_paint_close(j.paint, &j.painted, &j.paint_error);
