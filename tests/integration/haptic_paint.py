@@ -9,6 +9,7 @@ import re
 import resource
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -60,9 +61,9 @@ class Device:
         self.to, self.sent = ("127.0.0.1", int(found[1])), 0
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
-    def send(self, at, kind=1):
+    def send(self, at, kind=1, more=b""):
         self.sent += 1
-        self.socket.sendto(PLACE.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1), self.to)
+        self.socket.sendto(PLACE.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1) + more, self.to)
 
     def draw(self, process, seconds, step=None, kind=1):
         """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""
@@ -188,6 +189,23 @@ def test_lifted_pen(t):
     device.send((0, 0, 0), kind=3)
     out, err = p.communicate(timeout=60)
     check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
+
+
+def test_stylus(t):
+    """The pressure of a stylus sets the size and the opacity of points. Without pressure, nothing is painted."""
+    paint = t.at("stylus.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--colour", "0000ffff", "--fade", "0.5")
+    device = Device(p)
+    for i in range(60):
+        device.send((0.1 + 0.01 * i, 0.5, max(0.99, 1.2 - 0.05 * i)), 1, struct.pack("<d", (0.25, 0.5, 0)[i // 20]))
+        time.sleep(0.01)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0, err)
+    strokes = [(s["colour"], {q["pressure"] for q in s["points"]}, max(q["place"][0] for q in s["points"])) for s in t.strokes(paint)]
+    check([s[0] for s in strokes] == ["#0000ff9f", "#0000ffbf"], strokes)  # 10 and 12 sixteenths
+    check(strokes[0][1] == {16384} and min(strokes[1][1]) >= 16384 and max(strokes[1][1]) == 32768, strokes)
+    check(strokes[1][2] < 0.52, "paint without pressure", strokes)
 
 
 def test_unplugged(t):
@@ -319,6 +337,7 @@ def main(ebpo):
         test_kill(t)
         test_second_writer(t)
         test_lifted_pen(t)
+        test_stylus(t)
         test_unplugged(t)
         test_saved_elsewhere(t)
         test_view(t)

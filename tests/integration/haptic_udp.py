@@ -22,7 +22,8 @@ NONE = [
     b"", b"EBPT", place(9)[:79], place(9) + b"x", bytes(80), bytes(65000), place(9, magic=b"EBPO"),
     place(9, version=2), place(9, kind=0), place(9, kind=2), place(9, at=(NAN, 0, 0)),
     place(9, at=(HUGE, 0, 0)), place(9, turn=(0, 0, 0, 0)), place(9, turn=(NAN, 0, 0, 1)),
-    place(9, turn=(HUGE, 0, 0, 1)), place(9, kind=3)]
+    place(9, turn=(HUGE, 0, 0, 1)), place(9, kind=3), place(9) + bytes(7), place(9) + bytes(9)] + [
+    place(9) + struct.pack("<d", pressure) for pressure in (NAN, -0.1, 1.1, HUGE)]
 
 
 def begin(ebpo, model, *more):

@@ -26,7 +26,7 @@ typedef struct values {
     /* as text; NULL: not given */
     const char *path, *device, *record, *tool, *memory, *paint, *colour, *viewer;
     double rate, seconds, radius, friction, stiffness, damping, skin, search_radius, pen_radius,
-        full_force, thin, spread;
+        full_force, thin, fade, spread;
     int64_t faces, density, layer, port;
     bool probe, json, erase, view;
     remote_values remote;
@@ -364,6 +364,7 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
     pen.dated = v->device != NULL;
     pen.stiffness = v->stiffness;
     pen.full_force = full_force(j);
+    pen.fade = v->fade;
     pen.rate = v->rate;
     pen.diagonal = model_diagonal(ebpo_file_info(j->file));
     return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
@@ -527,7 +528,7 @@ static int check_pen(const values *v)
 {
     uint32_t colour;
     bool pen = v->colour || v->erase || v->pen_radius > 0 || v->full_force > 0 || v->thin != 0.25 ||
-               v->spread > 0 || v->density != 1 || v->layer >= 0;
+               v->fade != 1 || v->spread > 0 || v->density != 1 || v->layer >= 0;
     if (pen && !v->paint)
         return command_usage("haptic", "--pen-radius, --colour and other options of a pen belong "
                                        "to --paint");
@@ -543,6 +544,8 @@ static int check_pen(const values *v)
         return command_usage("haptic", "--colour '%s': expected " WORDS_COLOUR_EXPECTED, v->colour);
     if (v->colour && v->erase)
         return command_usage("haptic", "--erase and --colour cannot be used together");
+    if (v->fade != 1 && v->erase)
+        return command_usage("haptic", "--erase and --fade cannot be used together");
     return v->density != 1 && v->spread == 0
                ? command_usage("haptic", "--density belongs to --spread")
                : EXIT_OK;
@@ -627,6 +630,7 @@ static const values standard = { .rate = 1000,
                                  .damping = 0.4,
                                  .faces = 1 << 14,
                                  .thin = 0.25,
+                                 .fade = 1,
                                  .density = 1,
                                  .layer = -1,
                                  .port = 8080,

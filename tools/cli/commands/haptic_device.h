@@ -13,6 +13,7 @@ typedef struct haptic_pose {
     double position[3];
     double rotation[4]; /* a unit quaternion x, y, z, w; 0 0 0 1: not rotated */
     bool lifted;        /* the pen of the device does not paint */
+    double pressure;    /* of a stylus, above 0 to 1; 0: the force sets the pressure */
 } haptic_pose;
 
 /* Feedback for a device. Only a probe sets lo, hi, rgb and `where`; only other tools set the

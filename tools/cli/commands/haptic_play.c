@@ -171,6 +171,7 @@ static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
                              .depth = a->depth,
                              .clock = tool_clock(),
                              .flags = a->flags,
+                             .pressure = pose->pressure,
                              .lifted = pose->lifted };
     memcpy(sample.device, pose->position, sizeof sample.device);
     memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);

@@ -22,6 +22,7 @@ enum {
     END = 3,
     LIFTED = 4,          /* a position with the pen lifted */
     POSITION_BYTES = 80, /* sizes of packets */
+    PRESSURE_BYTES = 88, /* a position with the pressure of a stylus */
     FEEDBACK_BYTES = 192,
     PACKETS_MAX = 32 /* maximum number of packets taken in a step */
 };
@@ -82,12 +83,19 @@ static uint8_t *put_reals(uint8_t *at, const double *v, int count)
 
 /* --- packets --- */
 
-/* Reads the pose from a packet. Returns false if a coordinate is too large or the rotation is not a
- * quaternion of about unit length. */
-static bool read_pose(const uint8_t *p, haptic_pose *out)
+/* Reads the pose from a packet. Returns false if a coordinate is too large, the rotation is not a
+ * quaternion of about unit length, or the pressure is not 0 to 1. */
+static bool read_pose(const uint8_t *p, ssize_t size, haptic_pose *out)
 {
     double square = 0;
-    out->lifted = get_bytes(p + 6, 2) == LIFTED;
+    out->pressure = 0;
+    if (size == PRESSURE_BYTES) {
+        out->pressure = get_real(p + POSITION_BYTES);
+        if (!(out->pressure >= 0 && out->pressure <= 1))
+            return false;
+    }
+    /* a stylus without pressure does not paint */
+    out->lifted = get_bytes(p + 6, 2) == LIFTED || (size == PRESSURE_BYTES && out->pressure == 0);
     for (int k = 0; k < 3; k++) {
         out->position[k] = get_real(p + 24 + 8 * k);
         if (!(fabs(out->position[k]) <= 0x1p200))
@@ -114,7 +122,8 @@ static double force_share(const udp *u)
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;
-    if (size != POSITION_BYTES || memcmp(p, "EBPT", 4) != 0 || get_bytes(p + 4, 2) != VERSION)
+    if ((size != POSITION_BYTES && size != PRESSURE_BYTES) || memcmp(p, "EBPT", 4) != 0 ||
+        get_bytes(p + 4, 2) != VERSION)
         return false;
     uint64_t kind = get_bytes(p + 6, 2), sequence = get_bytes(p + 8, 8);
     if (u->known && (from->sin_port != u->device.sin_port ||
@@ -122,7 +131,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
         return false;
     if (kind == END && u->known)
         u->ended = true;
-    else if ((kind == POSITION || kind == LIFTED) && read_pose(p, &pose))
+    else if ((kind == POSITION || kind == LIFTED) && read_pose(p, size, &pose))
         u->pose = pose;
     else
         return false;
@@ -139,7 +148,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
 /* Processes the packets that have arrived; does not wait. */
 static void take_all(udp *u)
 {
-    uint8_t bytes[POSITION_BYTES + 1];
+    uint8_t bytes[PRESSURE_BYTES + 1];
     for (int i = 0; i < PACKETS_MAX; i++) {
         struct sockaddr_in from;
         socklen_t length = sizeof from;
