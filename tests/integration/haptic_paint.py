@@ -4,6 +4,7 @@ The device is this script, which sends UDP packets, or a recorded path. The mode
 """
 import fcntl
 import json
+import math
 import os
 import re
 import resource
@@ -225,6 +226,45 @@ def test_unplugged(t):
     check(p.returncode == 0 and len(strokes) == 2 and max(strokes[0]) < 0.3 and min(strokes[1]) > 0.6, err, strokes)
 
 
+def test_brush(t):
+    """A tool of 10,000 points, which is tilted, paints where it touches."""
+    brush, path, paint = t.at("brush.txt"), t.at("brush.path"), t.at("brush.paint.h5")
+    line(brush, [(0.1 * math.cos(i) * (i / 10000) ** 0.5, 0.1 * math.sin(i) * (i / 10000) ** 0.5,
+                  0.1 - 0.1 * (1 - i / 10000) ** 0.5) for i in range(10000)])  # the lower half of a ball
+    tilt = 0.5  # about the x axis; the lowest point is then at y = 0.1 sin(tilt), z = -low
+    low = 0.1 - 0.1 * math.cos(tilt)
+    with open(path, "w", encoding="ascii") as out:
+        out.writelines(f"{0.2 + 0.0003 * i} 0.5 {max(0.99 + low, 1.1 - 0.001 * i)} {math.sin(-tilt / 2)} 0 0 {math.cos(tilt / 2)}\n"
+                       for i in range(2000))
+    p = t.start(paint, "--tool", brush, "--path", path)
+    out, err = p.communicate(timeout=60)
+    got = json.loads(out)
+    check(p.returncode == 0 and err == "" and got["paint"]["lost_steps"] == 0, p.returncode, err)
+    check(got["contacts"] > 1800 and got["paint"]["strokes"] == 1, got["contacts"], got["paint"])
+    points = t.strokes(paint)[0]["points"]
+    check(all(abs(q["place"][2] - 1) < 1e-9 and abs(q["place"][1] - 0.5 - 0.1 * math.sin(tilt)) < 0.01 for q in points), points)
+    check(points[0]["place"][0] < 0.23 and points[-1]["place"][0] > 0.78 and 0.4 < points[-1]["pressure"] / 65535 < 0.5, points[-1])
+
+
+def test_probe(t):
+    """The page of a probe gets its distance, and the colour of the distance."""
+    viewer = t.at("probe")
+    os.mkdir(viewer)
+    with open(os.path.join(viewer, "index.html"), "w", encoding="ascii"):
+        pass
+    p = subprocess.Popen([t.ebpo, "haptic", "--probe", "--view", "--viewer", viewer, "--port", "0", "--device", "viewer",
+                          t.model], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    port = int(re.search(r"127\.0\.0\.1:(\d+)/", p.stderr.readline())[1])
+    page = request(port, "GET /live", "Sec-Fetch-Site: same-origin")[1]
+    press(port, 0.5, 1.02)
+    seen, end = b"", time.monotonic() + 5
+    while not re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen) and time.monotonic() < end:
+        seen += page.recv(65536)
+    p.send_signal(signal.SIGTERM)
+    p.communicate(timeout=60)
+    check(p.returncode == 0 and re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen), p.returncode, seen[-300:])
+
+
 def test_full_disk(t, recovers):
     """The loop continues when the paint cannot be saved. It is saved when there is space again."""
     paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
@@ -339,6 +379,8 @@ def main(ebpo):
         test_lifted_pen(t)
         test_stylus(t)
         test_unplugged(t)
+        test_brush(t)
+        test_probe(t)
         test_saved_elsewhere(t)
         test_view(t)
         test_full_disk(t, True)

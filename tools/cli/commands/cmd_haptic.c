@@ -556,6 +556,12 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
+    if (words_end_with(model, ".json"))
+        return command_usage("haptic",
+                             "%s: ebpo haptic cannot touch a scene: the proxy follows the faces "
+                             "of one model, and paint belongs to one model; give the .ebpo.h5 "
+                             "file of an instance",
+                             model);
     if (v->path && v->seconds != 10)
         return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
                                        "its last position");
