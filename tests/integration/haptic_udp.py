@@ -83,13 +83,9 @@ def press(device, to, sequence):
     assert got[7] > 10, got
     felt, begin = [], time.monotonic()
     device.settimeout(1)
-    while time.monotonic() < begin + 0.5:
-        force = FEEL.unpack(device.recv(4096))[5:8]
-        felt.append((time.monotonic() - begin, force[2]))
-    forces = [force for when, force in felt]
-    assert forces == sorted(forces, reverse=True) and forces[-1] == 0, felt
-    assert all(force > 0 for when, force in felt if when < 0.04), felt
-    assert all(force == 0 for when, force in felt if when > 0.3), felt  # 0.1 s, and delays of the machine
+    while time.monotonic() < begin + 1:
+        felt.append(FEEL.unpack(device.recv(4096))[7])
+    assert felt == sorted(felt, reverse=True) and felt[0] > 10 and felt[-1] == 0, felt
     return sequence - 1
 
 

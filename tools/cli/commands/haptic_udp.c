@@ -27,12 +27,13 @@ enum {
     PACKETS_MAX = 32 /* maximum number of packets taken in a step */
 };
 
-/* Seconds after the last position at which the forces begin to decrease, and at which they are 0
- * and the pen is lifted: the device may be unplugged. As in samples/haptic_link.h. */
+/* Seconds after the last position at which the forces begin to decrease, and at which they are 0:
+ * the device may be unplugged. As in samples/haptic_link.h. */
 static const double HOLD_SECONDS = 0.05, ZERO_SECONDS = 0.1;
 
-/* After a silence the pen stays lifted for this time, until the proxy has followed the device. */
-enum { SETTLE_NS = 50000000 };
+/* SILENCE_NS: time after the last position at which the pen is lifted. SETTLE_NS: time for which it
+ * stays lifted after a silence, until the proxy has followed the device. */
+enum { SILENCE_NS = 250000000, SETTLE_NS = 50000000 };
 
 typedef struct udp {
     int socket;
@@ -117,6 +118,8 @@ static double force_share(const udp *u)
     return fmax(0, fmin(1, (ZERO_SECONDS - seconds) / (ZERO_SECONDS - HOLD_SECONDS)));
 }
 
+static bool is_silent(const udp *u) { return tool_clock() - u->arrived >= SILENCE_NS; }
+
 /* Processes a packet. Returns false if it is not valid, is not from the device, or is older than a
  * packet processed before. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
@@ -139,7 +142,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
     u->device = *from;
     u->sequence = sequence;
     u->tag = get_bytes(p + 16, 8);
-    if (force_share(u) == 0)
+    if (is_silent(u))
         u->resumed = tool_clock();
     u->arrived = tool_clock();
     return true;
@@ -197,7 +200,7 @@ static bool read_position(void *self, uint64_t step, haptic_pose *out)
     (void)step;
     take_all(u);
     *out = u->pose;
-    out->lifted |= force_share(u) == 0 || tool_clock() - u->resumed < SETTLE_NS;
+    out->lifted |= is_silent(u) || tool_clock() - u->resumed < SETTLE_NS;
     return !u->ended;
 }
 
