@@ -5,8 +5,8 @@
  *
  * Passive: at any time, the energy that the hand has received in total is at most the energy that
  * it has given plus stiffness times s^2, where s is the longest motion of the hand in one step.
- * The energy of a step is the force of the step before times the motion. If a contact ends, energy
- * that the hand has given and not received is lost, so each contact is passive by itself.
+ * The energy of a step is the force of the step before times the motion. If the force becomes 0,
+ * energy that the hand has given and not received is lost, so each contact is passive by itself.
  *
  * Method: a passivity observer and controller (Hannaford and Ryu 2002) that reduces the force. The
  * greatest allowed force is derived at max_force in lib/extras/haptic/tool.c. */
@@ -100,14 +100,14 @@ static inline void haptic_link_step(haptic_link *link, double seconds, const dou
     link->longest = fmax(link->longest, sqrt(square));
     link->age += seconds;
     length = sqrt(length);
-    if (length == 0) /* no contact */
-        link->energy = fmax(link->energy, 0);
     double share = (HAPTIC_LINK_ZERO - link->age) / (HAPTIC_LINK_ZERO - HAPTIC_LINK_HOLD);
     share = fmax(0, fmin(1, share));
     if (share * length > haptic_link_most(link))
         share = haptic_link_most(link) / length;
     for (int k = 0; k < 3; k++)
         force[k] = link->force[k] = share * link->received[k];
+    if (share * length == 0) /* the contact has ended */
+        link->energy = fmax(link->energy, 0);
 }
 
 /* Prepares to send to a port of this machine, with the hand at `position`. Returns false if the
