@@ -227,7 +227,7 @@ def test_unplugged(t):
 
 
 def test_brush(t):
-    """A tool of 10,000 points, which is tilted, paints where it touches."""
+    """A tool of 10,000 points, a tilted bowl, paints with its points that are pressed in. It keeps up with the loop."""
     brush, path, paint = t.at("brush.txt"), t.at("brush.path"), t.at("brush.paint.h5")
     line(brush, [(0.1 * math.cos(i) * (i / 10000) ** 0.5, 0.1 * math.sin(i) * (i / 10000) ** 0.5,
                   0.1 - 0.1 * (1 - i / 10000) ** 0.5) for i in range(10000)])  # the lower half of a ball
@@ -240,10 +240,15 @@ def test_brush(t):
     out, err = p.communicate(timeout=60)
     got = json.loads(out)
     check(p.returncode == 0 and err == "" and got["paint"]["lost_steps"] == 0, p.returncode, err)
-    check(got["contacts"] > 1800 and got["paint"]["strokes"] == 1, got["contacts"], got["paint"])
-    points = t.strokes(paint)[0]["points"]
-    check(all(abs(q["place"][2] - 1) < 1e-9 and abs(q["place"][1] - 0.5 - 0.1 * math.sin(tilt)) < 0.01 for q in points), points)
-    check(points[0]["place"][0] < 0.23 and points[-1]["place"][0] > 0.78 and 0.4 < points[-1]["pressure"] / 65535 < 0.5, points[-1])
+    check(got["contacts"] > 1800 and got["paint"]["strokes"] > 40, got["contacts"], got["paint"])
+    strokes = [[q["place"] for q in s["points"]] for s in t.strokes(paint)]
+    check(all(len(s) <= 64 and all(abs(q[2] - 1) < 1e-9 for q in s) for s in strokes), strokes)
+    y, wide = 0.5 + 0.1 * math.sin(tilt), math.sqrt(0.1 ** 2 - 0.09 ** 2)  # a cap of height 0.01
+    last = strokes[-1]
+    check(0.7 < last[0][0] < 0.85 and len(last) == 64, last)
+    for low, high in ((min(q[1] for q in last) - y, max(q[1] for q in last) - y),
+                      (min(q[0] for q in last) - 0.8, max(q[0] for q in last) - 0.8)):
+        check(abs(low + wide) < 0.015 and abs(high - wide) < 0.015, low, high, wide)
 
 
 def test_probe(t):

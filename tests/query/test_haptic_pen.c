@@ -244,6 +244,80 @@ START_TEST(test_pen_takes_pressure_of_stylus)
 }
 END_TEST
 
+/* Moves a brush, a square of 11 x 11 points with sides of 0.1 that is tilted about the y axis, by
+ * 0.2 in steps of 0.00101. */
+static void move_brush(pen_test *t, double tilt, double depth)
+{
+    static double points[121][3];
+    for (int i = 0; i < 121; i++) {
+        points[i][0] = 0.01 * (i % 11) - 0.05;
+        points[i][1] = 0.01 * (i - i % 11) / 11 - 0.05;
+        points[i][2] = 0;
+    }
+    t->pen.points = (const double(*)[3])points;
+    t->pen.point_count = 121;
+    open_pen(t);
+    for (int i = 0; i <= 200; i++) {
+        haptic_sample s = touch_at(i, 0.3 + 0.00101 * i, depth);
+        const double low = 0.05 * sin(fabs(tilt)); /* of the point that touches, below the middle */
+        s.proxy[0] = s.touch[0];
+        s.proxy[1] = s.touch[1];
+        s.touch[0] += (i % 2 ? 0.05 : tilt != 0 ? 0.05 : -0.05) * cos(tilt); /* another point */
+        s.proxy[2] = 1 + low;
+        s.rotation[1] = sin(tilt / 2);
+        s.rotation[3] = cos(tilt / 2);
+        s.normal[2] = 1;
+        haptic_paint_take(t->paint, &s, 1);
+    }
+}
+
+/* A brush paints its pressed points at each step of half the radius, as one contact. A tilted brush
+ * paints with its lower edge. */
+START_TEST(test_pen_brush_paints_its_shape)
+{
+    for (int tilted = 0; tilted < 2; tilted++) {
+        pen_test t;
+        begin(&t);
+        t.pen.full_force = 0.1;
+        move_brush(&t, tilted ? 0.5 : 0, 0.01);
+        ck_assert_uint_eq(read_strokes(&t), 21);
+        for (uint64_t i = 0; i < 21; i++) {
+            ebpo_paint_stroke s = stroke_at(&t, i);
+            double low[2] = { 1, 1 }, high[2] = { 0, 0 };
+            ck_assert_uint_eq(s.point_count, tilted ? 33 : 64); /* of 121 */
+            for (uint64_t k = 0; k < s.point_count; k++) {
+                ck_assert_double_eq(s.points[k].place[2], 1);
+                ck_assert_int_eq(s.points[k].pressure, 6553);
+                for (int c = 0; c < 2; c++) {
+                    low[c] = fmin(low[c], s.points[k].place[c]);
+                    high[c] = fmax(high[c], s.points[k].place[c]);
+                }
+            }
+            double x = 0.3 + 0.0101 * (double)i;
+            ck_assert_double_le(fabs(low[1] - 0.45), 0.011);
+            ck_assert_double_le(fabs(high[1] - 0.55), 0.011);
+            ck_assert_double_le(fabs(high[0] - x - 0.05 * cos(tilted * 0.5)), 0.011);
+            /* points up to 0.01 above the lowest one: 0.01 / sin(0.5) along the brush */
+            ck_assert_double_le(fabs(low[0] - x - (tilted ? 0.0255 : -0.05)), 0.011);
+        }
+        end(&t);
+    }
+}
+END_TEST
+
+/* An undo removes all that a brush has painted in a contact. */
+START_TEST(test_pen_brush_is_undone)
+{
+    pen_test t;
+    begin(&t);
+    move_brush(&t, 0, 0.01);
+    ck_assert(haptic_paint_command(t.paint, "undo"));
+    ck_assert(!haptic_paint_command(t.paint, "undo"));
+    ck_assert_uint_eq(read_strokes(&t), 0);
+    end(&t);
+}
+END_TEST
+
 typedef struct painter {
     haptic_paint *paint;
     atomic_int slices; /* number of painted slices; SLICES: ended */
@@ -309,6 +383,8 @@ Suite *test_suite(void)
     tcase_add_test(tc, test_pen_opacity_follows_pressure);
     tcase_add_test(tc, test_pen_undo_removes_contacts);
     tcase_add_test(tc, test_pen_takes_pressure_of_stylus);
+    tcase_add_test(tc, test_pen_brush_paints_its_shape);
+    tcase_add_test(tc, test_pen_brush_is_undone);
     tcase_add_test(tc, test_pen_shares_lock);
     suite_add_tcase(suite, tc);
     return suite;

@@ -15,9 +15,13 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/commands/haptic_brush.h"
 #include "cli/numbers.h"
 #include "cli/tool_clock.h"
 #include "cli/words.h"
+
+/* Size of a point with the radius of the stroke. */
+enum { FULL_SIZE = 1 << 15 };
 
 /* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
 enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
@@ -51,8 +55,12 @@ struct haptic_paint {
     double touched;              /* time of the last sample in contact */
     ebpo_paint_input last;       /* last position of `drawing` */
     int level;                   /* opacity of the stroke: 1 to LEVELS */
-    ebpo_error error;            /* first error of painting */
-    pthread_mutex_t turn;        /* held while a thread waits for the lock */
+    bool pressed;                /* the brush has painted in this contact, at `print` */
+    haptic_sample print;         /* the last step in which the brush has painted */
+    double print_pressure;
+    double arm;           /* of a brush: distance of its farthest point from its origin */
+    ebpo_error error;     /* first error of painting */
+    pthread_mutex_t turn; /* held while a thread waits for the lock */
     /* Under the lock. */
     pthread_mutex_t lock;
     ebpo_paint *drawn;
@@ -200,7 +208,7 @@ static void end_stroke(haptic_paint *p)
 static void lift_pen(haptic_paint *p)
 {
     end_stroke(p);
-    p->in_contact = false;
+    p->in_contact = p->pressed = false;
 }
 
 static ebpo_status fail_memory(ebpo_error *error)
@@ -238,6 +246,18 @@ static int level_at(const haptic_paint *p, double pressure)
     return (int)fmax(1, floor(exact + 0.5));
 }
 
+/* Returns the colour of the pen with the opacity of p->level. */
+static uint32_t faded_colour(const haptic_paint *p)
+{
+    uint32_t colour = p->pen.pen.colour, opacity = colour & 255;
+    return colour - opacity + (opacity * (uint32_t)p->level + LEVELS / 2) / LEVELS;
+}
+
+static uint64_t stroke_time(const haptic_paint *p)
+{
+    return p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
+}
+
 /* Begins a stroke. The caller has the lock. */
 static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
 {
@@ -247,9 +267,8 @@ static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
     pen.within = fmax(reach, p->step_least); /* nothing is painted through the air */
     pen.pressure_step = 0x1p-4;
     pen.seed = 1 + info_of(p->drawn).stroke_count;
-    pen.time = p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
-    uint32_t opacity = pen.colour & 255;
-    pen.colour += (opacity * (uint32_t)p->level + LEVELS / 2) / LEVELS - opacity;
+    pen.time = stroke_time(p);
+    pen.colour = faded_colour(p);
     ebpo_status status = begin_contact(p, error);
     return status == EBPO_OK
                ? ebpo_paint_drawing_new(p->drawn, p->context, &pen, &p->drawing, error)
@@ -284,6 +303,71 @@ static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64
     p->last = input[count - 1];
 }
 
+/* Adds a stroke with the pressed points of the brush. The caller has the lock. */
+static ebpo_status add_print(haptic_paint *p, const haptic_sample *sample, double pressure,
+                             ebpo_error *error)
+{
+    const ebpo_paint_pen *pen = &p->pen.pen;
+    double place[HAPTIC_BRUSH_MAX][3], near = 0x1p-12 * p->pen.diagonal;
+    ebpo_paint_point point[HAPTIC_BRUSH_MAX];
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    int count = haptic_brush_pressed(p->pen.points, p->pen.point_count, sample, near, place);
+    ebpo_status status = begin_contact(p, error);
+    for (int i = 0; i < count && status == EBPO_OK; i++) {
+        ebpo_paint_point *q = &point[stroke.point_count];
+        status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
+        if (status != EBPO_OK)
+            break;
+        double off = hypot(hypot(q->place[0] - place[i][0], q->place[1] - place[i][1]),
+                           q->place[2] - place[i][2]);
+        q->size = (uint16_t)(FULL_SIZE * (pen->size_least + pressure * (1 - pen->size_least)));
+        q->pressure = (uint16_t)(pressure * UINT16_MAX);
+        stroke.point_count += off <= sample->depth + near; /* the surface is there */
+    }
+    stroke.layer = pen->layer;
+    stroke.kind = pen->kind;
+    stroke.colour = faded_colour(p);
+    stroke.radius = pen->radius;
+    stroke.time = stroke_time(p);
+    stroke.points = point;
+    if (status != EBPO_OK || stroke.point_count == 0)
+        return status;
+    status = ebpo_paint_add_stroke(p->drawn, &stroke, error);
+    p->finished = info_of(p->drawn).stroke_count;
+    p->changes++;
+    return status;
+}
+
+/* Returns a length that no point of the brush has exceeded since it painted last. */
+static double brush_motion(const haptic_paint *p, const haptic_sample *to)
+{
+    const haptic_sample *from = &p->print;
+    double square = 0, cosine = 0;
+    for (int k = 0; k < 3; k++)
+        square += (to->proxy[k] - from->proxy[k]) * (to->proxy[k] - from->proxy[k]);
+    for (int k = 0; k < 4; k++)
+        cosine += to->rotation[k] * from->rotation[k];
+    return sqrt(square) + 2 * p->arm * acos(fmin(1, fabs(cosine)));
+}
+
+/* Paints with the brush if it has moved by a step, or is pressed harder by a level of opacity,
+ * since it painted last. The caller has the lock. */
+static void press_brush(haptic_paint *p, const haptic_sample *sample)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_input next = input_of(p, sample);
+    double step = fmax(p->pen.pen.radius / 2, p->step_least);
+    if (p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
+        brush_motion(p, sample) < step)
+        return;
+    p->level = level_at(p, next.pressure);
+    if (add_print(p, sample, next.pressure, &error) != EBPO_OK)
+        report_painting(p, &error);
+    p->print = *sample;
+    p->print_pressure = next.pressure;
+    p->pressed = true;
+}
+
 /* Takes the next step, or steps in contact without a long gap. Returns their number. The caller has
  * the lock. */
 static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_t count)
@@ -295,8 +379,12 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
         lift_pen(p);
     if (!touches)
         return 1;
-    /* Between two touches with a long gap, steps were lost. */
     p->touched = samples[0].time;
+    if (p->pen.point_count > 0) {
+        press_brush(p, &samples[0]);
+        return 1;
+    }
+    /* Between two touches with a long gap, steps were lost. */
     for (; taken < SLICE && taken < count && is_touching(&samples[taken]) &&
            samples[taken].time - p->touched <= p->lost_ms;
          taken++) {
@@ -592,6 +680,9 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     p->pen = *pen;
     p->step_least = SHORTEST_STEP * pen->diagonal;
     p->lost_ms = fmax(LIFT_MS, 1500 / pen->rate);
+    for (uint64_t i = 0; i < pen->point_count; i++)
+        p->arm =
+            fmax(p->arm, hypot(hypot(pen->points[i][0], pen->points[i][1]), pen->points[i][2]));
     p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
     ebpo_status status = ebpo_context_new(model, &p->context, error);
     if (status == EBPO_OK)

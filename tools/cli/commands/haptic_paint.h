@@ -18,9 +18,11 @@ typedef struct haptic_pen {
     bool default_layer;  /* pen.layer is the topmost one */
     bool dated;          /* strokes have the time at which they begin */
     double stiffness, full_force;
-    double fade;     /* opacity at no pressure, as a share of that of the colour; 1: constant */
-    double diagonal; /* of the model's box */
-    double rate;     /* steps per second */
+    double fade; /* opacity at no pressure, as a share of that of the colour; 1: constant */
+    const double (*points)[3]; /* [point_count] points of a brush */
+    uint64_t point_count;      /* 0: not a brush; it paints at the contact */
+    double diagonal;           /* of the model's box */
+    double rate;               /* steps per second */
 } haptic_pen;
 
 /* Results of painting. */
