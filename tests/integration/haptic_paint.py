@@ -1,4 +1,4 @@
-"""Tests painting by a haptic device while it moves: haptic_paint.py EBPO.
+"""Tests painting by a haptic device while it moves: haptic_paint.py EBPO GENERATE.
 
 The device is this script, which sends UDP packets, or a recorded path. The model is a cube; the pen moves on its top.
 """
@@ -251,6 +251,22 @@ def test_brush(t):
         check(abs(low + wide) < 0.015 and abs(high - wide) < 0.015, low, high, wide)
 
 
+def test_rough_surface(t):
+    """A ball of 500 points follows the device over a rough surface: its points do not jam where they touch two faces."""
+    t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
+    ball, path, paint = t.at("ball.txt"), t.at("rough.path"), t.at("rough.paint.h5")
+    heights = [1 - (2 * i + 1) / 500 for i in range(500)]
+    line(ball, [(0.1 * math.cos(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * math.sin(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * z)
+                for i, z in enumerate(heights)])
+    moves = [(1.2 * i / 4000 - 0.6, 1.4 - i / 900 if i < 600 else 0.7334, 0.2 * math.sin(15 * i / 4000)) for i in range(4000)]
+    line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
+    t.run("haptic", "--tool", ball, "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
+    strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
+    angles = [math.atan2(s["points"][0]["place"][0], s["points"][0]["place"][2]) for s in strokes]
+    for k in range(5):
+        check(any(-0.4 + 0.2 * k < a < -0.2 + 0.2 * k for a in angles), "the ball did not follow the device", k, sorted(angles))
+
+
 def test_probe(t):
     """The page of a probe gets its distance, and the colour of the distance."""
     viewer = t.at("probe")
@@ -373,9 +389,10 @@ def test_view(t):
     check(json.loads(out)["paint"]["strokes"] == 2, "the pen was not lifted", out)
 
 
-def main(ebpo):
+def main(ebpo, generate):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
+        subprocess.run([generate, "--faces", "65536", t.at("rough.ply")], check=True, stdout=subprocess.DEVNULL)
         test_replay(t)
         test_gap(t)
         test_erase(t)
@@ -386,6 +403,7 @@ def main(ebpo):
         test_unplugged(t)
         test_brush(t)
         test_probe(t)
+        test_rough_surface(t)
         test_saved_elsewhere(t)
         test_view(t)
         test_full_disk(t, True)
