@@ -1,37 +1,14 @@
 /* The device side of `ebpo haptic --device udp:PORT`: moves a pen down into a model and up again,
- * and prints the forces. The two comments "driver" mark where a driver for a real device
- * (OpenHaptics, CHAI3D, a robot controller) reads the position and applies the force.
+ * and prints the forces. A driver for a real device reads the position and applies the force at the
+ * two comments "driver"; haptic_openhaptics.c and haptic_chai3d.cpp do this.
  *
  *     ebpo haptic --device udp:5601 model.ebpo.h5 &
- *     haptic_device 5601 X Y Z DOWN
- *
- * Packets: docs/guide/haptic.md. Requires a little-endian machine. */
-#include <arpa/inet.h>
-#include <poll.h>
-#include <stdint.h>
+ *     haptic_device 5601 X Y Z DOWN */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <sys/socket.h>
 #include <time.h>
-#include <unistd.h>
 
-typedef struct position_packet {
-    char magic[4];
-    uint16_t version, kind; /* kind 1: a position; kind 3: the end */
-    uint64_t sequence, tag;
-    double place[3], turn[4]; /* position; rotation as a quaternion (x, y, z, w) */
-} position_packet;
-
-typedef struct force_packet {
-    char magic[4];
-    uint16_t version, kind; /* kind 2: a force */
-    uint64_t sequence, tag; /* values of the position packet to which this packet is the reply */
-    double force[3], torque[3], proxy[3], turn[4], depth, lo, hi, normal[3];
-    uint64_t face;
-    uint32_t flags;
-    uint8_t rgb[3], where;
-} force_packet;
+#include "haptic_link.h"
 
 enum { STEPS = 1000 };
 
@@ -41,37 +18,25 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: haptic_device PORT X Y Z DOWN\n");
         return 2;
     }
-    const struct sockaddr_in to = { .sin_family = AF_INET,
-                                    .sin_port = htons((uint16_t)atoi(argv[1])),
-                                    .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };
-    int s = socket(AF_INET, SOCK_DGRAM, 0);
-    if (s < 0 || connect(s, (const struct sockaddr *)&to, sizeof to) != 0)
+    static const double unit[4] = { 0, 0, 0, 1 };
+    double position[3] = { atof(argv[2]), atof(argv[3]), atof(argv[4]) }, force[3];
+    double strongest = 0, proxy[3] = { 0 };
+    haptic_link link;
+    if (!haptic_link_open(&link, atoi(argv[1]), 400, position)) /* the default of --stiffness */
         return 1;
-    position_packet out = {
-        "EBPT", 1, 1, 0, 0, { atof(argv[2]), atof(argv[3]), 0 }, { 0, 0, 0, 1 }
-    };
-    force_packet in = { .depth = 0 }, strongest = in;
-    int replies = 0;
     for (int i = 0; i < STEPS; i++) {
         int depth_step = i < STEPS / 2 ? i : STEPS - i;
-        out.sequence++;
-        out.place[2] = atof(argv[4]) -
-                       atof(argv[5]) * depth_step / (STEPS / 2); /* driver: read the position */
-        (void)send(s, &out, sizeof out, 0);
-        struct pollfd waiting = { .fd = s, .events = POLLIN };
-        while (poll(&waiting, 1, 0) > 0 && recv(s, &in, sizeof in, 0) == (ssize_t)sizeof in) {
-            replies++;
-            if (in.force[2] > strongest.force[2]) /* driver: apply in.force */
-                strongest = in;
+        position[2] = atof(argv[4]) -
+                      atof(argv[5]) * depth_step / (STEPS / 2); /* driver: read the position */
+        haptic_link_exchange(&link, 0.001, position, unit, false, force);
+        if (force[2] > strongest) { /* driver: apply the force */
+            strongest = force[2];
+            memcpy(proxy, link.reply.proxy, sizeof proxy);
         }
         nanosleep(&(struct timespec){ 0, 1000000 }, NULL);
     }
-    out.kind = 3;
-    out.sequence++;
-    (void)send(s, &out, sizeof out, 0);
-    close(s);
-    printf("%s replies, %s force up, proxy at %.2f %.2f %.2f\n", replies > 0 ? "some" : "no",
-           strongest.force[2] > 0 ? "a" : "no", strongest.proxy[0], strongest.proxy[1],
-           strongest.proxy[2]);
-    return replies > 0 ? 0 : 1;
+    haptic_link_close(&link);
+    printf("%s replies, %s force up, proxy at %.2f %.2f %.2f\n", link.sequence ? "some" : "no",
+           strongest > 0 ? "a" : "no", proxy[0], proxy[1], proxy[2]);
+    return link.sequence ? 0 : 1;
 }

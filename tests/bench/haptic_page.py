@@ -124,7 +124,7 @@ one step handles; the next step continues.
 | case | late | wake p99.9 | max | idle wake p99.9 | in contact | waits | short | longest load, s |
 |---|---|---|---|---|---|---|---|---|""")
     for name, words, r in rows:
-        t, n = r["haptic"], r["nothing"]
+        t, n = r["haptic"], r["empty"]
         print(f"| {name}, {r['rate']:g} Hz | {t['missed']} | {us(t['wake_p99_9'])} | {us(t['wake_max'])} | "
               f"{us(n['wake_p99_9'])} | {r['contacts']:,} | {r['waiting']:,} | "
               f"{r['path_unfinished']:,} | {r['load_seconds_max']:.2f} |")

@@ -1,14 +1,16 @@
-"""Tests painting by a haptic device while it moves: haptic_paint.py EBPO.
+"""Tests painting by a haptic device while it moves: haptic_paint.py EBPO GENERATE.
 
 The device is this script, which sends UDP packets, or a recorded path. The model is a cube; the pen moves on its top.
 """
 import fcntl
 import json
+import math
 import os
 import re
 import resource
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -60,9 +62,9 @@ class Device:
         self.to, self.sent = ("127.0.0.1", int(found[1])), 0
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
-    def send(self, at, kind=1):
+    def send(self, at, kind=1, more=b""):
         self.sent += 1
-        self.socket.sendto(PLACE.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1), self.to)
+        self.socket.sendto(PLACE.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1) + more, self.to)
 
     def draw(self, process, seconds, step=None, kind=1):
         """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""
@@ -190,6 +192,100 @@ def test_lifted_pen(t):
     check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
 
 
+def test_stylus(t):
+    """The pressure of a stylus sets the size and the opacity of points. Without pressure, nothing is painted."""
+    paint = t.at("stylus.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--colour", "0000ffff", "--fade", "0.5")
+    device = Device(p)
+    for i in range(60):
+        device.send((0.1 + 0.01 * i, 0.5, max(0.99, 1.2 - 0.05 * i)), 1, struct.pack("<d", (0.25, 0.5, 0)[i // 20]))
+        time.sleep(0.01)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0, err)
+    strokes = [(s["colour"], {q["pressure"] for q in s["points"]}, max(q["place"][0] for q in s["points"])) for s in t.strokes(paint)]
+    check([s[0] for s in strokes] == ["#0000ff9f", "#0000ffbf"], strokes)  # 10 and 12 sixteenths
+    check(strokes[0][1] == {16384} and min(strokes[1][1]) >= 16384 and max(strokes[1][1]) == 32768, strokes)
+    check(strokes[1][2] < 0.52, "paint without pressure", strokes)
+
+
+def test_unplugged(t):
+    """A device whose positions are missing for a time does not paint along the way to its next position."""
+    paint = t.at("unplugged.paint.h5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    device = Device(p)
+    device.draw(p, 0.6)
+    time.sleep(0.4)
+    for x in (0.7, 0.72, 0.74, 0.76):
+        for _ in range(20):
+            device.send((x, 0.5, 0.98))
+            time.sleep(0.002)
+    device.send((0, 0, 0), kind=3)
+    out, err = p.communicate(timeout=60)
+    strokes = [[q["place"][0] for q in s["points"]] for s in t.strokes(paint)]
+    check(p.returncode == 0 and len(strokes) == 2 and max(strokes[0]) < 0.3 and min(strokes[1]) > 0.6, err, strokes)
+
+
+def test_brush(t):
+    """A tool of 10,000 points, a tilted bowl, paints with its points that are pressed in. It keeps up with the loop."""
+    brush, path, paint = t.at("brush.txt"), t.at("brush.path"), t.at("brush.paint.h5")
+    line(brush, [(0.1 * math.cos(i) * (i / 10000) ** 0.5, 0.1 * math.sin(i) * (i / 10000) ** 0.5,
+                  0.1 - 0.1 * (1 - i / 10000) ** 0.5) for i in range(10000)])  # the lower half of a ball
+    tilt = 0.5  # about the x axis; the lowest point is then at y = 0.1 sin(tilt), z = -low
+    low = 0.1 - 0.1 * math.cos(tilt)
+    with open(path, "w", encoding="ascii") as out:
+        out.writelines(f"{0.2 + 0.0003 * i} 0.5 {max(0.99 + low, 1.1 - 0.001 * i)} {math.sin(-tilt / 2)} 0 0 {math.cos(tilt / 2)}\n"
+                       for i in range(2000))
+    p = t.start(paint, "--tool", brush, "--path", path)
+    out, err = p.communicate(timeout=60)
+    got = json.loads(out)
+    check(p.returncode == 0 and err == "" and got["paint"]["lost_steps"] == 0, p.returncode, err)
+    check(got["contacts"] > 1800 and got["paint"]["strokes"] > 40, got["contacts"], got["paint"])
+    strokes = [[q["place"] for q in s["points"]] for s in t.strokes(paint)]
+    check(all(len(s) <= 64 and all(abs(q[2] - 1) < 1e-9 for q in s) for s in strokes), strokes)
+    y, wide = 0.5 + 0.1 * math.sin(tilt), math.sqrt(0.1 ** 2 - 0.09 ** 2)  # a cap of height 0.01
+    last = strokes[-1]
+    check(0.7 < last[0][0] < 0.85 and len(last) == 64, last)
+    for low, high in ((min(q[1] for q in last) - y, max(q[1] for q in last) - y),
+                      (min(q[0] for q in last) - 0.8, max(q[0] for q in last) - 0.8)):
+        check(abs(low + wide) < 0.015 and abs(high - wide) < 0.015, low, high, wide)
+
+
+def test_rough_surface(t):
+    """A ball of 500 points follows the device over a rough surface: its points do not jam where they touch two faces."""
+    t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
+    ball, path, paint = t.at("ball.txt"), t.at("rough.path"), t.at("rough.paint.h5")
+    heights = [1 - (2 * i + 1) / 500 for i in range(500)]
+    line(ball, [(0.1 * math.cos(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * math.sin(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * z)
+                for i, z in enumerate(heights)])
+    moves = [(1.2 * i / 4000 - 0.6, 1.4 - i / 900 if i < 600 else 0.7334, 0.2 * math.sin(15 * i / 4000)) for i in range(4000)]
+    line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
+    t.run("haptic", "--tool", ball, "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
+    strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
+    angles = [math.atan2(s["points"][0]["place"][0], s["points"][0]["place"][2]) for s in strokes]
+    for k in range(5):
+        check(any(-0.4 + 0.2 * k < a < -0.2 + 0.2 * k for a in angles), "the ball did not follow the device", k, sorted(angles))
+
+
+def test_probe(t):
+    """The page of a probe gets its distance, and the colour of the distance."""
+    viewer = t.at("probe")
+    os.mkdir(viewer)
+    with open(os.path.join(viewer, "index.html"), "w", encoding="ascii"):
+        pass
+    p = subprocess.Popen([t.ebpo, "haptic", "--probe", "--view", "--viewer", viewer, "--port", "0", "--device", "viewer",
+                          t.model], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    port = int(re.search(r"127\.0\.0\.1:(\d+)/", p.stderr.readline())[1])
+    page = request(port, "GET /live", "Sec-Fetch-Site: same-origin")[1]
+    press(port, 0.5, 1.02)
+    seen, end = b"", time.monotonic() + 5
+    while not re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen) and time.monotonic() < end:
+        seen += page.recv(65536)
+    p.send_signal(signal.SIGTERM)
+    p.communicate(timeout=60)
+    check(p.returncode == 0 and re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen), p.returncode, seen[-300:])
+
+
 def test_full_disk(t, recovers):
     """The loop continues when the paint cannot be saved. It is saved when there is space again."""
     paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
@@ -293,15 +389,21 @@ def test_view(t):
     check(json.loads(out)["paint"]["strokes"] == 2, "the pen was not lifted", out)
 
 
-def main(ebpo):
+def main(ebpo, generate):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
+        subprocess.run([generate, "--faces", "65536", t.at("rough.ply")], check=True, stdout=subprocess.DEVNULL)
         test_replay(t)
         test_gap(t)
         test_erase(t)
         test_kill(t)
         test_second_writer(t)
         test_lifted_pen(t)
+        test_stylus(t)
+        test_unplugged(t)
+        test_brush(t)
+        test_probe(t)
+        test_rough_surface(t)
         test_saved_elsewhere(t)
         test_view(t)
         test_full_disk(t, True)

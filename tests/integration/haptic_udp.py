@@ -1,10 +1,12 @@
-"""Tests a haptic device over UDP, and untrusted senders of invalid packets: haptic_udp.py EBPO."""
+"""Tests a haptic device over UDP, untrusted senders of invalid packets, and samples: haptic_udp.py EBPO BRIDGE..."""
+import json
 import re
 import socket
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 
 PLACE = struct.Struct("<4sHHQQ3d4d")
 FEEL = struct.Struct("<4sHHQQ3d3d3d4d3d3dQI3BB")
@@ -20,7 +22,8 @@ NONE = [
     b"", b"EBPT", place(9)[:79], place(9) + b"x", bytes(80), bytes(65000), place(9, magic=b"EBPO"),
     place(9, version=2), place(9, kind=0), place(9, kind=2), place(9, at=(NAN, 0, 0)),
     place(9, at=(HUGE, 0, 0)), place(9, turn=(0, 0, 0, 0)), place(9, turn=(NAN, 0, 0, 1)),
-    place(9, turn=(HUGE, 0, 0, 1)), place(9, kind=3)]
+    place(9, turn=(HUGE, 0, 0, 1)), place(9, kind=3), place(9) + bytes(7), place(9) + bytes(9)] + [
+    place(9) + struct.pack("<d", pressure) for pressure in (NAN, -0.1, 1.1, HUGE)]
 
 
 def begin(ebpo, model, *more):
@@ -70,7 +73,33 @@ end_header
                          "0 4 6", "0 6 2", "1 3 7", "1 7 5"))
 
 
-def main(ebpo):
+def press(device, to, sequence):
+    """Press on the cube and send nothing more, as if the device were unplugged. Check that the force decreases to 0.
+
+    Return the sequence number of the last packet."""
+    for z in (1.2, 1.05, 0.95, 0.95, 0.95):
+        got = receive(device, to, place(sequence, at=(0.4, 0.5, z)), sequence)
+        sequence += 1
+    assert got[7] > 10, got
+    felt, begin = [], time.monotonic()
+    device.settimeout(1)
+    while time.monotonic() < begin + 1:
+        felt.append(FEEL.unpack(device.recv(4096))[7])
+    assert felt == sorted(felt, reverse=True) and felt[0] > 10 and felt[-1] == 0, felt
+    return sequence - 1
+
+
+def bridge(ebpo, model, program):
+    """A sample that connects a device of another library presses on the top of the cube, with a force of the device."""
+    p, to = begin(ebpo, model, "--seconds", "20")
+    printed = subprocess.run([program, str(to[1]), "0.4", "1.2", "0.5", "1"], check=True, stdout=subprocess.PIPE,
+                             text=True, timeout=60).stdout
+    out, err = p.communicate(timeout=60)
+    assert p.returncode == 0 and json.loads(out)["contacts"] > 50, (p.returncode, out, err)
+    assert printed.endswith("strongest force up 3.30\n"), printed  # 3.3: the greatest force of the stub
+
+
+def main(ebpo, *bridges):
     with tempfile.TemporaryDirectory() as folder:
         ply, model = folder + "/m.ply", folder + "/m.ebpo.h5"
         with open(ply, "w", encoding="ascii") as out:
@@ -93,7 +122,8 @@ def main(ebpo):
             raise SystemExit("an untrusted sender got a reply: %r" % other.recv(4096))
         except socket.timeout:
             pass
-        device.sendto(place(12, kind=3), to)
+        last = press(device, to, 12)
+        device.sendto(place(last + 1, kind=3), to)
         out, err = p.communicate(timeout=60)
         assert p.returncode == 0, (p.returncode, err)
 
@@ -101,6 +131,8 @@ def main(ebpo):
         other.sendto(b"hello", to)
         out, err = p.communicate(timeout=60)
         assert p.returncode == 1 and "no device has sent its position in 2 seconds (1 invalid packets" in err, err
+        for program in bridges:
+            bridge(ebpo, model, program)
 
 
 if __name__ == "__main__":

@@ -333,6 +333,8 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
         if (!check_close_point(&p, &tool->close_points[tool->next_index]))
             return give_up_piece(&p);
     }
+    /* Without a new contact, the next piece would be the same. */
+    tool->jams = tool->fraction == 0 && tool->next.count <= tool->contacts.count;
     end_piece(&p);
     *arrived = true;
     if (t->max_piece < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
@@ -360,12 +362,31 @@ static void apply_friction(const ebpo_haptic *t, const double want[EBPO_SCREW],
         motion[k] *= fraction;
 }
 
+/* If the tool jams, begins a piece that only moves the points that touch back to the distance of
+ * the skin. A point that is closer than stop_distance to two faces cannot slide along one of them
+ * to the edge of the other: each motion along the face, however short, comes closer to the other
+ * face. Returns false if no piece begins. */
+static bool begin_retreat(ebpo_haptic *t, uint32_t *flags)
+{
+    ebpo_tool *tool = t->tool;
+    static const double stay[EBPO_SCREW];
+    double motion[EBPO_SCREW];
+    if (!tool->jams)
+        return false;
+    tool->jams = false;
+    (void)ebpo_tool_hold(&tool->contacts, stay, contact_tolerance(t), true, motion);
+    return ebpo_screw_length(motion) > contact_tolerance(t) / 2 &&
+           begin_tool_motion(t, motion, flags);
+}
+
 /* Computes the motion that the contacts allow, and begins a piece along it. Returns false if the
  * tool stays. */
 static bool begin_path(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
     double want[EBPO_SCREW], motion[EBPO_SCREW];
+    if (begin_retreat(t, flags))
+        return true;
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
     int holding = ebpo_tool_hold(&tool->contacts, want, contact_tolerance(t), true, motion);
     if (holding > 0 && t->touching && t->options.friction > 0)

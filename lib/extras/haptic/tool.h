@@ -151,10 +151,11 @@ typedef struct ebpo_tool {
     ebpo_tool_stage stage;
     double motion[EBPO_SCREW]; /* motion of the whole piece */
     double fraction;           /* fraction of the piece that is free */
-    ebpo_rigid end;            /* position of the tool at this fraction */
-    double from_matrix[3][3];  /* rotation at the beginning of the piece */
-    double to_matrix[3][3];    /* rotation at the end of the whole piece */
-    double end_matrix[3][3];   /* rotation of `end` */
+    bool jams;      /* the last piece did not move the tool, and has found no new contact */
+    ebpo_rigid end; /* position of the tool at this fraction */
+    double from_matrix[3][3]; /* rotation at the beginning of the piece */
+    double to_matrix[3][3];   /* rotation at the end of the whole piece */
+    double end_matrix[3][3];  /* rotation of `end` */
     uint32_t flags; /* bits of ebpo_haptic_flag that the step returns when the piece is complete */
     uint64_t next_index; /* index of the cluster or of the close point that is examined next */
     ebpo_close_point *close_points; /* [close_count] */

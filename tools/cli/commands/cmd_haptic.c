@@ -26,7 +26,7 @@ typedef struct values {
     /* as text; NULL: not given */
     const char *path, *device, *record, *tool, *memory, *paint, *colour, *viewer;
     double rate, seconds, radius, friction, stiffness, damping, skin, search_radius, pen_radius,
-        full_force, thin, spread;
+        full_force, thin, fade, spread;
     int64_t faces, density, layer, port;
     bool probe, json, erase, view;
     remote_values remote;
@@ -36,6 +36,9 @@ typedef struct values {
 
 /* Returns true if the page of the viewer is the device. */
 static bool is_page(const char *device) { return device && strcmp(device, "viewer") == 0; }
+
+/* Returns true if the device is a 3D mouse. */
+static bool is_mouse(const char *device) { return device && strcmp(device, "spacenav") == 0; }
 
 typedef struct job {
     const values *v;
@@ -278,6 +281,14 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
     return status;
 }
 
+/* Opens a 3D mouse, which begins outside of the model. Returns false after an error, reported on
+ * stderr. */
+static bool open_mouse(job *j)
+{
+    return !is_mouse(j->v->device) ||
+           haptic_spacenav_open(&j->device, ebpo_file_info(j->file), j->v->rate, tool_radius(j));
+}
+
 static ebpo_status make_haptic(job *j, const double start[3], ebpo_error *error)
 {
     const values *v = j->v;
@@ -353,7 +364,10 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
     pen.dated = v->device != NULL;
     pen.stiffness = v->stiffness;
     pen.full_force = full_force(j);
+    pen.fade = v->fade;
     pen.rate = v->rate;
+    pen.points = (const double(*)[3])j->points;
+    pen.point_count = v->spread > 0 ? 0 : j->point_count; /* a spray paints around the contact */
     pen.diagonal = model_diagonal(ebpo_file_info(j->file));
     return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
 }
@@ -482,6 +496,8 @@ static int run_job(job *j, uint64_t memory)
     ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
     if (status == EBPO_OK)
         status = open_model(j, memory, &error);
+    if (status == EBPO_OK && !open_mouse(j))
+        return EXIT_FAILED;
     if (status == EBPO_OK)
         status = play_empty(j, &error);
     if (status == EBPO_OK)
@@ -514,7 +530,7 @@ static int check_pen(const values *v)
 {
     uint32_t colour;
     bool pen = v->colour || v->erase || v->pen_radius > 0 || v->full_force > 0 || v->thin != 0.25 ||
-               v->spread > 0 || v->density != 1 || v->layer >= 0;
+               v->fade != 1 || v->spread > 0 || v->density != 1 || v->layer >= 0;
     if (pen && !v->paint)
         return command_usage("haptic", "--pen-radius, --colour and other options of a pen belong "
                                        "to --paint");
@@ -530,6 +546,8 @@ static int check_pen(const values *v)
         return command_usage("haptic", "--colour '%s': expected " WORDS_COLOUR_EXPECTED, v->colour);
     if (v->colour && v->erase)
         return command_usage("haptic", "--erase and --colour cannot be used together");
+    if (v->fade != 1 && v->erase)
+        return command_usage("haptic", "--erase and --fade cannot be used together");
     return v->density != 1 && v->spread == 0
                ? command_usage("haptic", "--density belongs to --spread")
                : EXIT_OK;
@@ -540,15 +558,22 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
+    if (words_end_with(model, ".json"))
+        return command_usage("haptic",
+                             "%s: ebpo haptic cannot touch a scene: the proxy follows the faces "
+                             "of one model, and paint belongs to one model; give the .ebpo.h5 "
+                             "file of an instance",
+                             model);
     if (v->path && v->seconds != 10)
         return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
                                        "its last position");
     if (v->path && v->device)
         return command_usage("haptic", "--path and --device cannot be used together: both move the "
                                        "tool");
-    if (v->device && !is_page(v->device) && !haptic_udp_named(v->device))
+    if (v->device && !is_page(v->device) && !is_mouse(v->device) && !haptic_udp_named(v->device))
         return command_usage("haptic",
-                             "--device '%s': expected udp:PORT, udp:ADDRESS:PORT or viewer",
+                             "--device '%s': expected udp:PORT, udp:ADDRESS:PORT, spacenav or "
+                             "viewer",
                              v->device);
     if (is_page(v->device) && !v->view)
         return command_usage("haptic", "--device viewer needs --view");
@@ -593,7 +618,7 @@ static int run_haptic(void *given, const char **operand)
         return EXIT_USAGE;
     bool prepared = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
                     (!v->path || haptic_path_open(&j.device, v->path)) &&
-                    (!v->device || is_page(v->device) || haptic_udp_open(&j.device, v->device));
+                    (!haptic_udp_named(v->device) || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
     haptic_view_end(j.view);
     (void)haptic_paint_close(j.paint, &j.painted, &j.paint_error);
@@ -613,6 +638,7 @@ static const values standard = { .rate = 1000,
                                  .damping = 0.4,
                                  .faces = 1 << 14,
                                  .thin = 0.25,
+                                 .fade = 1,
                                  .density = 1,
                                  .layer = -1,
                                  .port = 8080,

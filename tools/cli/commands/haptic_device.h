@@ -13,6 +13,7 @@ typedef struct haptic_pose {
     double position[3];
     double rotation[4]; /* a unit quaternion x, y, z, w; 0 0 0 1: not rotated */
     bool lifted;        /* the pen of the device does not paint */
+    double pressure;    /* of a stylus, above 0 to 1; 0: the force sets the pressure */
 } haptic_pose;
 
 /* Feedback for a device. Only a probe sets lo, hi, rgb and `where`; only other tools set the
@@ -54,10 +55,16 @@ int haptic_pose_read(const char *line, size_t length, haptic_pose *out);
  * false after an error, reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
-/* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT'.
+/* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT',
+ * and false for NULL.
  * haptic_udp_open opens the device `name`. */
 bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
+
+/* haptic_spacenav.c: opens a 3D mouse, whose daemon spacenavd runs. The tool begins in front of the
+ * model, `clearance` away. rate, clearance: as in haptic_builtin_open. Returns false after an
+ * error, reported on stderr. */
+bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate, double clearance);
 
 /* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
  * out of it. rate: steps per second. clearance: radius of the tool. The path keeps this additional

@@ -8,12 +8,15 @@
 
 /* One haptic step. */
 typedef struct haptic_sample {
-    double time;      /* milliseconds since the first step */
-    double device[3]; /* position of the device */
-    double proxy[3];  /* position of the proxy */
+    double time;        /* milliseconds since the first step */
+    double device[3];   /* position of the device */
+    double proxy[3];    /* position of the proxy */
+    double rotation[4]; /* of the proxy */
+    double normal[3];   /* of a tool in contact: away from the face */
     double force[3];
     double touch[3]; /* in contact: the point of contact; otherwise the position of the proxy */
     double depth;    /* as in ebpo_haptic_ball_result */
+    double pressure; /* of a stylus; 0: the force sets it */
     uint64_t clock;  /* tool_clock at the end of the step */
     uint32_t flags;  /* ebpo_haptic_flag bits */
     bool lifted;     /* the pen of the device does not paint */

@@ -15,15 +15,24 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/commands/haptic_brush.h"
 #include "cli/numbers.h"
 #include "cli/tool_clock.h"
 #include "cli/words.h"
+
+/* Size of a point with the radius of the stroke. */
+enum { FULL_SIZE = 1 << 15 };
 
 /* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
 enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
 
 /* Maximum number of steps that are painted while the lock is held. */
 enum { SLICE = 16 };
+
+/* The format has one opacity for each stroke. If the opacity follows the pressure, it has LEVELS
+ * steps, and a contact has a stroke for each change. It changes when it is a whole level from the
+ * current one, so that it does not change back and forth. */
+enum { LEVELS = 16 };
 
 /* Shortest step of the pen, as a share of the model's diagonal. It bounds the work for a movement
  * with a thin pen. */
@@ -44,13 +53,23 @@ struct haptic_paint {
     /* Used by the thread that paints. */
     ebpo_paint_drawing *drawing; /* NULL: the pen is lifted */
     double touched;              /* time of the last sample in contact */
-    ebpo_error error;            /* first error of painting */
+    ebpo_paint_input last;       /* last position of `drawing` */
+    int level;                   /* opacity of the stroke: 1 to LEVELS */
+    bool pressed;                /* the brush has painted in this contact, at `print` */
+    haptic_sample print;         /* the last step in which the brush has painted */
+    double print_pressure;
+    double arm;           /* of a brush: distance of its farthest point from its origin */
+    ebpo_error error;     /* first error of painting */
+    pthread_mutex_t turn; /* held while a thread waits for the lock */
     /* Under the lock. */
     pthread_mutex_t lock;
     ebpo_paint *drawn;
     uint64_t finished; /* number of strokes of `drawn` that will not change */
-    uint64_t changes;  /* number of changes of `drawn` */
-    uint64_t epoch;    /* number of removed strokes */
+    uint64_t *contact; /* [contact_count] number of strokes of `drawn` before each contact */
+    uint64_t contact_count, contact_capacity;
+    bool in_contact;  /* the last contact has not ended */
+    uint64_t changes; /* number of changes of `drawn` */
+    uint64_t epoch;   /* number of removed strokes */
     uint64_t layer_changes;
     /* Used by the thread that saves. */
     ebpo_paint *saved;
@@ -69,6 +88,17 @@ static ebpo_paint_info info_of(const ebpo_paint *paint)
     ebpo_paint_get_info(paint, &info);
     return info;
 }
+
+/* A thread that has waited for the lock gets it before the thread that released it: that thread
+ * must wait for its turn. */
+static void lock_paint(haptic_paint *p)
+{
+    pthread_mutex_lock(&p->turn);
+    pthread_mutex_lock(&p->lock);
+    pthread_mutex_unlock(&p->turn);
+}
+
+static void unlock_paint(haptic_paint *p) { pthread_mutex_unlock(&p->lock); }
 
 /* --- saving --- */
 
@@ -109,10 +139,10 @@ static ebpo_status save_paint(haptic_paint *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t begin = tool_clock();
-    pthread_mutex_lock(&p->lock);
+    lock_paint(p);
     ebpo_status status = p->changes == p->saved_changes ? EBPO_OK : copy_strokes(p, &error);
     bool changed = p->changes != p->saved_changes;
-    pthread_mutex_unlock(&p->lock);
+    unlock_paint(p);
     if (!changed)
         return EBPO_OK;
     if (status == EBPO_OK)
@@ -164,14 +194,68 @@ static void report_painting(haptic_paint *p, const ebpo_error *error)
         p->error = *error;
 }
 
-/* Lifts the pen, which ends a stroke. The caller has the lock. */
-static void lift_pen(haptic_paint *p)
+/* Ends a stroke. The caller has the lock. */
+static void end_stroke(haptic_paint *p)
 {
     if (!p->drawing)
         return;
     ebpo_paint_drawing_free(p->drawing);
     p->drawing = NULL;
     p->finished = info_of(p->drawn).stroke_count;
+}
+
+/* Lifts the pen, which ends a contact. The caller has the lock. */
+static void lift_pen(haptic_paint *p)
+{
+    end_stroke(p);
+    p->in_contact = p->pressed = false;
+}
+
+static ebpo_status fail_memory(ebpo_error *error)
+{
+    *error = (ebpo_error){ .status = EBPO_E_MEMORY, .offset = -1 };
+    snprintf(error->message, sizeof error->message,
+             "not enough memory or threads for painting; close other programs");
+    return EBPO_E_MEMORY;
+}
+
+/* Notes where a contact begins, for undo. The caller has the lock. */
+static ebpo_status begin_contact(haptic_paint *p, ebpo_error *error)
+{
+    if (p->in_contact)
+        return EBPO_OK;
+    if (p->contact_count == p->contact_capacity) {
+        uint64_t capacity = p->contact_capacity ? 2 * p->contact_capacity : 64;
+        uint64_t *contact = realloc(p->contact, capacity * sizeof *contact);
+        if (!contact)
+            return fail_memory(error);
+        p->contact = contact;
+        p->contact_capacity = capacity;
+    }
+    p->contact[p->contact_count++] = info_of(p->drawn).stroke_count;
+    p->in_contact = true;
+    return EBPO_OK;
+}
+
+/* Returns the level of opacity at a pressure. */
+static int level_at(const haptic_paint *p, double pressure)
+{
+    double exact = LEVELS * (p->pen.fade + (1 - p->pen.fade) * pressure);
+    if (p->drawing && fabs(exact - p->level) < 1)
+        return p->level;
+    return (int)fmax(1, floor(exact + 0.5));
+}
+
+/* Returns the colour of the pen with the opacity of p->level. */
+static uint32_t faded_colour(const haptic_paint *p)
+{
+    uint32_t colour = p->pen.pen.colour, opacity = colour & 255;
+    return colour - opacity + (opacity * (uint32_t)p->level + LEVELS / 2) / LEVELS;
+}
+
+static uint64_t stroke_time(const haptic_paint *p)
+{
+    return p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
 }
 
 /* Begins a stroke. The caller has the lock. */
@@ -183,8 +267,12 @@ static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
     pen.within = fmax(reach, p->step_least); /* nothing is painted through the air */
     pen.pressure_step = 0x1p-4;
     pen.seed = 1 + info_of(p->drawn).stroke_count;
-    pen.time = p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
-    return ebpo_paint_drawing_new(p->drawn, p->context, &pen, &p->drawing, error);
+    pen.time = stroke_time(p);
+    pen.colour = faded_colour(p);
+    ebpo_status status = begin_contact(p, error);
+    return status == EBPO_OK
+               ? ebpo_paint_drawing_new(p->drawn, p->context, &pen, &p->drawing, error)
+               : status;
 }
 
 static bool is_touching(const haptic_sample *s)
@@ -196,7 +284,8 @@ static ebpo_paint_input input_of(const haptic_paint *p, const haptic_sample *s)
 {
     ebpo_paint_input input = { .time = fmin(s->time, UINT32_MAX) };
     memcpy(input.place, s->touch, sizeof input.place);
-    input.pressure = fmin(1, p->pen.stiffness * s->depth / p->pen.full_force);
+    input.pressure =
+        s->pressure > 0 ? s->pressure : fmin(1, p->pen.stiffness * s->depth / p->pen.full_force);
     return input;
 }
 
@@ -211,56 +300,140 @@ static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64
     p->changes += info_of(p->drawn).point_count > before;
     if (status != EBPO_OK)
         report_painting(p, &error);
+    p->last = input[count - 1];
+}
+
+/* Adds a stroke with the pressed points of the brush. The caller has the lock. */
+static ebpo_status add_print(haptic_paint *p, const haptic_sample *sample, double pressure,
+                             ebpo_error *error)
+{
+    const ebpo_paint_pen *pen = &p->pen.pen;
+    double place[HAPTIC_BRUSH_MAX][3], near = 0x1p-12 * p->pen.diagonal;
+    ebpo_paint_point point[HAPTIC_BRUSH_MAX];
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    int count = haptic_brush_pressed(p->pen.points, p->pen.point_count, sample, near, place);
+    ebpo_status status = begin_contact(p, error);
+    for (int i = 0; i < count && status == EBPO_OK; i++) {
+        ebpo_paint_point *q = &point[stroke.point_count];
+        status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
+        if (status != EBPO_OK)
+            break;
+        double off = hypot(hypot(q->place[0] - place[i][0], q->place[1] - place[i][1]),
+                           q->place[2] - place[i][2]);
+        q->size = (uint16_t)(FULL_SIZE * (pen->size_least + pressure * (1 - pen->size_least)));
+        q->pressure = (uint16_t)(pressure * UINT16_MAX);
+        stroke.point_count += off <= sample->depth + near; /* the surface is there */
+    }
+    stroke.layer = pen->layer;
+    stroke.kind = pen->kind;
+    stroke.colour = faded_colour(p);
+    stroke.radius = pen->radius;
+    stroke.time = stroke_time(p);
+    stroke.points = point;
+    if (status != EBPO_OK || stroke.point_count == 0)
+        return status;
+    status = ebpo_paint_add_stroke(p->drawn, &stroke, error);
+    p->finished = info_of(p->drawn).stroke_count;
+    p->changes++;
+    return status;
+}
+
+/* Returns a length that no point of the brush has exceeded since it painted last. */
+static double brush_motion(const haptic_paint *p, const haptic_sample *to)
+{
+    const haptic_sample *from = &p->print;
+    double square = 0, cosine = 0;
+    for (int k = 0; k < 3; k++)
+        square += (to->proxy[k] - from->proxy[k]) * (to->proxy[k] - from->proxy[k]);
+    for (int k = 0; k < 4; k++)
+        cosine += to->rotation[k] * from->rotation[k];
+    return sqrt(square) + 2 * p->arm * acos(fmin(1, fabs(cosine)));
+}
+
+/* Paints with the brush if it has moved by a step, or is pressed harder by a level of opacity,
+ * since it painted last. The caller has the lock. */
+static void press_brush(haptic_paint *p, const haptic_sample *sample)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_input next = input_of(p, sample);
+    double step = fmax(p->pen.pen.radius / 2, p->step_least);
+    if (p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
+        brush_motion(p, sample) < step)
+        return;
+    p->level = level_at(p, next.pressure);
+    if (add_print(p, sample, next.pressure, &error) != EBPO_OK)
+        report_painting(p, &error);
+    p->print = *sample;
+    p->print_pressure = next.pressure;
+    p->pressed = true;
 }
 
 /* Takes the next step, or steps in contact without a long gap. Returns their number. The caller has
  * the lock. */
 static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_t count)
 {
-    ebpo_paint_input input[SLICE];
-    uint64_t n = 0;
+    ebpo_paint_input input[SLICE + 1];
+    uint64_t taken = 0, n = 0;
     bool touches = is_touching(&samples[0]);
     if (samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS))
         lift_pen(p);
     if (!touches)
         return 1;
+    p->touched = samples[0].time;
+    if (p->pen.point_count > 0) {
+        press_brush(p, &samples[0]);
+        return 1;
+    }
     /* Between two touches with a long gap, steps were lost. */
-    for (p->touched = samples[0].time; n < SLICE && n < count && is_touching(&samples[n]) &&
-                                       samples[n].time - p->touched <= p->lost_ms;
-         n++) {
-        input[n] = input_of(p, &samples[n]);
-        p->touched = samples[n].time;
+    for (; taken < SLICE && taken < count && is_touching(&samples[taken]) &&
+           samples[taken].time - p->touched <= p->lost_ms;
+         taken++) {
+        ebpo_paint_input next = input_of(p, &samples[taken]);
+        int level = level_at(p, next.pressure);
+        if (level != p->level && taken > 0)
+            break;
+        if (level != p->level && p->drawing) { /* the new stroke continues the path */
+            end_stroke(p);
+            input[n++] = p->last;
+        }
+        p->level = level;
+        input[n++] = next;
+        p->touched = samples[taken].time;
     }
     paint_contact(p, input, n);
-    return n;
+    return taken;
 }
 
 void haptic_paint_take(void *user, const haptic_sample *samples, uint64_t count)
 {
     haptic_paint *p = user;
     for (uint64_t i = 0; i < count;) {
-        pthread_mutex_lock(&p->lock);
+        lock_paint(p);
         i += take_some(p, samples + i, count - i);
-        pthread_mutex_unlock(&p->lock);
+        unlock_paint(p);
     }
 }
 
 /* --- commands --- */
 
-/* Removes the last stroke of this run. Returns false if there is none. The caller has the lock. */
-static bool undo_stroke(haptic_paint *p)
+/* Removes the strokes of the last contact of this run that has painted. Returns false if there is
+ * none. The caller has the lock. */
+static bool undo_contact(haptic_paint *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    uint64_t count = info_of(p->drawn).stroke_count;
-    if (count == p->strokes_before ||
-        ebpo_paint_remove_stroke(p->drawn, count - 1, &error) != EBPO_OK)
+    uint64_t count = info_of(p->drawn).stroke_count, before = count;
+    while (p->contact_count > 0 && before == count)
+        before = p->contact[--p->contact_count];
+    if (before == count)
         return false;
-    p->finished = count - 1;
+    while (count > before && ebpo_paint_remove_stroke(p->drawn, count - 1, &error) == EBPO_OK)
+        count--;
+    p->finished = count;
     if (p->copied > p->finished)
         p->copied = p->finished;
     p->changes++;
     p->epoch++;
-    return true;
+    return count == before;
 }
 
 static bool add_layer(haptic_paint *p, const char *title)
@@ -323,9 +496,9 @@ bool haptic_paint_command(haptic_paint *p, const char *text)
     char name[16] = "";
     if (word < sizeof name)
         memcpy(name, text, word);
-    pthread_mutex_lock(&p->lock);
+    lock_paint(p);
     lift_pen(p);
-    bool done = strcmp(text, "undo") == 0        ? undo_stroke(p)
+    bool done = strcmp(text, "undo") == 0        ? undo_contact(p)
                 : strcmp(text, "paint") == 0     ? set_kind(p, EBPO_PAINT_PAINTS)
                 : strcmp(text, "erase") == 0     ? set_kind(p, EBPO_PAINT_ERASES)
                 : strcmp(name, "colour") == 0    ? set_colour(p, value)
@@ -333,7 +506,7 @@ bool haptic_paint_command(haptic_paint *p, const char *text)
                 : strcmp(name, "layer") == 0     ? choose_number(p, value)
                 : strcmp(name, "new-layer") == 0 ? add_layer(p, value)
                                                  : false;
-    pthread_mutex_unlock(&p->lock);
+    unlock_paint(p);
     return done;
 }
 
@@ -417,7 +590,7 @@ static void write_strokes(const haptic_paint *p, haptic_paint_cursor *at, FILE *
 
 void haptic_paint_write_news(haptic_paint *p, haptic_paint_cursor *at, FILE *out)
 {
-    pthread_mutex_lock(&p->lock);
+    lock_paint(p);
     ebpo_paint_info info = info_of(p->drawn);
     ebpo_paint_stroke last = EBPO_PAINT_STROKE_INIT;
     if (at->epoch != p->epoch && at->strokes > 0)
@@ -435,7 +608,7 @@ void haptic_paint_write_news(haptic_paint *p, haptic_paint_cursor *at, FILE *out
         at->epoch = p->epoch;
         at->layer_changes = p->layer_changes;
     }
-    pthread_mutex_unlock(&p->lock);
+    unlock_paint(p);
 }
 
 /* --- opening and closing --- */
@@ -490,15 +663,9 @@ static void free_paint(haptic_paint *p)
     ebpo_paint_free(p->saved);
     ebpo_context_free(p->context);
     pthread_mutex_destroy(&p->lock);
+    pthread_mutex_destroy(&p->turn);
+    free(p->contact);
     free(p);
-}
-
-static ebpo_status fail_memory(ebpo_error *error)
-{
-    *error = (ebpo_error){ .status = EBPO_E_MEMORY, .offset = -1 };
-    snprintf(error->message, sizeof error->message,
-             "not enough memory or threads for painting; close other programs");
-    return EBPO_E_MEMORY;
 }
 
 ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const ebpo_file *file,
@@ -508,10 +675,14 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     *out = NULL;
     if (!p)
         return fail_memory(error);
+    pthread_mutex_init(&p->turn, NULL);
     pthread_mutex_init(&p->lock, NULL);
     p->pen = *pen;
     p->step_least = SHORTEST_STEP * pen->diagonal;
     p->lost_ms = fmax(LIFT_MS, 1500 / pen->rate);
+    for (uint64_t i = 0; i < pen->point_count; i++)
+        p->arm =
+            fmax(p->arm, hypot(hypot(pen->points[i][0], pen->points[i][1]), pen->points[i][2]));
     p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
     ebpo_status status = ebpo_context_new(model, &p->context, error);
     if (status == EBPO_OK)
@@ -561,9 +732,9 @@ ebpo_status haptic_paint_close(haptic_paint *p, haptic_painted *out, ebpo_error 
         return EBPO_OK;
     atomic_store(&p->ended, true);
     pthread_join(p->saver, NULL);
-    pthread_mutex_lock(&p->lock);
+    lock_paint(p);
     lift_pen(p);
-    pthread_mutex_unlock(&p->lock);
+    unlock_paint(p);
     ebpo_status status = save_paint(p);
     const ebpo_error *last = status != EBPO_OK ? &p->save_error : &p->error;
     if (last->status != EBPO_OK)

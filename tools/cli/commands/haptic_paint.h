@@ -9,7 +9,8 @@
 
 #include "cli/commands/haptic_live.h"
 
-/* The pen. Its pressure is the force of the spring divided by full_force, at most 1. */
+/* The pen. Its pressure is that of the device's stylus or, without one, the force of the spring
+ * divided by full_force, at most 1. */
 typedef struct haptic_pen {
     const char *path;    /* paint file; a new file gets a layer */
     ebpo_paint_pen pen;  /* seed, time and progress are not used */
@@ -17,8 +18,11 @@ typedef struct haptic_pen {
     bool default_layer;  /* pen.layer is the topmost one */
     bool dated;          /* strokes have the time at which they begin */
     double stiffness, full_force;
-    double diagonal; /* of the model's box */
-    double rate;     /* steps per second */
+    double fade; /* opacity at no pressure, as a share of that of the colour; 1: constant */
+    const double (*points)[3]; /* [point_count] points of a brush */
+    uint64_t point_count;      /* 0: not a brush; it paints at the contact */
+    double diagonal;           /* of the model's box */
+    double rate;               /* steps per second */
 } haptic_pen;
 
 /* Results of painting. */
@@ -60,7 +64,8 @@ typedef struct haptic_paint_cursor {
 void haptic_paint_write_news(haptic_paint *paint, haptic_paint_cursor *cursor, FILE *out);
 
 /* Changes the pen: "paint", "erase", "colour RRGGBB[AA]", "radius R", "layer N", "new-layer TITLE";
- * or removes the last stroke of this run: "undo". Returns false for other texts and values. */
+ * or removes the strokes of the last contact of this run: "undo". Returns false for other texts and
+ * values. */
 bool haptic_paint_command(haptic_paint *paint, const char *text);
 
 /* Saves the rest, and frees the object, which may be NULL. Returns the error of the last save or,

@@ -53,6 +53,7 @@ int haptic_pose_read(const char *line, size_t length, haptic_pose *out)
     if (count != 3 && count != 7)
         return count == 0 ? 0 : -1;
     out->lifted = false;
+    out->pressure = 0;
     memcpy(out->position, v, sizeof out->position);
     memcpy(out->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 },
            sizeof out->rotation);

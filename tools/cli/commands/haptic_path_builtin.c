@@ -74,6 +74,7 @@ static bool pose_at(void *self, uint64_t step, haptic_pose *out)
     double radius = surface_distance(p, angle, height) + p->clearance + nod - 0.01;
     box_point(p, angle, height, radius + approach * (0.9 + p->clearance - radius), out->position);
     out->lifted = false;
+    out->pressure = 0;
     for (int k = 0; k < 4; k++)
         out->rotation[k] = 0;
     out->rotation[p->up] = sin(0.3 * sin(angle)); /* the device turns back and forth */

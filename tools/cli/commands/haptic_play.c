@@ -12,6 +12,7 @@
 
 #include <ebpo/map.h>
 
+#include "cli/commands/haptic_brush.h"
 #include "cli/tool_clock.h"
 
 volatile sig_atomic_t haptic_play_stopped;
@@ -120,22 +121,12 @@ static void step_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_resul
     a->flags = r.flags;
 }
 
-/* Computes q * v / q: the vector v, rotated by the unit quaternion q. */
-static void rotate_vector(const double q[4], const double v[3], double out[3])
-{
-    const double t[3] = { 2 * (q[1] * v[2] - q[2] * v[1]), 2 * (q[2] * v[0] - q[0] * v[2]),
-                          2 * (q[0] * v[1] - q[1] * v[0]) };
-    out[0] = v[0] + q[3] * t[0] + q[1] * t[2] - q[2] * t[1];
-    out[1] = v[1] + q[3] * t[1] + q[2] * t[0] - q[0] * t[2];
-    out[2] = v[2] + q[3] * t[2] + q[0] * t[1] - q[1] * t[0];
-}
-
 static void step_tool(const haptic_play *p, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_tool_result r;
     ebpo_haptic_step_tool(p->haptic, pose->position, pose->rotation, &r);
     if (r.point != EBPO_NO_FACE)
-        rotate_vector(r.turn, p->points + 3 * r.point, a->touch);
+        haptic_rotate(r.turn, p->points + 3 * r.point, a->touch);
     for (int k = 0; k < 3; k++)
         a->touch[k] += r.proxy[k];
     memcpy(a->proxy.position, r.proxy, sizeof r.proxy);
@@ -171,9 +162,12 @@ static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
                              .depth = a->depth,
                              .clock = tool_clock(),
                              .flags = a->flags,
+                             .pressure = pose->pressure,
                              .lifted = pose->lifted };
     memcpy(sample.device, pose->position, sizeof sample.device);
     memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);
+    memcpy(sample.rotation, a->proxy.rotation, sizeof sample.rotation);
+    memcpy(sample.normal, a->normal, sizeof sample.normal);
     memcpy(sample.force, a->force, sizeof sample.force);
     memcpy(sample.touch, a->touch, sizeof sample.touch);
     memcpy(sample.rgb, a->rgb, sizeof sample.rgb);

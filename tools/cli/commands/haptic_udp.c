@@ -22,9 +22,18 @@ enum {
     END = 3,
     LIFTED = 4,          /* a position with the pen lifted */
     POSITION_BYTES = 80, /* sizes of packets */
+    PRESSURE_BYTES = 88, /* a position with the pressure of a stylus */
     FEEDBACK_BYTES = 192,
     PACKETS_MAX = 32 /* maximum number of packets taken in a step */
 };
+
+/* Seconds after the last position at which the forces begin to decrease, and at which they are 0:
+ * the device may be unplugged. As in samples/haptic_link.h. */
+static const double HOLD_SECONDS = 0.05, ZERO_SECONDS = 0.1;
+
+/* SILENCE_NS: time after the last position at which the pen is lifted. SETTLE_NS: time for which it
+ * stays lifted after a silence, until the proxy has followed the device. */
+enum { SILENCE_NS = 250000000, SETTLE_NS = 50000000 };
 
 typedef struct udp {
     int socket;
@@ -32,6 +41,8 @@ typedef struct udp {
     bool ended;                /* the device has sent a packet END */
     struct sockaddr_in device; /* address of the device */
     uint64_t sequence, tag;    /* from the last valid packet; each feedback repeats both numbers */
+    uint64_t arrived;          /* tool_clock at the last valid packet */
+    uint64_t resumed;          /* tool_clock at the last valid packet after a silence */
     uint64_t ignored;          /* number of invalid packets */
     haptic_pose pose;          /* the last position */
 } udp;
@@ -73,12 +84,19 @@ static uint8_t *put_reals(uint8_t *at, const double *v, int count)
 
 /* --- packets --- */
 
-/* Reads the pose from a packet. Returns false if a coordinate is too large or the rotation is not a
- * quaternion of about unit length. */
-static bool read_pose(const uint8_t *p, haptic_pose *out)
+/* Reads the pose from a packet. Returns false if a coordinate is too large, the rotation is not a
+ * quaternion of about unit length, or the pressure is not 0 to 1. */
+static bool read_pose(const uint8_t *p, ssize_t size, haptic_pose *out)
 {
     double square = 0;
-    out->lifted = get_bytes(p + 6, 2) == LIFTED;
+    out->pressure = 0;
+    if (size == PRESSURE_BYTES) {
+        out->pressure = get_real(p + POSITION_BYTES);
+        if (!(out->pressure >= 0 && out->pressure <= 1))
+            return false;
+    }
+    /* a stylus without pressure does not paint */
+    out->lifted = get_bytes(p + 6, 2) == LIFTED || (size == PRESSURE_BYTES && out->pressure == 0);
     for (int k = 0; k < 3; k++) {
         out->position[k] = get_real(p + 24 + 8 * k);
         if (!(fabs(out->position[k]) <= 0x1p200))
@@ -93,12 +111,22 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
     return square >= 0.25 && square <= 4;
 }
 
+/* Returns the share of the force that the device gets: less than 1 if its positions are late. */
+static double force_share(const udp *u)
+{
+    double seconds = 1e-9 * (double)(tool_clock() - u->arrived);
+    return fmax(0, fmin(1, (ZERO_SECONDS - seconds) / (ZERO_SECONDS - HOLD_SECONDS)));
+}
+
+static bool is_silent(const udp *u) { return tool_clock() - u->arrived >= SILENCE_NS; }
+
 /* Processes a packet. Returns false if it is not valid, is not from the device, or is older than a
  * packet processed before. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;
-    if (size != POSITION_BYTES || memcmp(p, "EBPT", 4) != 0 || get_bytes(p + 4, 2) != VERSION)
+    if ((size != POSITION_BYTES && size != PRESSURE_BYTES) || memcmp(p, "EBPT", 4) != 0 ||
+        get_bytes(p + 4, 2) != VERSION)
         return false;
     uint64_t kind = get_bytes(p + 6, 2), sequence = get_bytes(p + 8, 8);
     if (u->known && (from->sin_port != u->device.sin_port ||
@@ -106,7 +134,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
         return false;
     if (kind == END && u->known)
         u->ended = true;
-    else if ((kind == POSITION || kind == LIFTED) && read_pose(p, &pose))
+    else if ((kind == POSITION || kind == LIFTED) && read_pose(p, size, &pose))
         u->pose = pose;
     else
         return false;
@@ -114,13 +142,16 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
     u->device = *from;
     u->sequence = sequence;
     u->tag = get_bytes(p + 16, 8);
+    if (is_silent(u))
+        u->resumed = tool_clock();
+    u->arrived = tool_clock();
     return true;
 }
 
 /* Processes the packets that have arrived; does not wait. */
 static void take_all(udp *u)
 {
-    uint8_t bytes[POSITION_BYTES + 1];
+    uint8_t bytes[PRESSURE_BYTES + 1];
     for (int i = 0; i < PACKETS_MAX; i++) {
         struct sockaddr_in from;
         socklen_t length = sizeof from;
@@ -169,6 +200,7 @@ static bool read_position(void *self, uint64_t step, haptic_pose *out)
     (void)step;
     take_all(u);
     *out = u->pose;
+    out->lifted |= is_silent(u) || tool_clock() - u->resumed < SETTLE_NS;
     return !u->ended;
 }
 
@@ -176,13 +208,18 @@ static void write_result(void *self, const haptic_result *a)
 {
     udp *u = self;
     uint8_t bytes[FEEDBACK_BYTES], *at = bytes;
+    double share = force_share(u), force[3], torque[3];
+    for (int k = 0; k < 3; k++) {
+        force[k] = share * a->force[k];
+        torque[k] = share * a->torque[k];
+    }
     memcpy(at, "EBPT", 4);
     at = put_bytes(at + 4, VERSION, 2);
     at = put_bytes(at, FEEDBACK, 2);
     at = put_bytes(at, u->sequence, 8);
     at = put_bytes(at, u->tag, 8);
-    at = put_reals(at, a->force, 3);
-    at = put_reals(at, a->torque, 3);
+    at = put_reals(at, force, 3);
+    at = put_reals(at, torque, 3);
     at = put_reals(at, a->proxy.position, 3);
     at = put_reals(at, a->proxy.rotation, 4);
     at = put_reals(at, &a->depth, 1);
@@ -216,9 +253,11 @@ static void end_udp(void *self)
 static bool read_name(const char *name, struct sockaddr_in *out)
 {
     char address[64] = "127.0.0.1", *after;
-    const char *port = name + 4, *colon = strrchr(port, ':');
-    if (strncmp(name, "udp:", 4) != 0)
+    const char *port, *colon;
+    if (!name || strncmp(name, "udp:", 4) != 0)
         return false;
+    port = name + 4;
+    colon = strrchr(port, ':');
     if (colon) {
         if (colon - port >= (ptrdiff_t)sizeof address)
             return false;

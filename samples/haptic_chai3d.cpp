@@ -1,0 +1,54 @@
+/* Connects a device to `ebpo haptic --device udp:PORT`, by CHAI3D 3. The device is the pen or the
+ * tool; its first switch lifts the pen. Only compiled and run with a stub of CHAI3D
+ * (tests/support/haptic_stubs), never with a real device.
+ *
+ *     c++ -I CHAI3D/src samples/haptic_chai3d.cpp -o haptic_chai3d -lchai3d
+ *     haptic_chai3d PORT X Y Z SCALE
+ *
+ * X Y Z: position in the model at the origin of the device. SCALE: the model's unit in metres of
+ * the device is 1 / SCALE. */
+#include <cstdio>
+#include <cstdlib>
+
+#include "chai3d.h"
+
+#include "haptic_link.h"
+
+int main(int argc, char **argv)
+{
+    if (argc != 6) {
+        std::fprintf(stderr, "usage: haptic_chai3d PORT X Y Z SCALE\n");
+        return 2;
+    }
+    const double origin[3] = { std::atof(argv[2]), std::atof(argv[3]), std::atof(argv[4]) };
+    const double scale = std::atof(argv[5]);
+    chai3d::cHapticDeviceHandler handler;
+    chai3d::cGenericHapticDevicePtr device;
+    haptic_link link;
+    if (!handler.getDevice(device, 0) || !device->open() || !device->calibrate() ||
+        !haptic_link_open(&link, std::atoi(argv[1]), 400, origin)) {
+        std::fprintf(stderr, "haptic_chai3d: the device or a socket cannot be opened\n");
+        return 1;
+    }
+    link.force_max = device->getSpecifications().m_maxLinearForce;
+    chai3d::cVector3d at;
+    while (device->getPosition(at)) { /* false: the device is unplugged */
+        chai3d::cMatrix3d matrix;
+        chai3d::cQuaternion q;
+        bool pressed = false;
+        double force[3];
+        device->getRotation(matrix);
+        device->getUserSwitch(0, pressed);
+        q.fromRotMat(matrix);
+        /* CHAI3D: x to the user, y to the right, z up. The viewer: z to the user, x, y. */
+        const double position[3] = { origin[0] + scale * at.y(), origin[1] + scale * at.z(),
+                                     origin[2] + scale * at.x() };
+        const double rotation[4] = { q.y, q.z, q.x, q.w };
+        haptic_link_exchange(&link, 0.001, position, rotation, pressed, force);
+        device->setForce(chai3d::cVector3d(force[2], force[0], force[1]));
+        chai3d::cSleepMs(1);
+    }
+    haptic_link_close(&link);
+    device->close();
+    return 0;
+}

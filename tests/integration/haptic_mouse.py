@@ -1,0 +1,85 @@
+"""Tests a 3D mouse, with a stub of the daemon spacenavd: haptic_mouse.py EBPO."""
+import json
+import os
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.dont_write_bytecode = True
+from haptic_udp import CUBE
+
+EVENT = struct.Struct("=8i")
+
+
+def motion(x=0, y=0, z=0, rx=0, ry=0, rz=0):
+    return EVENT.pack(0, x, y, z, rx, ry, rz, 16)
+
+
+def play(ebpo, folder, send, *more):
+    """Run ebpo haptic while send(connection) sends events. Return its report and the recorded poses."""
+    path = os.path.join(folder, "mouse")
+    daemon = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    daemon.bind(path)
+    daemon.listen()
+    record = os.path.join(folder, "record")
+    p = subprocess.Popen([ebpo, "haptic", "--json", "--device", "spacenav", "--record", record, *more,
+                          os.path.join(folder, "cube.ebpo.h5")], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                         text=True, env={**os.environ, "SPNAV_SOCKET": path})
+    daemon.settimeout(20)
+    connection = daemon.accept()[0]
+    send(connection)
+    out, err = p.communicate(timeout=60)
+    daemon.close()
+    os.remove(path)
+    assert p.returncode == 0 and err == "", (p.returncode, err)
+    with open(record, encoding="ascii") as lines:
+        return json.loads(out), [[float(x) for x in line.split()] for line in lines]
+
+
+def push(connection):
+    """Press down on the front of the cube, in events whose bytes arrive in pieces, then turn, then unplug the mouse."""
+    for i in range(100):
+        event = motion(z=350)
+        connection.sendall(event[:i % 32])
+        time.sleep(0.005)
+        connection.sendall(event[i % 32:])
+        time.sleep(0.005)
+    for _ in range(20):
+        connection.sendall(motion(ry=-350))
+        time.sleep(0.01)
+    connection.sendall(motion(x=2 ** 31 - 1))  # the fastest motion is 350
+    time.sleep(3)  # silence: the tool stops after half a second
+    connection.sendall(motion())
+    connection.close()
+
+
+def main(ebpo):
+    with tempfile.TemporaryDirectory() as folder:
+        ply = os.path.join(folder, "cube.ply")
+        with open(ply, "w", encoding="ascii") as out:
+            out.write(CUBE)
+        subprocess.run([ebpo, "convert", "-q", ply, os.path.join(folder, "cube.ebpo.h5")], check=True)
+        got, poses = play(ebpo, folder, push, "--seconds", "20", "--paint", os.path.join(folder, "p.paint.h5"),
+                          "--pen-radius", "0.02")
+        first, last = poses[0], poses[-1]
+        assert first[:2] == last[1:2] * 2 and 1 < first[2] < 1.2 and first[3:] == [0, 0, 0, 1], first
+        assert got["contacts"] > 100 and got["paint"]["strokes"] == 1 and last[2] < 0.9, (got, last)
+        assert last[0] - first[0] < 0.25 * 1.8 * 2, (first, last)  # a quarter of the diagonal in a second; stops after 0.5 s
+        assert last[0] - first[0] > 0.05 and last[3] == last[5] == 0 and last[4] < -0.02, last
+
+        def lift(connection):  # a button lifts the pen
+            connection.sendall(EVENT.pack(1, 0, 1, 0, 0, 0, 0, 0) + EVENT.pack(2, 0, 0, 0, 0, 0, 0, 0))
+            push(connection)
+
+        got, poses = play(ebpo, folder, lift, "--seconds", "20", "--paint", os.path.join(folder, "q.paint.h5"),
+                          "--pen-radius", "0.02")
+        assert got["contacts"] > 100 and got["paint"]["strokes"] == 0, got["paint"]
+        p = subprocess.run([ebpo, "haptic", "--device", "spacenav", os.path.join(folder, "cube.ebpo.h5")], check=False,
+                           stderr=subprocess.PIPE, text=True, env={**os.environ, "SPNAV_SOCKET": folder + "/none"})
+        assert p.returncode == 1 and "none: the 3D mouse cannot be read: No such file or directory; " in p.stderr, p
+
+
+main(*sys.argv[1:])

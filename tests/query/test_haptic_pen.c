@@ -1,0 +1,391 @@
+/* The pen of `ebpo haptic --paint` on the top of a cube: when it is lifted, its least step, opacity
+ * by pressure, undo, and the lock that it shares with the pages of the viewer. */
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "check_main.h"
+#include "cli/command.h"
+#include "cli/commands/haptic_paint.h"
+#include "query_support.h"
+
+int command_thread(pthread_t *thread, void *(*body)(void *), void *argument)
+{
+    return pthread_create(thread, NULL, body, argument);
+}
+
+static const double radius = 0.02;
+
+typedef struct pen_test {
+    query_model m;
+    char path[SCRATCH_LENGTH + 32];
+    haptic_pen pen;
+    haptic_paint *paint; /* NULL: closed */
+    ebpo_paint *made;    /* NULL: paint is open */
+    uint64_t strokes;    /* in the file */
+} pen_test;
+
+static void open_pen(pen_test *t)
+{
+    ASSERT_OK(haptic_paint_open(&t->paint, &t->pen, t->m.file, t->m.model, error));
+}
+
+static void begin(pen_test *t)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    memset(t, 0, sizeof *t);
+    query_model_make(&t->m, "box", ebpo_test_box(low, high, 4), &query_variants[0]);
+    snprintf(t->path, sizeof t->path, "%s/pen.paint.h5", t->m.folder);
+    t->pen = (haptic_pen){ .path = t->path,
+                           .pen = EBPO_PAINT_PEN_INIT,
+                           .default_layer = true,
+                           .stiffness = 1,
+                           .full_force = 1,
+                           .fade = 1,
+                           .diagonal = sqrt(3),
+                           .rate = 1000 };
+    t->pen.pen.radius = radius;
+    t->pen.pen.colour = 0xff0000ff;
+}
+
+/* Closes the pen, and reads the file. Returns the number of its strokes. */
+static uint64_t read_strokes(pen_test *t)
+{
+    haptic_painted painted;
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ASSERT_OK(haptic_paint_close(t->paint, &painted, error));
+    t->paint = NULL;
+    ebpo_paint_free(t->made);
+    ASSERT_OK(ebpo_paint_open(t->path, &t->made, error));
+    ebpo_paint_get_info(t->made, &info);
+    ck_assert_uint_eq(info.stroke_count, t->strokes + painted.strokes);
+    return t->strokes = info.stroke_count;
+}
+
+static ebpo_paint_stroke stroke_at(const pen_test *t, uint64_t i)
+{
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    ebpo_paint_get_stroke(t->made, i, &stroke);
+    return stroke;
+}
+
+static void end(pen_test *t)
+{
+    ebpo_paint_free(t->made);
+    query_model_free(&t->m);
+    remove(t->path);
+}
+
+/* Returns a step in contact on the top of the cube. pressure: 0 to 1. */
+static haptic_sample touch_at(double time, double x, double pressure)
+{
+    return (haptic_sample){
+        .time = time, .touch = { x, 0.5, 1 }, .depth = pressure, .flags = EBPO_HAPTIC_CONTACT
+    };
+}
+
+/* Moves from x = 0.1 to 0.3, loses `lost` steps, and moves from 0.6 to 0.8. */
+static uint64_t strokes_with_gap(double period, double lost)
+{
+    pen_test t;
+    begin(&t);
+    t.pen.rate = 1000 / period;
+    open_pen(&t);
+    for (int i = 0; i < 200; i++) {
+        double time = period * (i + (i < 100 ? 0 : lost));
+        haptic_sample s = touch_at(time, 0.1 + 0.002 * i + (i < 100 ? 0 : 0.3), 1);
+        haptic_paint_take(t.paint, &s, 1);
+    }
+    uint64_t strokes = read_strokes(&t);
+    for (uint64_t i = 0; i < strokes; i++)
+        for (uint64_t k = 1; k < stroke_at(&t, i).point_count && strokes > 1; k++)
+            ck_assert_double_le(fabs(stroke_at(&t, i).points[k].place[0] -
+                                     stroke_at(&t, i).points[k - 1].place[0]),
+                                radius / 2 * 1.01);
+    end(&t);
+    return strokes;
+}
+
+/* A gap of over 30 ms between two steps in contact lifts the pen: steps were lost. At a low rate,
+ * steps are farther apart. */
+START_TEST(test_pen_is_lifted_after_lost_steps)
+{
+    ck_assert_uint_eq(strokes_with_gap(1, 0), 1);
+    ck_assert_uint_eq(strokes_with_gap(1, 28), 1);
+    ck_assert_uint_eq(strokes_with_gap(1, 31), 2);
+    ck_assert_uint_eq(strokes_with_gap(50, 0), 1);
+    ck_assert_uint_eq(strokes_with_gap(50, 1), 2);
+}
+END_TEST
+
+/* A pen of almost no radius makes a step for each 1e-5 of the model's diagonal. */
+START_TEST(test_pen_has_least_step)
+{
+    pen_test t;
+    begin(&t);
+    t.pen.pen.radius = 1e-12;
+    open_pen(&t);
+    haptic_sample s[2] = { touch_at(0, 0.2, 1), touch_at(1, 0.3, 1) };
+    haptic_paint_take(t.paint, s, 2);
+    ck_assert_uint_eq(read_strokes(&t), 1);
+    double wanted = 0.1 / (1e-5 * sqrt(3));
+    ck_assert_double_le(fabs((double)stroke_at(&t, 0).point_count - wanted), 2);
+    end(&t);
+}
+END_TEST
+
+/* The strokes do not depend on the number of steps that are passed together. */
+START_TEST(test_pen_slices_are_equal)
+{
+    enum { STEPS = 1000 };
+    static haptic_sample s[STEPS];
+    pen_test t[2];
+    uint64_t state = 5, count[2];
+    for (int i = 0; i < STEPS; i++)
+        s[i] = touch_at(i, 0.1 + 0.0008 * i, 0.5 + 0.4 * sin(0.02 * i));
+    for (int k = 0; k < 2; k++) {
+        begin(&t[k]);
+        t[k].pen.fade = 0.3;
+        t[k].pen.pen.spread = 0.05;
+        t[k].pen.pen.density = 5;
+        open_pen(&t[k]);
+        for (uint64_t i = 0, n; i < STEPS; i += n) {
+            n = k ? 1 + ebpo_test_random(&state) % 50 : STEPS;
+            n = n < STEPS - i ? n : STEPS - i;
+            haptic_paint_take(t[k].paint, s + i, n);
+        }
+        count[k] = read_strokes(&t[k]);
+    }
+    ck_assert_uint_eq(count[0], count[1]);
+    ck_assert_uint_gt(count[0], 20);
+    for (uint64_t i = 0; i < count[0]; i++) {
+        ebpo_paint_stroke a = stroke_at(&t[0], i), b = stroke_at(&t[1], i);
+        ck_assert_uint_eq(a.point_count, b.point_count);
+        ck_assert_mem_eq(a.points, b.points, a.point_count * sizeof *a.points);
+        ck_assert_uint_eq(a.colour, b.colour);
+    }
+    end(&t[0]);
+    end(&t[1]);
+}
+END_TEST
+
+/* Presses harder and harder, then at a constant pressure with noise. Each stroke has the opacity of
+ * its pressure, in steps of 1/16, and begins where the stroke before ended. The noise begins no
+ * stroke. */
+START_TEST(test_pen_opacity_follows_pressure)
+{
+    pen_test t;
+    double place = 0.1;
+    begin(&t);
+    t.pen.fade = 0;
+    open_pen(&t);
+    for (int i = 0; i < 1000; i++) {
+        double pressure = i < 800 ? i / 800.0 : 0.53 + 0.02 * sin(i);
+        haptic_sample s = touch_at(i, 0.1 + 0.0008 * i, pressure);
+        haptic_paint_take(t.paint, &s, 1);
+    }
+    ck_assert_uint_eq(read_strokes(&t), 16);
+    for (uint64_t i = 0; i < 16; i++) {
+        ebpo_paint_stroke s = stroke_at(&t, i);
+        uint32_t level = i < 15 ? (uint32_t)i + 1 : 9;
+        ck_assert_uint_eq(s.colour, 0xff000000 + (255 * level + 8) / 16);
+        ck_assert_double_le(fabs(s.points[0].place[0] - place), radius / 2 * 1.01);
+        place = s.points[s.point_count - 1].place[0];
+        for (uint64_t k = 0; k < s.point_count && i < 15; k++)
+            ck_assert_double_le(fabs(s.points[k].pressure / 65535.0 - level / 16.0), 1 / 15.9);
+    }
+    end(&t);
+}
+END_TEST
+
+/* Each undo removes all strokes of a contact, but none that were in the file before. */
+START_TEST(test_pen_undo_removes_contacts)
+{
+    pen_test t;
+    begin(&t);
+    for (int run = 0; run < 2; run++) {
+        t.pen.fade = run;
+        open_pen(&t);
+        for (int i = 0; i < 400; i++) {
+            haptic_sample s = touch_at(i, 0.1 + 0.001 * i, i % 200 / 200.0);
+            s.lifted = i % 200 < 20 || i % 200 > 160;
+            haptic_paint_take(t.paint, &s, 1);
+        }
+        for (int k = 0; k < (run ? 3 : 1); k++)
+            ck_assert_int_eq(haptic_paint_command(t.paint, "undo"), k < 2);
+        /* The first run has an opacity for each level from 2 to 12, the second one a constant one.
+         */
+        ck_assert_uint_eq(read_strokes(&t), 11);
+    }
+    end(&t);
+}
+END_TEST
+
+/* A stylus reports its own pressure. */
+START_TEST(test_pen_takes_pressure_of_stylus)
+{
+    pen_test t;
+    begin(&t);
+    open_pen(&t);
+    for (int i = 0; i < 100; i++) {
+        haptic_sample s = touch_at(i, 0.1 + 0.002 * i, 1);
+        s.pressure = 0.25;
+        haptic_paint_take(t.paint, &s, 1);
+    }
+    ck_assert_uint_eq(read_strokes(&t), 1);
+    ebpo_paint_stroke s = stroke_at(&t, 0);
+    for (uint64_t k = 0; k < s.point_count; k++)
+        ck_assert_int_eq(s.points[k].pressure, 16384);
+    end(&t);
+}
+END_TEST
+
+/* Moves a brush, a square of 11 x 11 points with sides of 0.1 that is tilted about the y axis, by
+ * 0.2 in steps of 0.00101. */
+static void move_brush(pen_test *t, double tilt, double depth)
+{
+    static double points[121][3];
+    for (int i = 0; i < 121; i++) {
+        points[i][0] = 0.01 * (i % 11) - 0.05;
+        points[i][1] = 0.01 * (i - i % 11) / 11 - 0.05;
+        points[i][2] = 0;
+    }
+    t->pen.points = (const double(*)[3])points;
+    t->pen.point_count = 121;
+    open_pen(t);
+    for (int i = 0; i <= 200; i++) {
+        haptic_sample s = touch_at(i, 0.3 + 0.00101 * i, depth);
+        const double low = 0.05 * sin(fabs(tilt)); /* of the point that touches, below the middle */
+        s.proxy[0] = s.touch[0];
+        s.proxy[1] = s.touch[1];
+        s.touch[0] += (i % 2 ? 0.05 : tilt != 0 ? 0.05 : -0.05) * cos(tilt); /* another point */
+        s.proxy[2] = 1 + low;
+        s.rotation[1] = sin(tilt / 2);
+        s.rotation[3] = cos(tilt / 2);
+        s.normal[2] = 1;
+        haptic_paint_take(t->paint, &s, 1);
+    }
+}
+
+/* A brush paints its pressed points at each step of half the radius, as one contact. A tilted brush
+ * paints with its lower edge. */
+START_TEST(test_pen_brush_paints_its_shape)
+{
+    for (int tilted = 0; tilted < 2; tilted++) {
+        pen_test t;
+        begin(&t);
+        t.pen.full_force = 0.1;
+        move_brush(&t, tilted ? 0.5 : 0, 0.01);
+        ck_assert_uint_eq(read_strokes(&t), 21);
+        for (uint64_t i = 0; i < 21; i++) {
+            ebpo_paint_stroke s = stroke_at(&t, i);
+            double low[2] = { 1, 1 }, high[2] = { 0, 0 };
+            ck_assert_uint_eq(s.point_count, tilted ? 33 : 64); /* of 121 */
+            for (uint64_t k = 0; k < s.point_count; k++) {
+                ck_assert_double_eq(s.points[k].place[2], 1);
+                ck_assert_int_eq(s.points[k].pressure, 6553);
+                for (int c = 0; c < 2; c++) {
+                    low[c] = fmin(low[c], s.points[k].place[c]);
+                    high[c] = fmax(high[c], s.points[k].place[c]);
+                }
+            }
+            double x = 0.3 + 0.0101 * (double)i;
+            ck_assert_double_le(fabs(low[1] - 0.45), 0.011);
+            ck_assert_double_le(fabs(high[1] - 0.55), 0.011);
+            ck_assert_double_le(fabs(high[0] - x - 0.05 * cos(tilted * 0.5)), 0.011);
+            /* points up to 0.01 above the lowest one: 0.01 / sin(0.5) along the brush */
+            ck_assert_double_le(fabs(low[0] - x - (tilted ? 0.0255 : -0.05)), 0.011);
+        }
+        end(&t);
+    }
+}
+END_TEST
+
+/* An undo removes all that a brush has painted in a contact. */
+START_TEST(test_pen_brush_is_undone)
+{
+    pen_test t;
+    begin(&t);
+    move_brush(&t, 0, 0.01);
+    ck_assert(haptic_paint_command(t.paint, "undo"));
+    ck_assert(!haptic_paint_command(t.paint, "undo"));
+    ck_assert_uint_eq(read_strokes(&t), 0);
+    end(&t);
+}
+END_TEST
+
+typedef struct painter {
+    haptic_paint *paint;
+    atomic_int slices; /* number of painted slices; SLICES: ended */
+} painter;
+
+enum { SLICES = 1000, SLICE = 16 };
+
+static void *paint_slices(void *user)
+{
+    painter *p = user;
+    haptic_sample s[SLICE];
+    for (int i = 0; i < SLICES * SLICE; i++) {
+        s[i % SLICE] = touch_at(i, 0.1 + 0.8 * i / SLICES / SLICE, 1);
+        if (i % SLICE == SLICE - 1) {
+            haptic_paint_take(p->paint, s, SLICE);
+            atomic_fetch_add(&p->slices, 1);
+        }
+    }
+    return NULL;
+}
+
+static int compare_ints(const void *a, const void *b) { return *(const int *)a - *(const int *)b; }
+
+/* A page that waits for the lock gets it after the current slice of 16 steps, also if the painter
+ * has more steps to paint at once. */
+START_TEST(test_pen_shares_lock)
+{
+    pen_test t;
+    pthread_t thread;
+    haptic_paint_cursor cursor = HAPTIC_PAINT_CURSOR_INIT;
+    int waited[SLICES], looks = 0;
+    begin(&t);
+    t.pen.pen.radius = 1e-4;
+    open_pen(&t);
+    painter p = { .paint = t.paint };
+    FILE *out = fopen("/dev/null", "w");
+    ck_assert_ptr_nonnull(out);
+    ck_assert_int_eq(pthread_create(&thread, NULL, paint_slices, &p), 0);
+    for (int before; (before = atomic_load(&p.slices)) < SLICES && looks < SLICES; looks++) {
+        haptic_paint_write_news(t.paint, &cursor, out);
+        waited[looks] = atomic_load(&p.slices) - before;
+        nanosleep(&(struct timespec){ 0, 200000 }, NULL);
+    }
+    pthread_join(thread, NULL);
+    fclose(out);
+    ck_assert_uint_eq(read_strokes(&t), 1);
+    qsort(waited, (size_t)looks, sizeof *waited, compare_ints);
+    ck_assert_int_gt(looks, 10);
+    ck_assert_msg(waited[looks * 9 / 10] <= 3, "%d slices in a wait (of %d); at most %d",
+                  waited[looks * 9 / 10], looks, waited[looks - 1]);
+    end(&t);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("haptic_pen");
+    TCase *tc = tcase_create("haptic_pen");
+    tcase_set_timeout(tc, 300);
+    tcase_add_test(tc, test_pen_is_lifted_after_lost_steps);
+    tcase_add_test(tc, test_pen_has_least_step);
+    tcase_add_test(tc, test_pen_slices_are_equal);
+    tcase_add_test(tc, test_pen_opacity_follows_pressure);
+    tcase_add_test(tc, test_pen_undo_removes_contacts);
+    tcase_add_test(tc, test_pen_takes_pressure_of_stylus);
+    tcase_add_test(tc, test_pen_brush_paints_its_shape);
+    tcase_add_test(tc, test_pen_brush_is_undone);
+    tcase_add_test(tc, test_pen_shares_lock);
+    suite_add_tcase(suite, tc);
+    return suite;
+}
