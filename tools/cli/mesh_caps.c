@@ -43,6 +43,9 @@ static ebpo_status join_caps(ebpo_mesh *out, const ebpo_mesh *mesh, const ebpo_b
 {
     uint64_t vertices = mesh->vertex_count, faces = mesh->face_count, caps = count_caps(loops);
     memset(out, 0, sizeof *out);
+    if (caps > 3 * faces) /* more than the mesh has edges */
+        return fail_caps(error, EBPO_E_FORMAT, path,
+                         "its border is longer than the edges of its mesh; run ebpo verify");
     if (vertices + loops->point_count > UINT32_MAX - 1 || faces + caps > UINT32_MAX - 1)
         return fail_caps(error, EBPO_E_LIMIT, path,
                          "with its caps, the mesh has more than 2^32 - 2 faces");
@@ -88,6 +91,9 @@ ebpo_status mesh_caps_add(ebpo_mesh *mesh, const ebpo_file *file, const char *pa
             error, EBPO_E_ABSENT, path,
             "has no border, so it has no caps; for a surface with holes, 'ebpo repack' "
             "adds the border");
+    if (ebpo_file_info(file)->pruned)
+        return fail_caps(error, EBPO_E_ABSENT, path,
+                         "is a subset, whose mesh the caps do not close; use the original file");
     read.threads = threads;
     ebpo_status status = ebpo_file_read_tree(file, &read, &tree, error);
     if (status != EBPO_OK)
