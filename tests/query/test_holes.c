@@ -731,6 +731,36 @@ START_TEST(test_subset_keeps_border)
 }
 END_TEST
 
+/* A subset that is pruned where envelopes extend little beyond the model still contains the inside.
+ */
+START_TEST(test_pruned_subset_contains_inside)
+{
+    uint64_t state = 15, inside = 0;
+    holed h, part = { .model = NULL };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options cut = EBPO_SUBSET_OPTIONS_INIT;
+    holed_make(&h, holed_torus(&state, 10, 2), EBPO_RULE_NONZERO, 0.5);
+    cut.max_error = 0.2;
+    model_must(ebpo_subset(h.file, scratch("part.ebpo.h5"), &cut, &error), "cutting", &error);
+    part.file = model_open(scratch("part.ebpo.h5"));
+    ck_assert(ebpo_file_info(part.file)->pruned && ebpo_file_info(part.file)->border_inside);
+    holed_open(&part, 0.5);
+    for (uint64_t i = 0; i < ebpo_test_scaled(2000); i++) {
+        double p[3];
+        ebpo_inside_result r;
+        choose_point(&state, &h, p);
+        model_must(ebpo_inside(h.context, p, NULL, &r, &error), "inside", &error);
+        if (r.where != EBPO_IN)
+            continue;
+        check_levels(&part, p, r.winding);
+        inside++;
+    }
+    ck_assert_uint_gt(inside, 0);
+    holed_free(&part);
+    holed_free(&h);
+}
+END_TEST
+
 /* A solid has integer bounds. */
 START_TEST(test_solid_has_integer_bounds)
 {
@@ -796,6 +826,7 @@ TEST_SUITE(holes)
     tcase_add_test(shapes, test_levels_agree_or_are_undecided);
     tcase_add_test(shapes, test_marks_take_few_terms);
     tcase_add_test(shapes, test_subset_keeps_border);
+    tcase_add_test(shapes, test_pruned_subset_contains_inside);
     tcase_add_test(shapes, test_solid_has_integer_bounds);
     suite_add_tcase(suite, shapes);
     TCase *wide = tcase_create("wide");
