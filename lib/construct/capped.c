@@ -3,7 +3,9 @@
  * The search is breadth first from the root. A cell is omitted if certainly |w_D| < 1/2 in it; no
  * cap touches such a cell. A cell in which |w_D| is certainly greater is not divided. Other cells
  * are divided while the number of tests is below the limit, and no deeper than the tree. Each cell
- * has a list of the caps near it, made from its parent's list (geometry/cap_bounds.h). */
+ * has a list of the caps near it, made from its parent's list (geometry/cap_bounds.h). A cell whose
+ * list is longer than LIST_MAX is not divided either, and has no list: thousands of large caps that
+ * overlap would be in the lists of almost all cells. */
 #include "core/strict_fp.h"
 
 #include <limits.h>
@@ -13,12 +15,20 @@
 
 #include "construct/capped.h"
 #include "construct/construct_stages.h"
+#include "construct/planes.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "geometry/cap_cells.h"
 
 /* Tests of cells, which take microseconds each: always, and for each border edge. */
-enum { TESTS_ALWAYS = 1 << 14, TESTS_PER_EDGE = 16, DETAIL_LEVELS = 3 };
+enum {
+    TESTS_ALWAYS = 1 << 14,
+    TESTS_PER_EDGE = 16,
+    LIST_MAX = 1024,
+    PROGRESS_CELLS = 2048, /* number of divided cells between two reports of progress */
+    DETAIL_LEVELS = 3
+};
 
 static const double threshold = 0.5;
 
@@ -26,6 +36,7 @@ static const double threshold = 0.5;
 typedef struct cap_cell {
     ebpo_octcode code;
     bool is_end;         /* it is not divided */
+    bool has_no_list;    /* its list is too long; all its points may be inside */
     uint64_t begin, end; /* range of its list of near caps */
     ebpo_bounded far;    /* bounds of the other caps */
 } cap_cell;
@@ -52,8 +63,9 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
                         cap_level *next)
 {
     for (unsigned octant = 0; octant < 8; octant++) {
-        cap_cell child = { ebpo_octcode_child(parent->code, octant), false, c->lists.count, 0,
-                           parent->far };
+        cap_cell child = { .code = ebpo_octcode_child(parent->code, octant),
+                           .begin = c->lists.count,
+                           .far = parent->far };
         ebpo_cell cell = ebpo_cell_of_octcode(child.code);
         double low[3], high[3];
         ebpo_cell_bounds(c->box, cell, low, high);
@@ -62,13 +74,17 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
                                    &child.far))
             return false;
         child.end = c->lists.count;
-        int small = ebpo_cap_small_in(front, &c->caps, low, high, c->lists.entry + child.begin,
-                                      child.end - child.begin, child.far, threshold);
+        child.has_no_list = child.end - child.begin > LIST_MAX;
+        int small =
+            child.has_no_list
+                ? 0
+                : ebpo_cap_small_in(front, &c->caps, low, high, c->lists.entry + child.begin,
+                                    child.end - child.begin, child.far, threshold);
         child.is_end = small == 0;
-        if (small == 1) {
-            c->lists.count = child.begin;
+        if (small == 1 || child.has_no_list)
+            c->lists.count = child.end = child.begin;
+        if (small == 1)
             continue;
-        }
         if (!ebpo_grow(&next->cell, &next->capacity, next->count + 1, sizeof *next->cell))
             return false;
         next->cell[next->count++] = child;
@@ -76,31 +92,57 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
     return true;
 }
 
-/* Finds the cap cells, level by level. Returns false when out of memory. */
-static bool find_cells(ebpo_capped *c, ebpo_cap_front *front, int max_level, uint64_t tests_max)
+static ebpo_status fail_lists(const ebpo_capped *c, ebpo_error *error)
+{
+    return ebpo_fail_memory(error, c->lists.count * sizeof *c->lists.entry);
+}
+
+/* Divides the cells of level c->deepest. `tests`: number of tests before; `tests_max`: limit. */
+static ebpo_status divide_level(ebpo_capped *c, ebpo_cap_front *front,
+                                const ebpo_progress *progress, uint64_t tests, uint64_t tests_max,
+                                ebpo_error *error)
+{
+    cap_level *l = &c->level[c->deepest];
+    uint64_t divided = 0;
+    for (uint64_t i = 0; i < l->count; i++) {
+        if (l->cell[i].is_end)
+            continue;
+        if (divided % PROGRESS_CELLS == 0 &&
+            !ebpo_progress_step(progress, "border", tests + 8 * divided, tests_max, error))
+            return EBPO_E_CANCELLED;
+        if (!divide_cell(c, front, &l->cell[i], l + 1))
+            return fail_lists(c, error);
+        divided++;
+    }
+    return EBPO_OK;
+}
+
+/* Finds the cap cells, level by level. */
+static ebpo_status find_cells(ebpo_capped *c, ebpo_cap_front *front, const ebpo_progress *progress,
+                              int max_level, uint64_t tests_max, ebpo_error *error)
 {
     cap_level *root = &c->level[0];
     if (!ebpo_grow(&root->cell, &root->capacity, 1, sizeof *root->cell) ||
         !ebpo_grow(&c->lists.entry, &c->lists.capacity, 1, sizeof *c->lists.entry))
-        return false;
+        return fail_lists(c, error);
     c->lists.entry[c->lists.count++] = 0; /* the root of the tree of caps: all caps */
-    root->cell[root->count++] = (cap_cell){ 1, false, 0, 1, { 0, 0 } };
+    root->cell[root->count++] = (cap_cell){ .code = 1, .end = 1 };
     uint64_t tests = 0;
     for (; c->deepest < max_level; c->deepest++) {
-        cap_level *l = &c->level[c->deepest];
+        const cap_level *l = &c->level[c->deepest];
         uint64_t divided = 0;
         for (uint64_t i = 0; i < l->count; i++)
             divided += !l->cell[i].is_end;
-        tests += 8 * divided;
-        if (divided == 0 || tests > tests_max)
+        if (divided == 0 || tests + 8 * divided > tests_max)
             break;
-        for (uint64_t i = 0; i < l->count; i++)
-            if (!l->cell[i].is_end && !divide_cell(c, front, &l->cell[i], l + 1))
-                return false;
+        ebpo_status status = divide_level(c, front, progress, tests, tests_max, error);
+        if (status != EBPO_OK)
+            return status;
+        tests += 8 * divided;
     }
     for (uint64_t i = 0; i < c->level[c->deepest].count; i++)
         c->level[c->deepest].cell[i].is_end = true;
-    return true;
+    return EBPO_OK;
 }
 
 /* Removes the cells without cap cells below that are not divided further. */
@@ -129,15 +171,14 @@ ebpo_status ebpo_capped_make(ebpo_builder *b, const ebpo_border_loops *loops, eb
     if (status == EBPO_OK) {
         c->box = &b->box;
         c->rule = (ebpo_cap_rule){ (uint8_t)b->options->rule, threshold };
-        if (!find_cells(c, front, b->max_level, TESTS_ALWAYS + TESTS_PER_EDGE * loops->point_count))
-            status = ebpo_fail_memory(error, c->lists.count * sizeof *c->lists.entry);
-        else
-            remove_empty(c);
+        status = find_cells(c, front, &b->options->progress, b->max_level,
+                            TESTS_ALWAYS + TESTS_PER_EDGE * loops->point_count, error);
     }
     free(front);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        remove_empty(c);
         b->capped = c;
-    else
+    } else
         ebpo_capped_free(c);
     return status;
 }
@@ -195,26 +236,37 @@ ebpo_cap_overlap ebpo_capped_overlap(const ebpo_capped *capped, ebpo_cell cell)
     return !found ? EBPO_CAP_NONE : found->is_end ? EBPO_CAP_WHOLE : EBPO_CAP_PART;
 }
 
-/* For each corner of a cell, the axis of an edge from an earlier corner, and that corner. */
-static const struct {
-    int axis, before;
-} edge_to[8] = { { 0, 0 }, { 0, 0 }, { 1, 0 }, { 1, 1 }, { 2, 0 }, { 2, 1 }, { 2, 2 }, { 2, 3 } };
+/* The corner differences of a cell, to which the crossings of caps are added. */
+typedef struct cap_corners {
+    const ebpo_box *box;
+    ebpo_cell cell;
+    int32_t *delta; /* [8] */
+} cap_corners;
+
+/* Adds the crossings of a cap: minus those of the disc. Returns false, so that the visit goes on.
+ */
+static bool add_disc(void *context, const double a[3], const double b[3], const double c[3],
+                     uint32_t weight)
+{
+    const cap_corners *to = context;
+    int32_t disc[8];
+    ebpo_triangle face;
+    memcpy(face.corner[0], a, sizeof face.corner[0]);
+    memcpy(face.corner[1], b, sizeof face.corner[1]);
+    memcpy(face.corner[2], c, sizeof face.corner[2]);
+    ebpo_corner_windings(to->box, to->cell, &face, 1, disc);
+    for (int i = 0; i < 8; i++)
+        to->delta[i] -= (int32_t)weight * disc[i];
+    return false;
+}
 
 void ebpo_cap_corners(const ebpo_cap_tree *tree, const ebpo_box *box, ebpo_cell cell,
                       int32_t delta[8])
 {
     double low[3], high[3];
-    int32_t caps[8] = { 0 };
+    cap_corners to = { box, cell, delta };
     ebpo_cell_bounds(box, cell, low, high);
-    if (!ebpo_caps_near(tree, low, high))
-        return;
-    for (int i = 1; i < 8; i++) {
-        int axis = edge_to[i].axis, before = edge_to[i].before;
-        const double from[3] = { before & 1 ? high[0] : low[0], before & 2 ? high[1] : low[1],
-                                 before & 4 ? high[2] : low[2] };
-        caps[i] = caps[before] + ebpo_cap_crossings(tree, from, high[axis], axis);
-        delta[i] += caps[i];
-    }
+    ebpo_caps_visit(tree, low, high, add_disc, &to);
 }
 
 void ebpo_capped_add_corners(const ebpo_capped *capped, ebpo_cell cell, int32_t delta[8])
@@ -229,6 +281,8 @@ bool ebpo_capped_may_hold(const ebpo_capped *capped, ebpo_cell cell, int32_t win
     const cap_cell *found = find_cell(capped, cell);
     if (!found)
         return ebpo_rule_inside((ebpo_rule)capped->rule.rule, winding);
+    if (found->has_no_list)
+        return true;
     double low[3], high[3];
     uint64_t terms = 0;
     ebpo_cap_front front;

@@ -4,7 +4,9 @@
  * integer winding number k of faces and caps (geometry/cap_tree.h), w = k + w_D. Where |w_D| < 1/2,
  * the rule gives the same result for w and for k, as in a solid. The cells in which |w_D| may be
  * 1/2 or more are the cap cells: a thin layer around the caps. They are found once, level by level,
- * until the number of tests reaches a limit that grows with the length of the border.
+ * until the number of tests reaches a limit that grows with the length of the border. A cell that
+ * has more than a thousand caps near it is a cap cell as a whole, so the work is limited for caps
+ * that overlap.
  *
  * So the inside is a part of the union of the cap cells and of the solid that faces and caps bound
  * outside the cap cells. The boundary of this union consists of faces and of sides of cap cells.
@@ -18,7 +20,8 @@
 
 typedef struct ebpo_capped ebpo_capped;
 
-/* Finds the cap cells of a surface with these loops. Sets b->capped. */
+/* Finds the cap cells of a surface with these loops. Sets b->capped. Reports progress as the stage
+ * "border". Returns EBPO_E_MEMORY, EBPO_E_LIMIT, EBPO_E_CANCELLED. */
 EBPO_MUST_USE ebpo_status ebpo_capped_make(ebpo_builder *b, const ebpo_border_loops *loops,
                                            ebpo_error *error);
 void ebpo_capped_free(ebpo_capped *capped); /* accepts NULL */

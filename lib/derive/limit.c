@@ -3,7 +3,10 @@
  * leaves list faces, white nodes are outside the solid, and black nodes are inside. The limit is
  * the sum, over the cells of the level, of the volume of the convex hull of the solid in the cell.
  * The extreme points of a hull are corners of the mesh's faces after clipping to the cell, or
- * corners of the cell that are inside the solid. The library qhull computes the volumes. In a build
+ * corners of the cell that are inside the solid. If the envelopes of a surface contain its inside
+ * (ebpo_info.border_inside), corners that are inside by the surface's winding number count, too.
+ * Near caps, which close the holes of the surface, the inside may extend beyond these hulls. So the
+ * sum is only a lower bound there. The library qhull computes the volumes. In a build
  * without qhull, ebpo_limit_level returns EBPO_E_ABSENT. Volumes are stored for each node and added
  * in the order of the nodes, so that the number of threads does not change the sum. */
 #include "core/strict_fp.h"
@@ -20,7 +23,9 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "format/border_loops.h"
 #include "levels/lod.h"
+#include "geometry/cap_bounds.h"
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 
@@ -135,7 +140,8 @@ typedef struct scratch {
 
 typedef struct job {
     ebpo_lod_model model;
-    ebpo_mesh mesh; /* all faces of the file */
+    ebpo_mesh mesh;     /* all faces of the file */
+    ebpo_cap_tree caps; /* with border_inside: the caps of the surface; otherwise empty */
     int level;
     ebpo_level_nodes tree; /* the nodes of `model`, in the form that ebpo_level_child reads */
     ebpo_node *nodes;      /* [node_count] nodes whose hulls are computed */
@@ -219,7 +225,8 @@ static bool load_listed_faces(const job *j, scratch *s)
 {
     const ebpo_mesh *m = &j->mesh;
     uint64_t kept = 0;
-    qsort(s->list, s->list_count, sizeof *s->list, compare_faces);
+    if (s->list_count)
+        qsort(s->list, s->list_count, sizeof *s->list, compare_faces);
     for (uint64_t i = 0; i < s->list_count; i++)
         if (i == 0 || s->list[i] != s->list[i - 1])
             s->list[kept++] = s->list[i];
@@ -238,9 +245,9 @@ static bool load_listed_faces(const job *j, scratch *s)
 
 /* --- a node's points --- */
 
-/* Returns the winding number at a node's lowest corner. The file has no winding numbers of gray
- * nodes, so for a gray node, the function uses the white node, black node or leaf at this corner.
- */
+/* Returns the winding number at a node's lowest corner; in a surface, that of faces and caps. The
+ * file has no winding numbers of gray nodes, so for a gray node, the function uses the white node,
+ * black node or leaf at this corner. */
 static int32_t lowest_winding(const job *j, ebpo_node node)
 {
     while (node.type == EBPO_GRAY)
@@ -248,18 +255,37 @@ static int32_t lowest_winding(const job *j, ebpo_node node)
     return ebpo_level_winding(&j->tree, &node);
 }
 
-/* Adds the corners of the node's cell that are inside the solid to s->points. */
+/* Returns true if corner i of a cell is inside. `winding`: winding number at the corner; in a
+ * surface, the lowest corner's number plus the crossings of faces on the way, without those of
+ * caps.
+ */
+static bool is_inside(const job *j, ebpo_cell cell, int i, int32_t winding)
+{
+    const ebpo_info *info = j->model.info;
+    const ebpo_cap_rule rule = { (uint8_t)info->rule, 0.5 };
+    double low[3], p[3];
+    if (info->solid)
+        return ebpo_rule_inside(info->rule, winding);
+    ebpo_cell_bounds(&j->model.box, cell, low, p);
+    for (int k = 0; k < 3; k++)
+        p[k] = i >> k & 1 ? p[k] : low[k];
+    if (j->caps.node_count)
+        winding += ebpo_cap_path_crossings(&j->caps, 0, low, p);
+    return ebpo_cap_decide(&j->caps, p, winding, &rule).inside;
+}
+
+/* Adds the corners of the node's cell that are inside the model to s->points. */
 static bool add_corners(const job *j, scratch *s, const ebpo_node *node)
 {
     const ebpo_lod_model *m = &j->model;
-    if (!m->info->solid)
+    if (!m->info->solid && !m->info->border_inside)
         return true;
     int32_t delta[8], lowest = lowest_winding(j, *node);
     ebpo_corner_windings(&m->box, node->cell, s->faces, s->list_count, delta);
     if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 8, 3 * sizeof *s->points))
         return false;
     for (int i = 0; i < 8; i++)
-        if (ebpo_rule_inside(m->info->rule, lowest + delta[i])) {
+        if (is_inside(j, node->cell, i, lowest + delta[i])) {
             double *p = s->points + 3 * s->point_count++;
             p[0] = i & 1, p[1] = i >> 1 & 1, p[2] = i >> 2 & 1;
         }
@@ -311,7 +337,24 @@ static ebpo_status check_level(const ebpo_file *file, int level, ebpo_error *err
                          "convex hulls need the whole mesh, but this file %s; use the original "
                          "file with its mesh",
                          info->pruned ? "is a subset" : "has no mesh");
+    if (info->border_inside && !(info->parts & EBPO_PART_BORDER))
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "convex hulls need the border of this surface, whose envelopes contain "
+                         "its inside; use the original file with the part border");
     return EBPO_OK;
+}
+
+/* Reads the caps of a surface whose envelopes contain its inside. */
+static ebpo_status read_caps(job *j, const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_border_loops loops = { 0 };
+    if (!ebpo_file_info(file)->border_inside)
+        return EBPO_OK;
+    ebpo_status status = ebpo_border_read(file, &loops, error);
+    if (status == EBPO_OK)
+        status = ebpo_cap_tree_of_loops(&j->caps, &loops, error);
+    ebpo_border_loops_free(&loops);
+    return status;
 }
 
 static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigned threads,
@@ -324,6 +367,8 @@ static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigne
     ebpo_status status = ebpo_lod_model_read(&j->model, file, info->level_count - 1, &read, error);
     if (status == EBPO_OK)
         status = ebpo_file_read_mesh(file, &read, &j->mesh, error);
+    if (status == EBPO_OK)
+        status = read_caps(j, file, error);
     j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
     if (status == EBPO_OK) {
         j->tree = ebpo_lod_model_nodes(&j->model);
@@ -350,6 +395,7 @@ static void job_free(job *j, unsigned threads)
     free(j->nodes);
     free(j->volume);
     ebpo_mesh_free(&j->mesh);
+    ebpo_cap_tree_free(&j->caps);
     ebpo_lod_model_free(&j->model);
 }
 

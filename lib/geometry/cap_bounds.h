@@ -59,9 +59,9 @@ ebpo_cap_decision ebpo_cap_decide_near(const ebpo_cap_tree *tree, const ebpo_nea
                                        const uint32_t *disc, const double p[3], int32_t winding,
                                        const ebpo_cap_rule *rule);
 
-/* Returns the signed number of crossings of a path with the caps of an entry, counted as
- * ebpo_cap_crossings counts. The path leads from the lowest corner `low` of a cell to a point p of
- * the cell: along x, then y, then z. */
+/* Returns the sum of the crossings of a path with the caps of an entry. A crossing is 1, -1 or 0,
+ * as ebpo_axis_crossing defines it. The path leads from the lowest corner `low` of a cell to a
+ * point p of the cell: along x, then y, then z. */
 int32_t ebpo_cap_path_crossings(const ebpo_cap_tree *tree, uint32_t entry, const double low[3],
                                 const double p[3]);
 

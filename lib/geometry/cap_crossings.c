@@ -1,4 +1,4 @@
-/* Finds caps in a tree of caps: the crossings of a segment, and the caps near a box. Discs are caps
+/* Finds caps in a tree of caps: the crossings of a path, and the caps near a box. Discs are caps
  * with the opposite orientation, so a crossing of a cap is minus the crossing of the disc. Nodes
  * are groups of loops, and stretches (paths along a loop, cap_triangles.h).
  *
@@ -57,15 +57,6 @@ static int32_t cross_discs(const cap_segment *g, uint64_t at)
     return sum;
 }
 
-int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis)
-{
-    cap_segment g = { .tree = tree, .from = from, .to = to, .axis = axis };
-    for (int k = 0; k < 3; k++)
-        g.low[k] = g.high[k] = from[k];
-    g.high[axis] = to;
-    return tree->node_count ? -cross_discs(&g, 0) : 0;
-}
-
 int32_t ebpo_cap_path_crossings(const ebpo_cap_tree *tree, uint32_t entry, const double low[3],
                                 const double p[3])
 {
@@ -86,26 +77,49 @@ int32_t ebpo_cap_path_crossings(const ebpo_cap_tree *tree, uint32_t entry, const
     return -sum;
 }
 
-/* Returns false if certainly no cap below a node touches the box. Recursive, at most 64 deep. */
-static bool is_near(const ebpo_cap_tree *t, uint64_t at, const double low[3], const double high[3])
+/* The arguments of ebpo_caps_visit. */
+typedef struct cap_visit {
+    const ebpo_cap_tree *tree;
+    const double *low, *high; /* [3] the box */
+    ebpo_cap_visit_fn *visit;
+    void *context;
+} cap_visit;
+
+/* Visits the discs below a node. Recursive, at most 64 deep. */
+static bool visit_discs(const cap_visit *v, uint64_t at)
 {
+    const ebpo_cap_tree *t = v->tree;
     const ebpo_cap_node *n = &t->node[at];
-    if (ball_is_apart(n, low, high))
+    if (ball_is_apart(n, v->low, v->high))
         return false;
     if (n->weight == 0)
-        return is_near(t, n->from, low, high) || is_near(t, n->to, low, high);
+        return visit_discs(v, n->from) || visit_discs(v, n->to);
     uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
+    const double *a = t->position[n->from], *b = t->position[m], *c = t->position[n->to];
     bool apart = false;
-    for (int k = 0; k < 3; k++) {
-        const double a = t->position[n->from][k], b = t->position[m][k], c = t->position[n->to][k];
-        apart = apart || (a < low[k] && b < low[k] && c < low[k]) ||
-                (a > high[k] && b > high[k] && c > high[k]);
-    }
-    return !apart || (first && is_near(t, at + 1, low, high)) ||
-           (ebpo_cap_count(m, n->to) && is_near(t, at + 1 + first, low, high));
+    for (int k = 0; k < 3; k++)
+        apart = apart || (a[k] < v->low[k] && b[k] < v->low[k] && c[k] < v->low[k]) ||
+                (a[k] > v->high[k] && b[k] > v->high[k] && c[k] > v->high[k]);
+    return (!apart && v->visit(v->context, a, b, c, n->weight)) ||
+           (first && visit_discs(v, at + 1)) ||
+           (ebpo_cap_count(m, n->to) && visit_discs(v, at + 1 + first));
+}
+
+bool ebpo_caps_visit(const ebpo_cap_tree *tree, const double low[3], const double high[3],
+                     ebpo_cap_visit_fn *visit, void *context)
+{
+    const cap_visit v = { tree, low, high, visit, context };
+    return tree->node_count && visit_discs(&v, 0);
+}
+
+static bool stop_visit(void *context, const double a[3], const double b[3], const double c[3],
+                       uint32_t weight)
+{
+    (void)context, (void)a, (void)b, (void)c, (void)weight;
+    return true;
 }
 
 bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3])
 {
-    return tree->node_count && is_near(tree, 0, low, high);
+    return ebpo_caps_visit(tree, low, high, stop_visit, NULL);
 }

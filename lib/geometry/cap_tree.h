@@ -62,10 +62,12 @@ void ebpo_cap_tree_free(ebpo_cap_tree *tree);
 void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stretch,
                             ebpo_cap_node *out);
 
-/* Returns the sum of the crossings of a segment with all caps. A crossing is 1, -1 or 0, as
- * ebpo_axis_crossing defines it. The segment runs from `from` along `axis` to the coordinate `to`.
- */
-int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis);
+/* Calls visit(context, a, b, c, weight) for each disc that may touch the box: a triangle a, b, c
+ * that counts `weight` times. Returns true as soon as a call returns true. */
+typedef bool ebpo_cap_visit_fn(void *context, const double a[3], const double b[3],
+                               const double c[3], uint32_t weight);
+bool ebpo_caps_visit(const ebpo_cap_tree *tree, const double low[3], const double high[3],
+                     ebpo_cap_visit_fn *visit, void *context);
 /* Returns false if certainly no cap touches the box. */
 bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3]);
 

@@ -373,6 +373,10 @@ def surface(inputs):
     page_holds(folder, reported, 0)
     against_info(reported, folder)
     queries(reported, folder)
+    measured = json.loads(run("measure", "--json", folder / "inherit.ebpo.h5"))
+    model = reported["model"]
+    assert model["volume"] is None and model["volume_lo"] < measured["volume"] < model["volume_hi"], model
+    assert all(model[k] == measured[k] for k in ("volume_lo", "volume_hi", "winding_integral")), (model, measured)
     for l in reported["methods"][0]["levels"]:
         assert (l["excess"] is None and l["maybe_uniform"] is None and l["inside_ns"] is None
                 and l["width_median"] > 0 and l["hausdorff_hi"] >= 0)

@@ -23,16 +23,50 @@
 
 /* ---- the judge ---- */
 
+static double dot_product(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Adds half the solid angle of a triangle that appears small from p: the arctangent of its sine
+ * divided by its cosine, by a series. Returns false for other triangles. */
+static bool add_small_angle(const double p[3], const double t[3][3], long double *sum,
+                            long double *rounding)
+{
+    double v[3][3], length[3];
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++)
+            v[i][k] = t[i][k] - p[k];
+        length[i] = sqrt(dot_product(v[i], v[i]));
+    }
+    double sine = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) +
+                  v[0][1] * (v[1][2] * v[2][0] - v[1][0] * v[2][2]) +
+                  v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]),
+           product = length[0] * length[1] * length[2],
+           cosine = product + dot_product(v[0], v[1]) * length[2] +
+                    dot_product(v[1], v[2]) * length[0] + dot_product(v[2], v[0]) * length[1];
+    if (!(cosine > product && fabs(sine) < 0x1p-10 * cosine))
+        return false;
+    double x = sine / cosine;
+    *sum += x - x * x * x / 3;
+    *rounding += 0x1p-46 + fabs(x) * 0x1p-42; /* also of the series: x^5 / 5 < |x| 2^-42 */
+    return true;
+}
+
 /* Returns the winding number of p by its definition; NAN on a face. *error: bound of its rounding
  * error, which is large next to edges. */
 static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *error)
 {
+    const bool large = mesh->face_count > 10000; /* exact sums of these would take minutes */
     long double sum = 0, rounding = 0;
     for (uint64_t f = 0; f < mesh->face_count; f++) {
         double t[3][3];
         long double v[3][3], length[3], dot[3];
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++)
             ebpo_mesh_position(mesh, mesh->faces[3 * f + (uint64_t)i], t[i]);
+        if (large && add_small_angle(p, (const double(*)[3])t, &sum, &rounding))
+            continue;
+        for (int i = 0; i < 3; i++) {
             for (int k = 0; k < 3; k++)
                 v[i][k] = (long double)t[i][k] - p[k];
             length[i] = sqrtl(v[i][0] * v[i][0] + v[i][1] * v[i][1] + v[i][2] * v[i][2]);
@@ -62,6 +96,8 @@ static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *e
 
 /* Limit of the terms of sums of bounds for each leaf (ebpo_holes.terms). */
 enum { TERMS_OF_LEAF = 126 };
+
+enum { WIDE_FACES = 4000 };
 
 /* The same file in memory, with subtrees below level 1, and read node by node. */
 enum { WHOLE, PARTS, NODES, WAYS };
@@ -230,8 +266,9 @@ START_TEST(test_surfaces_match_sums_over_faces)
 }
 END_TEST
 
-/* Makes a sphere of radius 2 without the faces in a slice: caps cross large cells without faces. */
-static ebpo_mesh without_slice(uint32_t subdivisions)
+/* Makes a sphere of radius 2 around (1, 2, 3) without the faces whose first corner has a z between
+ * two values. */
+static ebpo_mesh without_slice(uint32_t subdivisions, double low, double high)
 {
     const double centre[3] = { 1, 2, 3 };
     ebpo_mesh m = ebpo_test_sphere(centre, 2, subdivisions);
@@ -239,7 +276,7 @@ static ebpo_mesh without_slice(uint32_t subdivisions)
     for (uint64_t f = 0; f < m.face_count; f++) {
         double t[3];
         ebpo_mesh_position(&m, m.faces[3 * f], t);
-        if (t[2] < 3 || t[2] > 4)
+        if (t[2] < low || t[2] > high)
             memmove(m.faces + 3 * kept++, m.faces + 3 * f, 3 * sizeof *m.faces);
     }
     m.face_count = kept;
@@ -261,10 +298,31 @@ START_TEST(test_few_holes_match_sums_over_faces)
     memmove(mesh.faces + 300, mesh.faces + 309, 3 * (mesh.face_count - 103) * sizeof *mesh.faces);
     mesh.face_count -= 3;
     check_model(mesh, rule, 0.375, points, 22, &all);
-    check_model(without_slice(3), rule, 0.125, points, 23, &all);
+    /* caps cross large cells without faces */
+    check_model(without_slice(3, 3, 4), rule, 0.125, points, 23, &all);
     ck_assert_uint_gt(all.of[EBPO_IN], 0);
 }
 END_TEST
+
+/* Makes the three faces of a cube of size 2 that touch the origin. */
+static ebpo_mesh three_cube_faces(void)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 2, 2, 2 };
+    ebpo_mesh mesh = ebpo_test_box(low, high, 1);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < mesh.face_count; f++) {
+        double t[3][3];
+        bool keep = false;
+        for (int i = 0; i < 3; i++)
+            ebpo_mesh_position(&mesh, mesh.faces[3 * f + (uint64_t)i], t[i]);
+        for (int k = 0; k < 3; k++)
+            keep = keep || (t[0][k] == 0 && t[1][k] == 0 && t[2][k] == 0);
+        if (keep)
+            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
+    }
+    mesh.face_count = kept;
+    return mesh;
+}
 
 START_TEST(test_ties_are_counted)
 {
@@ -289,20 +347,8 @@ START_TEST(test_ties_are_counted)
     holed_free(&h);
 
     /* a cube without three faces around one corner: 1/2 at the centre */
-    const double low[3] = { 0, 0, 0 }, high[3] = { 2, 2, 2 }, centre[3] = { 1, 1, 1 };
-    mesh = ebpo_test_box(low, high, 1);
-    uint64_t kept = 0;
-    for (uint64_t f = 0; f < mesh.face_count; f++) {
-        double t[3][3];
-        bool keep = false;
-        for (int i = 0; i < 3; i++)
-            ebpo_mesh_position(&mesh, mesh.faces[3 * f + (uint64_t)i], t[i]);
-        for (int k = 0; k < 3; k++)
-            keep = keep || (t[0][k] == 0 && t[1][k] == 0 && t[2][k] == 0);
-        if (keep)
-            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
-    }
-    mesh.face_count = kept;
+    const double centre[3] = { 1, 1, 1 };
+    mesh = three_cube_faces();
     holed_make(&h, mesh, EBPO_RULE_NONZERO, 0.5);
     model_must(ebpo_inside(h.context, centre, NULL, &r, &error), "inside", &error);
     ck_assert_int_eq(r.where, EBPO_OUT);
@@ -512,7 +558,61 @@ START_TEST(test_envelopes_contain_inside)
     static const char *const shapes[] = { "mobius", "open_box", "flipped_face_cube" };
     for (int i = 0; i < 3; i++)
         inside += check_envelopes(ebpo_test_make(shapes[i]), rule, points, state);
+    inside += check_envelopes(without_slice(2, -9, 3), rule, points, state); /* a half sphere */
+    inside += check_envelopes(three_cube_faces(), rule, points, state);
     ck_assert_uint_gt(inside, points / 4);
+}
+END_TEST
+
+/* Calls of a progress callback for the stage "border" before the stage "envelopes". The call with
+ * number `last` stops. */
+typedef struct border_calls {
+    unsigned count, last;
+    bool over;   /* the stage "envelopes" has begun */
+    bool within; /* `done` was at most `total` in all calls */
+} border_calls;
+
+static bool report_border(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    border_calls *calls = user;
+    calls->over = calls->over || strcmp(stage, "envelopes") == 0;
+    if (calls->over || strcmp(stage, "border") != 0)
+        return true;
+    calls->within = calls->within && done <= total;
+    return ++calls->count != calls->last;
+}
+
+/* Thousands of triangles as wide as the model, which overlap, so that all of them are caps near
+ * every cell. All cells then count whole. Progress is reported, and can stop the search. */
+START_TEST(test_overlapping_caps_take_bounded_work)
+{
+    uint64_t state = 8;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = random_soup(&state, WIDE_FACES), copy;
+    border_calls calls = { 0, 1, false, true };
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    ebpo_mesh_report found;
+    ebpo_repair_record repairs = { 0 };
+    ebpo_tree tree;
+    build.max_level = 4;
+    build.progress = (ebpo_progress){ report_border, &calls };
+    model_must(ebpo_mesh_copy(&mesh, &copy, &error), "copying", &error);
+    model_must(ebpo_mesh_check(&copy, 1, (ebpo_progress){ NULL, NULL }, &found, &error), "checking",
+               &error);
+    ck_assert_int_eq(ebpo_build(&copy, &found, &repairs, &build, &tree, &error), EBPO_E_CANCELLED);
+    ck_assert(calls.count == 1 && !calls.over);
+    calls.last = 0;
+    tree = model_build(mesh, &build);
+    ck_assert(calls.within && calls.count > 1);
+    model_write(&tree, scratch("wide.ebpo.h5"), NULL);
+    ebpo_file *file = model_open(scratch("wide.ebpo.h5"));
+    model_must(ebpo_verify(file, NULL, &report, &error), "verifying", &error);
+    ck_assert_msg(report.violations == 0, "%s; %s", report.structure.first,
+                  report.containment.first);
+    for (int level = 0; level < ebpo_file_info(file)->level_count; level++)
+        ck_assert_uint_eq(ebpo_file_info(file)->level[level].white_count, 0);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -631,6 +731,36 @@ START_TEST(test_subset_keeps_border)
 }
 END_TEST
 
+/* A subset that is pruned where envelopes extend little beyond the model still contains the inside.
+ */
+START_TEST(test_pruned_subset_contains_inside)
+{
+    uint64_t state = 15, inside = 0;
+    holed h, part = { .model = NULL };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options cut = EBPO_SUBSET_OPTIONS_INIT;
+    holed_make(&h, holed_torus(&state, 10, 2), EBPO_RULE_NONZERO, 0.5);
+    cut.max_error = 0.2;
+    model_must(ebpo_subset(h.file, scratch("part.ebpo.h5"), &cut, &error), "cutting", &error);
+    part.file = model_open(scratch("part.ebpo.h5"));
+    ck_assert(ebpo_file_info(part.file)->pruned && ebpo_file_info(part.file)->border_inside);
+    holed_open(&part, 0.5);
+    for (uint64_t i = 0; i < ebpo_test_scaled(2000); i++) {
+        double p[3];
+        ebpo_inside_result r;
+        choose_point(&state, &h, p);
+        model_must(ebpo_inside(h.context, p, NULL, &r, &error), "inside", &error);
+        if (r.where != EBPO_IN)
+            continue;
+        check_levels(&part, p, r.winding);
+        inside++;
+    }
+    ck_assert_uint_gt(inside, 0);
+    holed_free(&part);
+    holed_free(&h);
+}
+END_TEST
+
 /* A solid has integer bounds. */
 START_TEST(test_solid_has_integer_bounds)
 {
@@ -672,7 +802,8 @@ START_TEST(test_scans_match_sums_over_faces)
     uint64_t points = ebpo_test_scaled(mesh.face_count > 100000 ? 40 : 400);
     ebpo_mesh copy;
     model_must(ebpo_mesh_copy(&mesh, &copy, &error), "copying", &error);
-    uint64_t inside = check_envelopes(copy, EBPO_RULE_NONZERO, 25 * points, (uint64_t)_i + 9);
+    uint64_t inside =
+        check_envelopes(copy, EBPO_RULE_NONZERO, ebpo_test_scaled(10000), (uint64_t)_i + 9);
     check_model(mesh, EBPO_RULE_NONZERO, 0.5, points, (uint64_t)_i + 5, &all);
     printf("%s: %llu points in all levels, %llu in, %llu out, %llu on\n", scans[_i],
            (unsigned long long)inside, (unsigned long long)all.of[EBPO_IN],
@@ -695,8 +826,14 @@ TEST_SUITE(holes)
     tcase_add_test(shapes, test_levels_agree_or_are_undecided);
     tcase_add_test(shapes, test_marks_take_few_terms);
     tcase_add_test(shapes, test_subset_keeps_border);
+    tcase_add_test(shapes, test_pruned_subset_contains_inside);
     tcase_add_test(shapes, test_solid_has_integer_bounds);
     suite_add_tcase(suite, shapes);
+    TCase *wide = tcase_create("wide");
+    tcase_set_timeout(wide, 300);
+    tcase_add_checked_fixture(wide, scratch_enter, scratch_leave);
+    tcase_add_test(wide, test_overlapping_caps_take_bounded_work);
+    suite_add_tcase(suite, wide);
     if (getenv("EBPO_MODELS")) {
         TCase *real = tcase_create("scans");
         tcase_set_timeout(real, 600);

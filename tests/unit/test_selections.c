@@ -566,6 +566,72 @@ START_TEST(test_hull_of_convex_solid_fills_levels)
 }
 END_TEST
 
+/* Returns the sum of the limits of all levels, which the envelopes must not undercut. */
+static double sum_limits(ebpo_file *file)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    double sum = 0;
+    for (int level = 0; level < info->level_count; level++) {
+        ebpo_limit_options options = EBPO_LIMIT_OPTIONS_INIT;
+        ebpo_limit limit = EBPO_LIMIT_INIT;
+        ebpo_error error = EBPO_ERROR_INIT;
+        double volume;
+        ck_assert(ebpo_limit_level(file, level, &options, &limit, &error) == EBPO_OK);
+        ck_assert(ebpo_lod_level(file, level, NULL, NULL, &volume, &error) == EBPO_OK);
+        ck_assert_msg(volume >= limit.volume * (1 - 1e-9), "level %d: %g below the limit %g", level,
+                      volume, limit.volume);
+        sum += limit.volume;
+    }
+    return sum;
+}
+
+/* The limit of a surface with holes is that of a solid but for cells near the holes, if envelopes
+ * contain the inside. The border is needed for this limit only. */
+START_TEST(test_limit_of_surface_contains_inside)
+{
+    double sum[3] = { 0, 0, 0 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_limit limit = EBPO_LIMIT_INIT;
+    enum { CLOSED, HOLED, FACES_ONLY };
+    for (int i = CLOSED; i <= FACES_ONLY; i++) {
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        ebpo_mesh mesh = ebpo_test_sphere((double[3]){ 3, -1, 2 }, 0.5, 3);
+        options.leaf_faces = 2;
+        options.parts &= ~(uint32_t)(i == FACES_ONLY ? EBPO_PART_BORDER : 0);
+        mesh.face_count -= i == CLOSED ? 0 : 3;
+        write_file(mesh, &options);
+        ebpo_file *file = open_file();
+        if (!has_hulls(file)) {
+            ebpo_close(file);
+            return;
+        }
+        sum[i] = sum_limits(file);
+        ebpo_close(file);
+    }
+    ck_assert_msg(sum[HOLED] > 0.97 * sum[CLOSED] && sum[HOLED] < sum[CLOSED] &&
+                      sum[FACES_ONLY] < 0.9 * sum[CLOSED],
+                  "closed %g, with a hole %g, faces only %g", sum[CLOSED], sum[HOLED],
+                  sum[FACES_ONLY]);
+
+    /* a file without the border still has envelopes that contain the inside */
+    ebpo_mesh mesh = ebpo_test_sphere((double[3]){ 3, -1, 2 }, 0.5, 3);
+    ebpo_mesh_report facts;
+    ebpo_tree tree;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    mesh.face_count -= 3;
+    write.parts &= ~(uint32_t)EBPO_PART_BORDER;
+    ck_assert(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ 0 }, &facts, &error) == EBPO_OK);
+    ck_assert(ebpo_build(&mesh, &facts, NULL, NULL, &tree, &error) == EBPO_OK);
+    ck_assert(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK);
+    ebpo_tree_free(&tree);
+    ebpo_file *file = open_file();
+    ck_assert(ebpo_file_info(file)->border_inside);
+    ck_assert_int_eq(ebpo_limit_level(file, 0, NULL, &limit, &error), EBPO_E_ABSENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "part border"));
+    ebpo_close(file);
+}
+END_TEST
+
 START_TEST(test_envelope_sizes_are_close_to_limit)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
@@ -631,6 +697,7 @@ TEST_SUITE(selections)
     tcase_add_loop_test(files, test_selections_make_valid_files, 0, ebpo_test_solid_count);
     tcase_add_test(files, test_equal_seeds_give_equal_files);
     tcase_add_test(files, test_hull_of_convex_solid_fills_levels);
+    tcase_add_test(files, test_limit_of_surface_contains_inside);
     tcase_add_loop_test(files, test_envelope_sizes_are_close_to_limit, 0, ebpo_test_solid_count);
     suite_add_tcase(suite, files);
     tcase_set_timeout(more, 600);

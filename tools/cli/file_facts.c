@@ -363,6 +363,7 @@ static void json_model(json *j, const ebpo_info *info)
 {
     json_text(j, "kind", info->solid ? "solid" : "surface");
     json_bool(j, "inside_out", facts_inside_out(info) != NULL);
+    json_bool(j, "envelopes_contain_inside", info->solid || info->border_inside);
     json_text(j, "rule", words_rule(info->rule));
     json_uint(j, "vertices", info->vertex_count);
     json_uint(j, "faces", info->face_count);

@@ -45,10 +45,13 @@ ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells)
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass)
 {
     ebpo_solid_volume solid = facts_solid(info, NULL);
-    if (!findings_volume_known(&solid)) {
+    bool capped = info->parts & EBPO_PART_BORDER;
+    if (capped || !findings_volume_known(&solid)) {
         solid.lo = mass->volume_lo;
         solid.hi = mass->volume_hi;
     }
+    if (capped)
+        solid.integral = mass->integral;
     return solid;
 }
 

@@ -18,7 +18,8 @@ EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned thr
 /* Returns the bounds of the volume of the solid. `shells`: as for ebpo_solid_volume_of. */
 ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells);
 /* Returns the bounds of the volume of the solid. If the bounds from the header are not equal,
- * returns the bounds in `mass`, the measurements of the mesh. */
+ * returns the bounds in `mass`, the measurements of the mesh. For a surface with its border,
+ * returns the bounds in `mass` of the volume that faces and caps enclose. */
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass);
 /* Returns the word for the base of percentages: "box" (the root box) for a surface, "solid" for a
  * solid, or "integral" (of the winding number) for a solid whose volume is not known. */

@@ -58,10 +58,10 @@ typedef struct ebpo_limit {
 #define EBPO_LIMIT_INIT EBPO_SIZED(ebpo_limit)
 
 /*
- * For each cell of a level, computes the convex hull of the part of the solid in the cell (for a
- * surface: of the parts of faces in the cell). Sums the volumes of these hulls. qhull computes the
- * hull from the parts of faces in the cell, and from the corners of the cell that are inside the
- * solid.
+ * Sums the volumes of the convex hulls of the model in the cells of a level. qhull computes a hull
+ * from the parts of faces in the cell, and from the corners of the cell that are inside: in a solid
+ * and in a surface with info.border_inside. The inside of the latter may extend beyond the hulls
+ * next to holes.
  *
  * The sum is rounded and not certified, so use it only for comparison. In cubic units of the model,
  * the sum is infinite or 0 if the volume of a cell is out of the range of doubles. This happens
@@ -71,8 +71,8 @@ typedef struct ebpo_limit {
  * a hull depends on the faces in the cell. Memory and time are not limited; `progress` can stop the
  * call.
  *
- * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull. Also the errors of
- * reading (base.h).
+ * EBPO_E_ABSENT: the file has no mesh, or info.border_inside without the border; or the library was
+ * built without qhull. Also the errors of reading (base.h).
  *
  * Threads: any.
  */

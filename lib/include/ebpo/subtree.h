@@ -188,7 +188,7 @@ typedef struct ebpo_subtree_node {
     /*
      * The node as a stream returns it (stream.h), with one difference. If no planes of leaves are
      * stored, and the subtree has faces, then leaves have planes derived from their faces (EBP
-     * 2017, 3.3.4).
+     * 2017, 3.3.4), but not with info.border_inside, where leaves also contain the inside.
      */
     ebpo_stream_node node;
 

@@ -6,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/json.h"
 #include "cli/memory_args.h"
+#include "cli/mesh_caps.h"
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
@@ -25,7 +26,7 @@ typedef struct extracted {
 typedef struct values {
     int64_t level, subtree, threads;
     memory_values memory;
-    bool mesh, no_cell_faces, json, quiet;
+    bool mesh, caps, no_cell_faces, json, quiet;
     const char *textures;
     remote_values remote;
 } values;
@@ -53,6 +54,8 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->level < 0 && v->no_cell_faces)
         return command_usage(
             "extract", "--no-cell-faces applies to --level only; the model has no cell faces");
+    if (v->caps && !v->mesh)
+        return command_usage("extract", "--caps applies to --mesh only");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
     return EXIT_OK;
@@ -137,19 +140,21 @@ static ebpo_status take_mesh(ebpo_file *file, const values *v, const char *path,
     }
     bool source_order = false;
     ebpo_read_options read = reading_options(v->threads, workspace);
-    read.attributes = 1;
+    read.attributes = !v->caps;
     ebpo_status status = ebpo_file_read_source_mesh(file, &read, &out->mesh, &source_order, error);
     if (status == EBPO_OK && !source_order)
         fprintf(stderr,
                 "ebpo extract: %s: note: has no source indices, so vertices and faces are "
                 "in the file's order\n",
                 remote_shown(path));
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && !v->caps)
         warn_of_elements(file, source_order, path);
     if (status == EBPO_OK && ebpo_file_info(file)->pruned)
         fprintf(stderr,
                 "ebpo extract: %s: note: is a subset, so its mesh is only part of the model's\n",
                 remote_shown(path));
+    if (status == EBPO_OK && v->caps)
+        status = mesh_caps_add(&out->mesh, file, remote_shown(path), (unsigned)v->threads, error);
     return status;
 }
 

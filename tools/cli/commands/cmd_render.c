@@ -11,6 +11,7 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
+#include "cli/mesh_caps.h"
 #include "cli/mesh_findings.h"
 #include "cli/json.h"
 #include "cli/process_memory.h"
@@ -33,7 +34,7 @@ typedef struct values {
     int64_t level, threads;
     const char *levels, *view, *size, *memory;
     int up;
-    bool mesh, surface, edges, no_colours, json, quiet;
+    bool mesh, caps, surface, edges, no_colours, json, quiet;
     remote_values remote;
 } values;
 
@@ -52,6 +53,7 @@ typedef struct tile {
     ebpo_colours colours;  /* colours of the model, if it has colours */
     float *normals;        /* normals of the triangles of a level, for lighting; or NULL */
     float *vertex_normals; /* normals of the vertices of a simplified surface; or NULL */
+    uint8_t *paint;        /* with --caps: RASTER_RED for caps, RASTER_PLAIN for faces; or NULL */
     bool closed;           /* only front sides of faces are visible */
     char caption[64];
 } tile;
@@ -135,6 +137,11 @@ static int parse_values(job *j)
             "at most 24 of 'mesh' and levels, such as 0-3,mesh; the deepest possible is 20");
     if (!v->levels)
         j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
+    bool draws_mesh = false;
+    for (int i = 0; i < j->tile_count; i++)
+        draws_mesh = draws_mesh || j->tiles[i].level == MESH;
+    if (v->caps && !draws_mesh)
+        return command_usage("render", "--caps applies to pictures of the mesh only");
     return EXIT_OK;
 }
 
@@ -154,6 +161,24 @@ static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *erro
     return status;
 }
 
+/* Adds the caps to the mesh of a tile. */
+static ebpo_status add_caps(tile *t, const ebpo_file *file, const char *path, unsigned threads,
+                            ebpo_error *error)
+{
+    uint64_t faces = t->mesh.face_count;
+    ebpo_status status = mesh_caps_add(&t->mesh, file, path, threads, error);
+    if (status != EBPO_OK)
+        return status;
+    t->paint = malloc(t->mesh.face_count + 1);
+    if (!t->paint) {
+        snprintf(error->message, sizeof error->message, "%s: not enough memory for the caps", path);
+        return error->status = EBPO_E_MEMORY;
+    }
+    memset(t->paint, RASTER_PLAIN, faces);
+    memset(t->paint + faces, RASTER_RED, t->mesh.face_count - faces);
+    return EBPO_OK;
+}
+
 static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
                              ebpo_error *error)
 {
@@ -164,8 +189,10 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         snprintf(t->caption, sizeof t->caption, "mesh, %llu %s",
                  (unsigned long long)info->face_count, info->face_count == 1 ? "face" : "faces");
         t->closed = info->solid && info->report.manifold;
-        read.attributes = !j->v.no_colours;
+        read.attributes = !j->v.no_colours && !j->v.caps;
         ebpo_status read_status = ebpo_file_read_mesh(file, &read, &t->mesh, error);
+        if (read_status == EBPO_OK && j->v.caps)
+            return add_caps(t, file, remote_shown(j->in), threads, error);
         return read_status == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error)
                                       : read_status;
     }
@@ -232,6 +259,11 @@ static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
                  "%s: is a mesh, which has no levels; convert it first", j->in);
         return error->status = EBPO_E_ARGUMENT;
     }
+    if (j->v.caps) {
+        snprintf(error->message, sizeof error->message,
+                 "%s: is a mesh, which has no caps; convert it first", j->in);
+        return error->status = EBPO_E_ARGUMENT;
+    }
     ebpo_status status = ebpo_mesh_read(j->in, &read, &t->mesh, error);
     /* The check ensures that every index and coordinate can be drawn. */
     if (status == EBPO_OK)
@@ -283,6 +315,7 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
     raster_style style = { .colour = { 0.30, 0.48, 0.66 },
                            .closed = t->closed,
                            .edges = j->v.edges,
+                           .paint = t->paint,
                            .face_colours = t->colours.by_face ? t->colours.face : NULL,
                            .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex,
                            .normals = t->normals,
@@ -347,6 +380,7 @@ static ebpo_status render_picture(job *j, bool is_file, ebpo_progress progress, 
         ebpo_colours_free(&j->tiles[i].colours);
         free(j->tiles[i].normals);
         free(j->tiles[i].vertex_normals);
+        free(j->tiles[i].paint);
     }
     return status;
 }

@@ -92,14 +92,15 @@ static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *fil
     return status;
 }
 
-/* Sets the volume of the solid from the header or, if the header does not give it, from the mesh.
- */
+/* Sets the volume of the solid from the header. If the header does not give it, and for a surface
+ * with its border, measures the mesh. */
 static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file *file,
                                 ebpo_error *error)
 {
     ebpo_mass mass = EBPO_MASS_INIT;
     m->solid = facts_solid(&m->info, NULL);
-    if (findings_volume_known(&m->solid) || !(m->info.parts & EBPO_PART_MESH) || m->info.pruned)
+    bool known = findings_volume_known(&m->solid) && !(m->info.parts & EBPO_PART_BORDER);
+    if (known || !(m->info.parts & EBPO_PART_MESH) || m->info.pruned)
         return EBPO_OK;
     ebpo_status status = ebpo_measure(file, (unsigned)c->v->threads, &mass, error);
     if (status == EBPO_OK)
