@@ -194,13 +194,18 @@ function nativeTimes(program, file, inputs) {
   }
 }
 
-const item = (values, columns, i) => values.subarray(columns * i, columns * i + columns);
+/** Copies item i of the values to `out`, and returns it. */
+function take(values, i, out) {
+  for (let k = 0; k < out.length; k++)
+    out[k] = values[out.length * i + k];
+  return out;
+}
 
 /** Evaluates all queries with the package and with three-mesh-bvh. Batches and single queries have different inputs, because
  * the first query in a leaf prepares it. Each query has its own loop, which the compiler optimizes for this query alone, as
- * in a program that makes one kind of query. */
+ * in a program that makes one kind of query. Single queries of both use one object for the input again and again. */
 async function measureQueries(model, bvh, THREE, inputs, others) {
-  const ray = new THREE.Ray(), target = {}, at = new THREE.Vector3();
+  const ray = new THREE.Ray(), target = {}, at = new THREE.Vector3(), point = new Float64Array(3), line = new Float64Array(6);
   const many = {
     'first hit': await measure(inputs, COUNT, ({ rays }) => model.raysSync(rays)),
     nearest: await measure(inputs, COUNT, ({ points }) => model.distanceSync(points, { unsigned: true })),
@@ -209,15 +214,15 @@ async function measureQueries(model, bvh, THREE, inputs, others) {
   const one = {
     'first hit': await measure(others, COUNT, ({ rays }) => {
       for (let i = 0; i < COUNT; i++)
-        model.raysSync(item(rays, 6, i));
+        model.raysSync(take(rays, i, line));
     }),
     nearest: await measure(others, COUNT, ({ points }) => {
       for (let i = 0; i < COUNT; i++)
-        model.distanceSync(item(points, 3, i), { unsigned: true });
+        model.distanceSync(take(points, i, point), { unsigned: true });
     }),
     inside: await measure(others, COUNT, ({ points }) => {
       for (let i = 0; i < COUNT; i++)
-        model.insideSync(item(points, 3, i));
+        model.insideSync(take(points, i, point));
     }),
   };
   const theirs = {
@@ -284,7 +289,7 @@ ${[...missed, ...goals.filter((x) => x.met)].map((x) => row(x.what, x.goal, x.va
 
 node ${process.version}, ${cpus()[0].model.trim()}, ${availableParallelism()} cores, load average ${loadavg()[0].toFixed(1)}.
 Model: \`ebpo-generate --base igea.ply --subdivide 2 igea4.ply\`${memory ? '; large model: that of [remote files](remote.md)' : ''}.
-Server and client are on this machine; real round trips take longer. With brotli, ebpo.wasm has ${short(packed.brotli)} bytes.
+Server and client are on this machine. With brotli, ebpo.wasm has ${short(packed.brotli)} bytes.
 
 ${row('until the first result', 'ms')}|---|---|
 ${Object.entries(FIRST).map(([name, what]) => row(what, short(first[name]))).join('')}

@@ -123,6 +123,17 @@ test('one point or ray a call gives the results of batches', async () => {
   assert.throws(() => model.insideSync([0, 0, 0]), EbpoError);
 });
 
+test('after a trap, the module is not called again', async () => {
+  const [{ Heap }, { OneQuery }] = await Promise.all(['heap.js', 'one.js'].map((name) => import(join(folder, name)))), names = ['malloc', 'ebpo_js_inside_one'];
+  const module = await WebAssembly.compile(Uint8Array.from([0, 0x61, 0x73, 0x6d, 1, 0, 0, 0, // malloc returns 16, ebpo_js_inside_one traps
+    1, 15, 2, 0x60, 1, 0x7f, 1, 0x7f, 0x60, 5, 0x7f, 0x7c, 0x7c, 0x7c, 0x7f, 1, 0x7f, 3, 3, 2, 0, 1,
+    7, 31, 2, ...names.flatMap((name, i) => [name.length, ...new TextEncoder().encode(name), 0, i]), 10, 10, 2, 4, 0, 0x41, 16, 0x0b, 3, 0, 0, 0x0b]));
+  const heap = new Heap(module), query = new OneQuery(heap, 0);
+  assert.throws(() => query.inside([0, 0, 0], -1), (error) => error instanceof EbpoError && /failed in ebpo_js_inside_one/.test(error.message));
+  for (const call of [() => query.inside([0, 0, 0], -1), () => heap.call('malloc', 8)])
+    assert.throws(call, (error) => error.status === 'EBPO_E_INTERNAL' && /has failed before/.test(error.message));
+});
+
 test('invalid arguments are errors', async () => {
   const model = await open(small);
   await assert.rejects(model.inside([0, 0]), EbpoArgumentError);

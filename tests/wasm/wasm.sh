@@ -27,9 +27,9 @@ if [ "${EBPO_TEST_SCALE:-0.05}" = 1 ]; then
 fi
 # Compressed size of the core, as servers send it.
 "$node" -e 'const { constants, brotliCompressSync, gzipSync } = require("zlib");
-const bytes = require("fs").readFileSync(process.argv[1]);
-const size = brotliCompressSync(bytes, { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } }).length;
-console.log(`ebpo.wasm: ${size} bytes with brotli, ${gzipSync(bytes, { level: 9 }).length} with gzip`);
+const bytes = require("fs").readFileSync(process.argv[1]), size = gzipSync(bytes, { level: 9 }).length;
+const brotli = brotliCompressSync(bytes, { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } }).length;
+console.log(`ebpo.wasm: ${size} bytes with gzip, at most 400000; ${brotli} with brotli`);
 process.exit(size > 400000 ? 1 : 0)' "$EBPO_PACKAGE/ebpo.wasm"
 rm -rf "$EBPO_FUZZ"
 mkdir -p "$folder/models" "$EBPO_FUZZ"

@@ -91,9 +91,18 @@ build_gmp() {
     # Integers and rationals alone, without the functions for output and random numbers.
     common="assert errno extract-dbl invalid memory mp_bpl mp_clz_tab mp_dv_tab mp_minv_tab mp_get_fns mp_set_fns
         primesieve tal-reent"
+    # Half of the code are algorithms that are faster for numbers of more than 9600 bits, which are rare here. A
+    # threshold that no number of limbs reaches omits them; the algorithms for smaller numbers take their place.
+    thresholds=
+    for algorithm in MUL_TOOM44 MUL_TOOM6H MUL_TOOM8H MUL_TOOM32_TO_TOOM43 MUL_TOOM32_TO_TOOM53 MUL_TOOM42_TO_TOOM53 \
+        MUL_TOOM42_TO_TOOM63 MUL_FFT SQR_TOOM4 SQR_FFT MU_DIV_QR MU_DIVAPPR_Q MUPI_DIV_QR MU_BDIV_QR MU_BDIV_Q \
+        INV_MULMOD_BNM1 GCD_DC; do
+        thresholds="$thresholds -D${algorithm}_THRESHOLD=0x100000000"
+    done
     (
         cd "$deps/gmp"
-        CC=emcc AR=emar RANLIB=emranlib NM=emnm CC_FOR_BUILD=cc CFLAGS="$flags" "$sources/gmp/configure" \
+        CC=emcc AR=emar RANLIB=emranlib NM=emnm CC_FOR_BUILD=cc CFLAGS="$flags" CPPFLAGS="$thresholds" \
+            "$sources/gmp/configure" \
             --host=none --disable-assembly --disable-shared --disable-cxx >configure.log 2>&1
         {
             make gmp.h fac_table.h fib_table.h mp_bases.h trialdivtab.h mpn/fib_table.c mpn/mp_bases.c \

@@ -65,14 +65,24 @@ export class Heap {
 
   /** Calls an exported function. After a trap the instance is not used again. */
   call(name, ...args) {
-    if (this.failed)
-      throw new EbpoError('the module has failed before', { status: 'EBPO_E_INTERNAL' });
+    this.ready();
     try {
       return this.exports[name](...args);
     } catch (cause) {
-      this.failed = true;
-      throw new EbpoError(`the module failed in ${name}: ${cause.message}`, { status: 'EBPO_E_INTERNAL', cause });
+      throw this.trapped(name, cause);
     }
+  }
+
+  /** Throws if a function has trapped before. */
+  ready() {
+    if (this.failed)
+      throw new EbpoError('the module has failed before', { status: 'EBPO_E_INTERNAL' });
+  }
+
+  /** Returns the error for a trap in an exported function. */
+  trapped(name, cause) {
+    this.failed = true;
+    return new EbpoError(`the module failed in ${name}: ${cause.message}`, { status: 'EBPO_E_INTERNAL', cause });
   }
 
   /** Returns a view of the whole memory. */
