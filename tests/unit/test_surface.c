@@ -422,6 +422,15 @@ START_TEST(test_boxes_keep_patches)
     ck_assert(is_closed(&kept.mesh));
     ebpo_surface_mesh_free(&whole);
     ebpo_surface_mesh_free(&kept);
+    /* patches of a subset have the face numbers of the original file, so no face replaces them */
+    ck_assert(ebpo_file_info(part)->parts & EBPO_PART_MESH);
+    options.faces = true;
+    options.pixels = 0;
+    must(take_view(part, &options, &kept, &error), "finest view of the part", &error);
+    ck_assert_uint_eq(kept.faces, 0);
+    weld(&kept.mesh);
+    ck_assert(is_closed(&kept.mesh));
+    ebpo_surface_mesh_free(&kept);
     ebpo_close(part);
     ebpo_close(file);
 }
