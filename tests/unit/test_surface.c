@@ -436,6 +436,40 @@ START_TEST(test_boxes_keep_patches)
 }
 END_TEST
 
+/* The boxes of long diagonal faces intersect all cells of the verifier's grid; verification still
+ * needs little memory. */
+START_TEST(test_long_faces_need_little_memory)
+{
+    static const double diagonal[3][3] = { { 0.70710678118654752, 0.40824829046386302, 0.57735 },
+                                           { -0.70710678118654752, 0.40824829046386302, 0.57735 },
+                                           { 0, -0.81649658092772603, 0.57735 } },
+                        nowhere[3] = { 0, 0, 0 };
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ebpo_workspace *workspace;
+    ebpo_workspace_options limits = EBPO_WORKSPACE_OPTIONS_INIT;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    ebpo_mesh needle = ebpo_test_cone(0.01, 1, 2000);
+    ebpo_test_transform(&needle, diagonal, nowhere);
+    build(&tree, needle, 1);
+    must(ebpo_tree_write(&tree, scratch("needle.ebpo.h5"), NULL, &error), "write", &error);
+    ebpo_tree_free(&tree);
+    must(ebpo_open(scratch("needle.ebpo.h5"), &file, &error), "open", &error);
+    ck_assert_uint_gt(ebpo_file_info(file)->surface_patches, 0);
+    must(ebpo_workspace_new(&limits, &workspace, &error), "workspace", &error);
+    options.workspace = workspace;
+    must(ebpo_verify(file, &options, &report, &error), "verify", &error);
+    ck_assert_uint_eq(report.violations, 0);
+    must(ebpo_workspace_get_stats(workspace, &stats), "stats", NULL);
+    ck_assert_uint_lt(stats.held_peak + stats.filed_peak, 32 << 20);
+    ebpo_workspace_free(workspace);
+    ebpo_close(file);
+}
+END_TEST
+
 TEST_SUITE(surface)
 {
     Suite *suite = suite_create("surface");
@@ -451,6 +485,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_views_end_at_faces);
     tcase_add_test(tests, test_views_within_bytes);
     tcase_add_test(tests, test_boxes_keep_patches);
+    tcase_add_test(tests, test_long_faces_need_little_memory);
     suite_add_tcase(suite, tests);
     return suite;
 }
