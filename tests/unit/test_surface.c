@@ -340,6 +340,37 @@ START_TEST(test_views_are_closed)
 }
 END_TEST
 
+/* Normals of faces do not depend on the unit of length, however small or large the model is. */
+START_TEST(test_faces_of_extreme_sizes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_surface_mesh mesh[3];
+    for (int i = 0; i < 3; i++) {
+        ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+        ebpo_tree tree;
+        ebpo_file *file;
+        ebpo_mesh torus = waves(40, 30);
+        for (uint64_t v = 0; v < 3 * torus.vertex_count; v++)
+            torus.xyz64[v] = ldexp(torus.xyz64[v], i * 900 - 900);
+        build(&tree, torus, 1);
+        must(ebpo_tree_write(&tree, scratch("size.ebpo.h5"), NULL, &error), "write", &error);
+        ebpo_tree_free(&tree);
+        must(ebpo_open(scratch("size.ebpo.h5"), &file, &error), "open", &error);
+        options.faces = true;
+        must(take_view(file, &options, &mesh[i], &error), "view", &error);
+        ck_assert_uint_eq(mesh[i].faces, 2400);
+        ebpo_close(file);
+    }
+    for (int i = 0; i < 3; i += 2) {
+        ck_assert_uint_eq(mesh[i].mesh.vertex_count, mesh[1].mesh.vertex_count);
+        ck_assert(memcmp(mesh[i].normals, mesh[1].normals,
+                         3 * mesh[1].mesh.vertex_count * sizeof(float)) == 0);
+    }
+    for (int i = 0; i < 3; i++)
+        ebpo_surface_mesh_free(&mesh[i]);
+}
+END_TEST
+
 /* Without a limit of the error, all faces of the model are drawn, each once. */
 START_TEST(test_views_end_at_faces)
 {
@@ -482,6 +513,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_hostile_codes);
     tcase_add_test(tests, test_views_are_closed);
+    tcase_add_test(tests, test_faces_of_extreme_sizes);
     tcase_add_test(tests, test_views_end_at_faces);
     tcase_add_test(tests, test_views_within_bytes);
     tcase_add_test(tests, test_boxes_keep_patches);
