@@ -3,7 +3,7 @@
  * A patch simplifies the faces below one node of the octree, and becomes a tile. The patches of the
  * node's children become the tile's children. Viewers replace the tile by its children (REPLACE).
  * If the mesh is exported, a patch without patches below has one child: a tile with the model's
- * faces that the patch simplifies. Tiles are written one after the other, and then tileset.json.
+ * faces that the patch simplifies (except in a subset by a box). Tiles are written one after the other, and then tileset.json.
  * The table of patches, the bounds of all tiles, and one tile are in memory. A tile's
  * geometricError is the greatest of the certified errors of this tile and the tiles below, because
  * readers expect that children have no greater error.
@@ -162,7 +162,8 @@ static bool is_divided(const tiler *t, uint64_t i)
 
 static bool has_faces(const tiler *t, uint64_t i)
 {
-    return t->job->options->mesh && !is_divided(t, i);
+    /* patches of a subset have the face numbers of the original file */
+    return t->job->options->mesh && !t->info->pruned && !is_divided(t, i);
 }
 
 static ebpo_status write_faces(tiler *t, uint64_t i, ebpo_error *error)

@@ -43,6 +43,9 @@ typedef struct polygon {
 
 typedef struct lighting {
     ebpo_box box;
+    /* areas are computed in units of 2^exponent, which is near the longest side of the box, so that
+     * products neither overflow nor underflow */
+    int exponent;
     const ebpo_lod_nodes *nodes;
     polygon *polygons;             /* [polygon_count] */
     uint32_t (*corner_of_node)[8]; /* [node_count] index of each corner of the node's cell */
@@ -55,14 +58,19 @@ typedef struct lighting {
 /* --- polygons --- */
 
 /* Adds the area vector of a triangle to `area`: the triangle's normal, whose length is twice the
- * triangle's area. */
-static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double area[3])
+ * triangle's area. The unit of length is 2^exponent. */
+static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, int exponent, double area[3])
 {
     const double *a = mesh->xyz64 + 3 * (uint64_t)face[0], *b = mesh->xyz64 + 3 * (uint64_t)face[1],
                  *c = mesh->xyz64 + 3 * (uint64_t)face[2];
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = ldexp(b[k] - a[k], -exponent);
+        v[k] = ldexp(c[k] - a[k], -exponent);
+    }
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
-        area[k] += (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
+        area[k] += u[i] * v[j] - u[j] * v[i];
     }
 }
 
@@ -108,7 +116,7 @@ static void describe_polygons(lighting *l, const ebpo_mesh *mesh)
                 for (int axis = 0; axis < 3; axis++)
                     p->middle[axis] += corner_of(mesh, face, c)[axis] / n;
             for (; n > 2; n--, face += 3)
-                add_triangle(mesh, face, p->area);
+                add_triangle(mesh, face, l->exponent, p->area);
         }
     }
 }
@@ -273,6 +281,7 @@ ebpo_status ebpo_lod_normals(const ebpo_info *info, const ebpo_mesh *mesh,
     ebpo_status status = check_nodes(mesh, nodes, error);
     if (status == EBPO_OK)
         status = lighting_prepare(&l, error);
+    (void)frexp(fmax(l.box.size[0], fmax(l.box.size[1], l.box.size[2])), &l.exponent);
     if (status == EBPO_OK) {
         describe_polygons(&l, mesh);
         memset(out, 0, nodes->polygon_count * 3 * sizeof *out);

@@ -30,7 +30,8 @@ typedef struct faces_reader {
     uint32_t *face;   /* [count] indices of the faces in the file */
     uint32_t *corner; /* [count][3] indices in the file of the faces' vertices */
     uint32_t *vertex; /* [out->vertex_count] index in the file of each shared vertex */
-    /* [count] area vectors of faces: a normal whose length is twice the face's area */
+    /* [count] area vectors of faces: a normal whose length is twice the face's area; the unit is
+     * that of add_normals */
     double (*normal)[3];
     double (*sum)[3]; /* [out->vertex_count] sums of the area vectors around a vertex */
     uint8_t *colour;  /* [count][3][3] red, green, blue of each corner; NULL: no colours */
@@ -75,9 +76,13 @@ static ebpo_status read_positions(faces_reader *r, ebpo_error *error)
     return status;
 }
 
-/* Computes the area vectors of the faces and their sums at the shared vertices. */
+/* Computes the area vectors of the faces and their sums at the shared vertices. The unit of length
+ * is a power of two near the size of the model, so that products neither overflow nor underflow. */
 static void add_normals(faces_reader *r)
 {
+    int exponent;
+    (void)frexp(ebpo_patch_error_step(&r->chunks->file->info), &exponent);
+    exponent += 32; /* the longest side of the root cell is 2^32 steps */
     for (uint64_t f = 0; f < r->count; f++) {
         const uint32_t *t = r->out->triangles + 3 * f;
         const double *p[3];
@@ -85,8 +90,8 @@ static void add_normals(faces_reader *r)
         for (int k = 0; k < 3; k++)
             p[k] = r->out->xyz + 3 * (uint64_t)t[k];
         for (int k = 0; k < 3; k++) {
-            u[k] = p[1][k] - p[0][k];
-            v[k] = p[2][k] - p[0][k];
+            u[k] = ldexp(p[1][k] - p[0][k], -exponent);
+            v[k] = ldexp(p[2][k] - p[0][k], -exponent);
         }
         ebpo_vec3_cross(u, v, r->normal[f]);
         for (int i = 0; i < 3; i++)

@@ -1,8 +1,8 @@
 /* Declares the state of a view (view_cut.c): the observer, the delivered part of the tree, and the
  * frontier. A view delivers nodes of the octree to a program, from coarse to fine. The "cut" is the
  * set of the delivered nodes whose children have not been delivered. The "frontier" is the set of
- * those gray nodes of the cut that have children in the file. To refine a node means to replace it
- * in the cut by its children. */
+ * the gray nodes of the cut. To refine a node means to replace it in the cut by its children. A
+ * pruned node has no children in the file, so it is not refined. */
 #ifndef EBPO_LEVELS_VIEW_CUT_H
 #define EBPO_LEVELS_VIEW_CUT_H
 
@@ -146,15 +146,20 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_par
 /* --- the frontier: the gray nodes of the cut in a heap; the top is the node to refine next --- */
 
 /* Class of a node in the order of refinement: visible nodes first, then nodes outside the frustum.
- * EBPO_TURN_NEVER: the node is not refined, because a limit of the view's options excludes it. */
+ * EBPO_TURN_NEVER: the node is not refined, because a limit of the view's options excludes it, or
+ * because it is pruned. */
 typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebpo_turn;
+
+#define EBPO_PRUNED_GROUP UINT64_MAX
 
 /* A node of the frontier. Nodes are ordered by turn, then by key, then by octcode. */
 typedef struct ebpo_waiting {
     uint64_t key, octcode; /* key: ebpo_viewpoint_key */
-    uint64_t child_group;  /* ebpo_partial_children; view_surface.c: index of a patch */
-    uint32_t group;        /* `group` and `octant`: the node as an ebpo_partial_node */
-    uint8_t octant, turn;  /* turn: ebpo_turn */
+    /* ebpo_partial_children; EBPO_PRUNED_GROUP: the children are not in the file; view_surface.c:
+     * index of a patch */
+    uint64_t child_group;
+    uint32_t group;       /* `group` and `octant`: the node as an ebpo_partial_node */
+    uint8_t octant, turn; /* turn: ebpo_turn */
 } ebpo_waiting;
 
 typedef struct ebpo_frontier {

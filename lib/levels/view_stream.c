@@ -562,7 +562,9 @@ static void rank_waiting(const ebpo_view_stream *s, ebpo_waiting *w)
     ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(w->octcode));
     w->key = ebpo_viewpoint_key(&s->viewpoint, &s->box, s->options.priority, w->octcode,
                                 sight.distance2);
-    w->turn = (uint8_t)turn_of(s, ebpo_octcode_level(w->octcode), sight);
+    w->turn = w->child_group == EBPO_PRUNED_GROUP
+                  ? EBPO_TURN_NEVER
+                  : (uint8_t)turn_of(s, ebpo_octcode_level(w->octcode), sight);
 }
 
 ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options *options,
@@ -674,8 +676,7 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
 
 /* Begins to deliver the root, or the children of the frontier's first node. If the view ends here,
  * sets *end to the reason. If the first node is pruned (its children are not in the file), only
- * removes the node from the frontier. Such a node stays in the cut, and the caller calls this
- * function again. */
+ * marks it as a node that is not refined, and the caller calls this function again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
@@ -700,7 +701,10 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         return EBPO_OK;
     }
     if (status == EBPO_OK && !root && s->info->pruned && s->read.types == 0) {
-        (void)ebpo_frontier_pop(&s->frontier);
+        ebpo_waiting pruned = ebpo_frontier_pop(&s->frontier);
+        pruned.child_group = EBPO_PRUNED_GROUP;
+        pruned.turn = EBPO_TURN_NEVER;
+        ebpo_frontier_push(&s->frontier, pruned); /* in the space of the removed node */
         return EBPO_OK;
     }
     if (status == EBPO_OK)
@@ -737,11 +741,12 @@ static void end_group(ebpo_view_stream *s)
         ebpo_partial_node node = { group, (uint8_t)octant };
         ebpo_node_type type = ebpo_partial_type(&s->partial, node);
         s->cut[type]++;
-        if (type == EBPO_GRAY && ebpo_octcode_level(ebpo_partial_octcode(&s->partial, node)) + 1 <
-                                     /* a gray node of the last level is pruned */
-                                     s->info->level_count) {
-            ebpo_waiting w = { .octcode = ebpo_partial_octcode(&s->partial, node),
-                               .child_group = ebpo_partial_children(&s->partial, node),
+        if (type == EBPO_GRAY) {
+            uint64_t octcode = ebpo_partial_octcode(&s->partial, node);
+            bool pruned = ebpo_octcode_level(octcode) + 1 == s->info->level_count;
+            ebpo_waiting w = { .octcode = octcode,
+                               .child_group = pruned ? EBPO_PRUNED_GROUP
+                                                     : ebpo_partial_children(&s->partial, node),
                                .group = group,
                                .octant = (uint8_t)octant };
             rank_waiting(s, &w);

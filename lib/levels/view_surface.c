@@ -4,8 +4,9 @@
  * The choice begins with the patch of the root. The patch with the greatest error in the image is
  * replaced by the patches of its node's children, until no error is greater than options.pixels. If
  * the children have no patches and options.faces is true, the patch is replaced by the model's
- * faces. The errors are in the table of patches, so only chosen patches are read. If there is a
- * limit of bytes, the choice ends before the chunks of the next patches would exceed the limit. */
+ * faces, except in a subset: there, patches have the face numbers of the original file. The errors
+ * are in the table of patches, so only chosen patches are read. If there is a limit of bytes, the
+ * choice ends before the chunks of the next patches would exceed the limit. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,6 +25,7 @@ typedef struct choosing {
     const ebpo_view_options *options;
     const ebpo_info *info;
     ebpo_box box;
+    bool faces; /* patches may be replaced by faces */
     /* the patches chosen so far, as a heap (view_cut.h); child_group: index of a patch */
     ebpo_frontier frontier;
     /* missing chunks of the patches chosen so far; NULL: no limit of bytes */
@@ -60,7 +62,7 @@ static ebpo_turn turn_of(const choosing *c, uint64_t patch, ebpo_seen sight)
     const ebpo_view_options *o = c->options;
     int level = ebpo_octcode_level(octcode_of(c, patch));
     bool divided = c->table->child_end[patch] > c->table->child[patch];
-    if ((!divided && !o->faces) || (o->level >= 0 && level >= o->level) ||
+    if ((!divided && !c->faces) || (o->level >= 0 && level >= o->level) ||
         (o->pixels > 0 && pixels_of(c, patch, sight) <= o->pixels) ||
         (!isinf(o->distance) &&
          ebpo_viewpoint_distance(c->viewpoint, sight.distance2) > o->distance))
@@ -242,7 +244,8 @@ ebpo_status ebpo_view_surface(ebpo_patch_table *table, ebpo_chunks *chunks,
                    .viewpoint = viewpoint,
                    .options = options,
                    .info = info,
-                   .box = ebpo_root_box(info) };
+                   .box = ebpo_root_box(info),
+                   .faces = options->faces && !info->pruned };
     memset(out, 0, sizeof *out);
     ebpo_chunks_limit(chunks, options->bytes ? options->bytes : UINT64_MAX);
     ebpo_status status = ebpo_patch_table_read(table, chunks, error);

@@ -25,7 +25,10 @@
 #include "verify/verify_parts.h"
 
 enum {
-    SIDE_MAX = 128,      /* greatest number of grid cells along an axis */
+    SIDE_MAX = 128, /* greatest number of grid cells along an axis */
+    /* greatest number of entries of a grid, divided by the number of triangles; a triangle has an
+     * entry in each cell that its box intersects */
+    ENTRIES_MAX = 32,
     SAMPLED_FACES = 4096 /* approximate number of faces that are tested for a patch */
 };
 
@@ -92,10 +95,12 @@ static bool visit_node(node_walk *w, ebpo_octcode code, ebpo_node_type type)
 /* Triangles in a uniform grid. */
 typedef struct triangle_grid {
     ebpo_workspace *workspace;
-    double low[3], step[3]; /* lowest corner of the grid; sides of a cell */
+    double low[3], high[3]; /* box of the triangles */
+    double step[3];         /* sides of a cell */
     int side;               /* number of cells along each axis */
     uint64_t *begin;        /* [side^3 + 1] index in `triangle` of each cell's first triangle */
     uint32_t *triangle;     /* indices of triangles, cell by cell */
+    uint64_t near;          /* index in `triangle` of the last entry that was near a point */
 } triangle_grid;
 
 /* A list of triangles: the triangles of a patch, or faces of the model. */
@@ -147,23 +152,36 @@ static void triangle_range(const triangle_grid *g, const triangle_list *list, ui
             for (int cell = (z_ * (grid)->side + y_) * (grid)->side + (from)[0], x_ = (from)[0]; \
                  x_ <= (to)[0]; x_++, cell++)
 
+/* Computes the box of the triangles. */
 static void measure_grid(triangle_grid *g, const triangle_list *list)
 {
-    double high[3] = { -INFINITY, -INFINITY, -INFINITY };
     for (int k = 0; k < 3; k++)
-        g->low[k] = INFINITY;
+        g->low[k] = INFINITY, g->high[k] = -INFINITY;
     EBPO_FOR_ITEMS(g->workspace, i, 0, list->count) {
         double t[3][3];
         get_triangle(list, i, t);
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++) {
                 g->low[k] = fmin(g->low[k], t[c][k]);
-                high[k] = fmax(high[k], t[c][k]);
+                g->high[k] = fmax(g->high[k], t[c][k]);
             }
     }
-    g->side = (int)fmin(SIDE_MAX, 1 + sqrt((double)list->count) / 2);
+}
+
+/* Divides the box of the triangles into side^3 cells. Returns how many entries the grid has. */
+static uint64_t divide_grid(triangle_grid *g, const triangle_list *list, int side)
+{
+    int from[3], to[3];
+    uint64_t entries = 0;
+    g->side = side;
     for (int k = 0; k < 3; k++)
-        g->step[k] = (high[k] - g->low[k]) / g->side;
+        g->step[k] = (g->high[k] - g->low[k]) / side;
+    EBPO_FOR_ITEMS(g->workspace, i, 0, list->count) {
+        triangle_range(g, list, i, from, to);
+        entries += (uint64_t)(to[0] - from[0] + 1) * (uint64_t)(to[1] - from[1] + 1) *
+                   (uint64_t)(to[2] - from[2] + 1);
+    }
+    return entries;
 }
 
 static void free_grid(triangle_grid *g)
@@ -172,12 +190,16 @@ static void free_grid(triangle_grid *g)
     ebpo_array_free(g->workspace, g->triangle);
 }
 
-/* Sorts the triangles into a grid. Returns false when out of memory. */
+/* Sorts the triangles into a grid. The grid has fewer cells if many triangles are long, so that its
+ * size does not grow faster than the number of triangles. Returns false when out of memory. */
 static bool make_grid(triangle_grid *g, const triangle_list *list, ebpo_workspace *workspace)
 {
     int from[3], to[3];
     *g = (triangle_grid){ .workspace = workspace };
     measure_grid(g, list);
+    int side = (int)fmin(SIDE_MAX, 1 + sqrt((double)list->count) / 2);
+    while (divide_grid(g, list, side) > ENTRIES_MAX * list->count)
+        side /= 2; /* with one cell, each triangle has one entry */
     uint64_t cells = (uint64_t)g->side * (uint64_t)g->side * (uint64_t)g->side;
     g->begin = ebpo_alloc_zero(cells + 2, sizeof *g->begin);
     if (!g->begin)
@@ -201,26 +223,32 @@ static bool make_grid(triangle_grid *g, const triangle_list *list, ebpo_workspac
 }
 
 /* Returns false if the point is certainly farther than `limit` from all triangles in a range of
- * cells; otherwise returns true. */
-static bool is_near_cells(const triangle_grid *g, const triangle_list *list, const double p[3],
+ * cells; otherwise returns true. Begins with the triangle that was near the last point, because
+ * most points follow near ones. */
+static bool is_near_cells(triangle_grid *g, const triangle_list *list, const double p[3],
                           double limit, const int from[3], const int to[3])
 {
     FOR_CELLS(g, from, to, cell)
-    for (uint64_t i = g->begin[cell]; i < g->begin[cell + 1]; i++) {
-        double t[3][3];
-        ebpo_distance_bounds bounds;
-        get_triangle(list, g->triangle[i], t);
-        ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &bounds);
-        if (bounds.lo <= limit)
-            return true;
+    {
+        uint64_t begin = g->begin[cell], end = g->begin[cell + 1],
+                 i = g->near >= begin && g->near < end ? g->near : begin;
+        for (uint64_t left = end - begin; left > 0; left--, i = i + 1 < end ? i + 1 : begin) {
+            double t[3][3];
+            ebpo_distance_bounds bounds;
+            get_triangle(list, g->triangle[i], t);
+            ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &bounds);
+            if (bounds.lo <= limit) {
+                g->near = i;
+                return true;
+            }
+        }
     }
     return false;
 }
 
 /* Returns false if the point is certainly farther than `limit` from all triangles; otherwise
  * returns true. */
-static bool is_near(const triangle_grid *g, const triangle_list *list, const double p[3],
-                    double limit)
+static bool is_near(triangle_grid *g, const triangle_list *list, const double p[3], double limit)
 {
     double low[3], high[3];
     int from[3], to[3];
@@ -238,7 +266,7 @@ static bool is_near(const triangle_grid *g, const triangle_list *list, const dou
 /* Tests the corners and the centre of every `every`-th triangle of the list `of`. Returns how many
  * of these points are certainly farther than `limit` from all triangles of the list `from`. `g`:
  * grid of `from`. */
-static uint64_t count_far(const triangle_list *of, uint64_t every, const triangle_grid *g,
+static uint64_t count_far(const triangle_list *of, uint64_t every, triangle_grid *g,
                           const triangle_list *from, double limit)
 {
     uint64_t far = 0;

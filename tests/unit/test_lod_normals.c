@@ -241,6 +241,32 @@ START_TEST(test_lod_normals_of_sphere_cell_faces)
 }
 END_TEST
 
+/* Normals do not depend on the unit of length, however small or large the model is. */
+START_TEST(test_lod_normals_of_extreme_sizes)
+{
+    level l = take(ebpo_test_make("torus"), 4, 3);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_info info = *l.info;
+    float *normals = space(3 * l.nodes.polygon_count, sizeof *normals);
+    for (int power = -900; power <= 900; power += 1800) {
+        double *xyz = l.mesh.xyz64;
+        l.mesh.xyz64 = space(3 * l.mesh.vertex_count, sizeof *xyz);
+        for (uint64_t i = 0; i < 3 * l.mesh.vertex_count; i++)
+            l.mesh.xyz64[i] = ldexp(xyz[i], power);
+        for (int k = 0; k < 3; k++) {
+            info.box_origin[k] = ldexp(l.info->box_origin[k], power);
+            info.box_size[k] = ldexp(l.info->box_size[k], power);
+        }
+        ck_assert_int_eq(ebpo_lod_normals(&info, &l.mesh, &l.nodes, normals, &error), EBPO_OK);
+        ck_assert(memcmp(normals, l.normals, 3 * l.nodes.polygon_count * sizeof *normals) == 0);
+        free(l.mesh.xyz64);
+        l.mesh.xyz64 = xyz;
+    }
+    free(normals);
+    release(&l);
+}
+END_TEST
+
 START_TEST(test_lod_normals_refuse_other_level)
 {
     level l = take(ebpo_test_make("sphere"), 4, 2);
@@ -268,6 +294,7 @@ TEST_SUITE(lod_normals)
     tcase_add_checked_fixture(cases, make_folder, scratch_leave);
     tcase_add_loop_test(cases, test_lod_normals_match_definition, 0, 3);
     tcase_add_test(cases, test_lod_normals_of_sphere_cell_faces);
+    tcase_add_test(cases, test_lod_normals_of_extreme_sizes);
     tcase_add_test(cases, test_lod_normals_refuse_other_level);
     suite_add_tcase(suite, cases);
     return suite;

@@ -340,6 +340,37 @@ START_TEST(test_views_are_closed)
 }
 END_TEST
 
+/* Normals of faces do not depend on the unit of length, however small or large the model is. */
+START_TEST(test_faces_of_extreme_sizes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_surface_mesh mesh[3];
+    for (int i = 0; i < 3; i++) {
+        ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+        ebpo_tree tree;
+        ebpo_file *file;
+        ebpo_mesh torus = waves(40, 30);
+        for (uint64_t v = 0; v < 3 * torus.vertex_count; v++)
+            torus.xyz64[v] = ldexp(torus.xyz64[v], i * 900 - 900);
+        build(&tree, torus, 1);
+        must(ebpo_tree_write(&tree, scratch("size.ebpo.h5"), NULL, &error), "write", &error);
+        ebpo_tree_free(&tree);
+        must(ebpo_open(scratch("size.ebpo.h5"), &file, &error), "open", &error);
+        options.faces = true;
+        must(take_view(file, &options, &mesh[i], &error), "view", &error);
+        ck_assert_uint_eq(mesh[i].faces, 2400);
+        ebpo_close(file);
+    }
+    for (int i = 0; i < 3; i += 2) {
+        ck_assert_uint_eq(mesh[i].mesh.vertex_count, mesh[1].mesh.vertex_count);
+        ck_assert(memcmp(mesh[i].normals, mesh[1].normals,
+                         3 * mesh[1].mesh.vertex_count * sizeof(float)) == 0);
+    }
+    for (int i = 0; i < 3; i++)
+        ebpo_surface_mesh_free(&mesh[i]);
+}
+END_TEST
+
 /* Without a limit of the error, all faces of the model are drawn, each once. */
 START_TEST(test_views_end_at_faces)
 {
@@ -422,7 +453,50 @@ START_TEST(test_boxes_keep_patches)
     ck_assert(is_closed(&kept.mesh));
     ebpo_surface_mesh_free(&whole);
     ebpo_surface_mesh_free(&kept);
+    /* patches of a subset have the face numbers of the original file, so no face replaces them */
+    ck_assert(ebpo_file_info(part)->parts & EBPO_PART_MESH);
+    options.faces = true;
+    options.pixels = 0;
+    must(take_view(part, &options, &kept, &error), "finest view of the part", &error);
+    ck_assert_uint_eq(kept.faces, 0);
+    weld(&kept.mesh);
+    ck_assert(is_closed(&kept.mesh));
+    ebpo_surface_mesh_free(&kept);
     ebpo_close(part);
+    ebpo_close(file);
+}
+END_TEST
+
+/* The boxes of long diagonal faces intersect all cells of the verifier's grid; verification still
+ * needs little memory. */
+START_TEST(test_long_faces_need_little_memory)
+{
+    static const double diagonal[3][3] = { { 0.70710678118654752, 0.40824829046386302, 0.57735 },
+                                           { -0.70710678118654752, 0.40824829046386302, 0.57735 },
+                                           { 0, -0.81649658092772603, 0.57735 } },
+                        nowhere[3] = { 0, 0, 0 };
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ebpo_workspace *workspace;
+    ebpo_workspace_options limits = EBPO_WORKSPACE_OPTIONS_INIT;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    ebpo_mesh needle = ebpo_test_cone(0.01, 1, 2000);
+    ebpo_test_transform(&needle, diagonal, nowhere);
+    build(&tree, needle, 1);
+    must(ebpo_tree_write(&tree, scratch("needle.ebpo.h5"), NULL, &error), "write", &error);
+    ebpo_tree_free(&tree);
+    must(ebpo_open(scratch("needle.ebpo.h5"), &file, &error), "open", &error);
+    ck_assert_uint_gt(ebpo_file_info(file)->surface_patches, 0);
+    must(ebpo_workspace_new(&limits, &workspace, &error), "workspace", &error);
+    options.workspace = workspace;
+    must(ebpo_verify(file, &options, &report, &error), "verify", &error);
+    ck_assert_uint_eq(report.violations, 0);
+    must(ebpo_workspace_get_stats(workspace, &stats), "stats", NULL);
+    ck_assert_uint_lt(stats.held_peak + stats.filed_peak, 32 << 20);
+    ebpo_workspace_free(workspace);
     ebpo_close(file);
 }
 END_TEST
@@ -439,9 +513,11 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_hostile_codes);
     tcase_add_test(tests, test_views_are_closed);
+    tcase_add_test(tests, test_faces_of_extreme_sizes);
     tcase_add_test(tests, test_views_end_at_faces);
     tcase_add_test(tests, test_views_within_bytes);
     tcase_add_test(tests, test_boxes_keep_patches);
+    tcase_add_test(tests, test_long_faces_need_little_memory);
     suite_add_tcase(suite, tests);
     return suite;
 }

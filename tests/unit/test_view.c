@@ -541,6 +541,11 @@ START_TEST(test_view_cut_keeps_pruned_subset_nodes)
         ebpo_view_stream_get_stats(stream, &stats);
         ck_assert_uint_eq(stats.waiting, 0);
         ck_assert_uint_eq(stats.cut[EBPO_GRAY], pruned);
+        double pixels = 0;
+        for (uint64_t i = 0; i < all.count; i++)
+            if (v.in_cut[i] && v.seen[i] && all.at[i].type == EBPO_GRAY)
+                pixels = fmax(pixels, plain_pixels(&observer, &all.at[i]));
+        ck_assert(stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels);
         viewer_free(&v);
         ebpo_view_stream_free(stream);
     }

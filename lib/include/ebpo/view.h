@@ -356,8 +356,8 @@ EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
  * The mesh begins with the patch of the root. Again and again, the visible patch with the greatest
  * error in the image is replaced by the patches of the node's children. The options unseen,
  * distance, level, bytes and memory apply to patches as to nodes. If the option `faces` is true,
- * patches whose nodes have no patches below are replaced by the model's faces. The option
- * `priority` is ignored.
+ * patches whose nodes have no patches below are replaced by the model's faces, except in a subset
+ * by a box. The option `priority` is ignored.
  *
  * Option `pixels`: a visible patch with a greater error in the image is used only if another option
  * prevents its replacement. The error in the image is the length in pixels of a segment in the

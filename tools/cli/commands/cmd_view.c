@@ -186,9 +186,8 @@ static void print_node(printer *p, const ebpo_view_node *v)
 static void print_legend(void)
 {
     table_legend(stdout);
-    puts(
-        "waiting: number of gray nodes to divide next; pixels: size of the largest of these nodes\n"
-        "(shown as - if there is no --eye); bytes: read from the file; ms: since opening");
+    puts("waiting: number of gray nodes to divide next; pixels: size of the largest visible one\n"
+         "(shown as - if there is no --eye); bytes: read from the file; ms: since opening");
 }
 
 /* --- streaming --- */
