@@ -338,9 +338,9 @@ typedef struct ebpo_boolean_mesh_options {
      * `removed` (columns `first` and `count`) of the mesh has the ranges of the faces of operand 0
      * that are not faces of the result. Indices are indices in the file of operand 0.
      * ebpo_mesh_write_ply writes `removed` as an element. The mesh and the faces of operand 0
-     * outside these ranges together are the result. Faces of operand 0 outside the box of the other
-     * operands are unchanged, even if they intersect each other. Only the part of operand 0 in this
-     * box is read, and its faces must fit in memory. `volume` and `attributes` must be false.
+     * outside these ranges together are the result. Self-intersections of operand 0 are not cut, so
+     * faces that stay may intersect each other. Only the part of operand 0 in the box of the other
+     * operands is read, and its faces must fit in memory. `volume` and `attributes` must be false.
      */
     bool changed_only;
 
@@ -428,9 +428,9 @@ typedef struct ebpo_boolean_mesh_report {
  * conditions is met: the expression does not use operand 0; `volume` is true; `attributes` is true.
  * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices.
  * EBPO_E_FORMAT: an operand is not closed, although its file says that it is a solid.
- * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 has one of these properties in the box
- * of the other operands: faces that intersect each other, faces without area, or winding numbers
- * other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
+ * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 is cut or reversed where its faces
+ * intersect each other, have no area, or have a side with a winding number other than 0 and 1. Also
+ * the errors of reading. On failure `out` is cleared.
  *
  * Threads: one at a time per expression.
  */
