@@ -83,6 +83,12 @@ typedef struct ebpo_boolean_options {
      * axis k, only row[3] / row[k] is rounded.
      */
     const double *planes;
+
+    /*
+     * Folder for the small temporary files of the box and the half-spaces. NULL: $TMPDIR, or
+     * /var/tmp if TMPDIR is not set.
+     */
+    const char *temp_dir;
 } ebpo_boolean_options;
 
 #define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
@@ -98,8 +104,8 @@ typedef struct ebpo_boolean ebpo_boolean;
  * EBPO_E_ARGUMENT: an index is out of range; a node refers to itself or to a later node; an
  * operation, box, plane or pose (ebpo_pose_check) is not valid; or there is a complement, but no
  * box. EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
- * surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or
- * the number of the operand (from 1 on) and its file.
+ * surface. EBPO_E_ABSENT: an operand's file has no mesh. EBPO_E_IO: `temp_dir` cannot hold files.
+ * Messages give the index of the node, or the number of the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
