@@ -154,8 +154,7 @@ class Queries(Case):
         self.assertAlmostEqual(m.volume - volume["&"], volume["-"], 9)
         self.assertEqual(len(ebpo.boolean("A - (A | B & B)", [m, m], poses=poses).faces), 0)
         box, plane = [[-9, -9, -9], [9, 9, 9]], [0, 0, 1, .1]
-        cut = [ebpo.boolean(e, [m], box=box, planes=p, volume=True, doubles=True, memory=how, temp_dir="."
-                            if how else None)
+        cut = [ebpo.boolean(e, [m], box=box, planes=p, volume=True, doubles=True, memory=how, temp_dir=".")
                for e, p, how in (("A", None, None), ("~A", None, "256M"), ("A", plane, None), ("A", [plane, plane], None))]
         for result in cut:
             a, b, c = np.moveaxis(result.vertices[result.faces].astype(float), 1, 0)

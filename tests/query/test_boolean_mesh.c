@@ -711,22 +711,28 @@ START_TEST(changes)
 }
 END_TEST
 
-/* Refuses changes of two overlapping spheres: the other operand cuts both, or it is in both. */
+/* Refuses changes of two overlapping spheres: the other operand cuts both, or it is in both, or it
+ * contains both, and the result has the reversed spheres. */
 START_TEST(refused_changes)
 {
-    const double centre[3] = { 0, 0, 0 }, other[3] = { 0.9, 0, 0 };
-    static const double size[2] = { 0.5, 0.1 }, shift[2] = { -0.25, -0.45 };
+    const double centre[3] = { 0, 0, 0 }, other[3] = { 0.9, 0, 0 }, far[3] = { 1.3, -1.2, 0 };
+    static const double size[4] = { 0.5, 0.1, 8, 8 }, shift[4] = { -0.25, -0.45, 0, 0 };
+    static const ebpo_boolean_node root[4] = { { EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 },
+                                               { EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 },
+                                               { EBPO_BOOLEAN_DIFFERENCE, 1, 0, 0 },
+                                               { EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE, 0, 1, 0 } };
     ebpo_error got = EBPO_ERROR_INIT;
     ebpo_mesh mesh;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 4; i++) {
         ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
         scene s = { .nodes = 0 };
-        add_operand(&s, join_meshes(ebpo_test_sphere(centre, 1, 2), ebpo_test_sphere(other, 1, 2)),
-                    moved_pose(0, 0, 0), 0);
+        ebpo_mesh second = ebpo_test_sphere(i < 2 ? other : far, 1, 2);
+        add_operand(&s, join_meshes(ebpo_test_sphere(centre, 1, 2), second), moved_pose(0, 0, 0),
+                    0);
         add_operand(&s, ebpo_test_sphere(other, size[i], 1), moved_pose(shift[i], 0, 0), 0);
         s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
         s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
-        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 };
+        s.node[s.nodes++] = root[i];
         options.changed_only = true;
         ebpo_boolean *boolean = make_boolean(&s, 1);
         ck_assert_int_eq(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got),

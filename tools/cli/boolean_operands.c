@@ -79,18 +79,27 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
     return status == EBPO_OK ? EXIT_OK : command_failed(name, &error);
 }
 
+/* Opens a model. A cut level below the model's last level is no error, because other models may
+ * have more levels. Then the whole model stays in memory. */
+static int open_model(boolean_operands *o, const char *name, boolean_input *in,
+                      const ebpo_model_options *model_options, const remote_values *remote)
+{
+    const ebpo_model_options any_level = EBPO_MODEL_OPTIONS_INIT;
+    int code = query_open_file(&in->session, name, in->path, &any_level, -1, remote);
+    if (code == EXIT_OK)
+        code = query_open_model(&in->session, name, model_options);
+    o->operand[in->first].model = in->session.model;
+    return code;
+}
+
 int boolean_operands_open(boolean_operands *o, const char *name,
                           const ebpo_model_options *model_options, const remote_values *remote)
 {
     int code = EXIT_OK;
     for (uint32_t i = 0; i < o->inputs && code == EXIT_OK; i++) {
         boolean_input *in = &o->input[i];
-        if (in->scene) {
-            code = open_scene(o, name, in, model_options, remote);
-        } else {
-            code = query_open(&in->session, name, in->path, model_options, -1, remote);
-            o->operand[in->first].model = in->session.model;
-        }
+        code = in->scene ? open_scene(o, name, in, model_options, remote)
+                         : open_model(o, name, in, model_options, remote);
     }
     return code;
 }

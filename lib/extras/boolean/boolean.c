@@ -241,15 +241,16 @@ static ebpo_status add_region(ebpo_boolean *b, ebpo_status status, ebpo_error *e
 
 /* Adds the half-spaces as operands, and intersects the expression with them. The model of a
  * half-space contains only the part near the box of the expression. */
-static ebpo_status add_half_spaces(ebpo_boolean *b, const double *planes, uint32_t count,
+static ebpo_status add_half_spaces(ebpo_boolean *b, const ebpo_boolean_options *options,
                                    ebpo_error *error)
 {
     double box[6];
     ebpo_status status = EBPO_OK;
     ebpo_boolean_box(b, box);
     b->first_plane = b->count;
-    for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
-        status = ebpo_region_half_space(&b->region[b->count], planes + 4 * i, box, error);
+    for (uint32_t i = 0; i < options->plane_count && status == EBPO_OK; i++) {
+        status = ebpo_region_half_space(&b->region[b->count], options->planes + 4 * i, box,
+                                        options->temp_dir, error);
         status = add_region(b, status, error);
         if (status == EBPO_OK)
             cut_expression(&b->expression, b->count - 1);
@@ -277,10 +278,12 @@ static ebpo_status fill_operands(ebpo_boolean *b, const ebpo_boolean_operand *op
         return ebpo_fail_memory(error, all * (sizeof *b->solid + b->threads * sizeof(void *)));
     for (uint32_t i = 0; i < b->given && status == EBPO_OK; i++)
         status = add_solid(b, operands[i].model, &operands[i].pose, error);
-    if (status == EBPO_OK && options->box)
-        status = add_region(b, ebpo_region_box(&b->region[b->count], options->box, error), error);
+    if (status == EBPO_OK && options->box) {
+        status = ebpo_region_box(&b->region[b->count], options->box, options->temp_dir, error);
+        status = add_region(b, status, error);
+    }
     if (status == EBPO_OK)
-        status = add_half_spaces(b, options->planes, options->plane_count, error);
+        status = add_half_spaces(b, options, error);
     return status == EBPO_OK ? make_contexts(b, error) : status;
 }
 

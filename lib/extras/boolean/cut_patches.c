@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/sort.h"
+#include "core/workspace.h"
 #include "extras/boolean/cut_mesh.h"
 #include "geometry/predicates.h"
 
@@ -311,6 +312,81 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
     return status;
 }
 
+/* --- reversed faces of the base --- */
+
+/* Lists the faces of the base of which a triangle is reversed in the result. Returns their number.
+ */
+static uint32_t list_reversed(const ebpo_cut_mesh *cut, const int8_t *sign, uint32_t *out)
+{
+    uint32_t count = 0;
+    for (uint64_t t = 0; t < cut->count; t++)
+        if (sign[t] < 0 && ebpo_face_list_operand(cut->faces, cut->face[t]) == 0 &&
+            (count == 0 || out[count - 1] != cut->face[t]))
+            out[count++] = cut->face[t];
+    return count;
+}
+
+/* Makes a mesh of listed faces. Each face has separate vertices. The caller frees the mesh, also
+ * after a failure. */
+static ebpo_status make_mesh(const ebpo_face_list *faces, const uint32_t *face, uint32_t count,
+                             ebpo_mesh *out, ebpo_error *error)
+{
+    uint64_t corners = 3 * (uint64_t)count;
+    *out = (ebpo_mesh){ .workspace = faces->workspace };
+    out->xyz64 = ebpo_array_alloc(out->workspace, corners, 3 * sizeof *out->xyz64);
+    out->faces = ebpo_array_alloc(out->workspace, corners, sizeof *out->faces);
+    if (!out->xyz64 || !out->faces)
+        return ebpo_workspace_fail(out->workspace, 28 * corners, error);
+    for (uint64_t i = 0; i < corners; i++) {
+        memcpy(out->xyz64 + 3 * i, ebpo_face_list_corner(faces, face[i / 3], (int)(i % 3)),
+               3 * sizeof *out->xyz64);
+        out->faces[i] = (uint32_t)i;
+    }
+    out->vertex_count = corners;
+    out->face_count = count;
+    return EBPO_OK;
+}
+
+static bool stop_at_first(void *user, const ebpo_self_intersection *crossings, uint64_t count)
+{
+    (void)crossings;
+    *(bool *)user = count > 0;
+    return false;
+}
+
+/* Fails if reversed faces of the base intersect each other. Self-intersections of the base are not
+ * cut. If such faces stay or are removed, winding numbers of the changed mesh are those of the base
+ * or 0. But if they are reversed, a winding number of 2 becomes -1, which no point outside the
+ * result may have. classify_triangle finds such winding numbers only at the tested points. */
+static ebpo_status check_reversed(const ebpo_cut_mesh *cut, const int8_t *sign,
+                                  const ebpo_progress *progress, ebpo_error *error)
+{
+    ebpo_mesh mesh;
+    ebpo_mesh_report report;
+    ebpo_self_intersections_options options = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
+    bool found = false;
+    uint32_t *face = ebpo_alloc(cut->faces->count, sizeof *face);
+    uint32_t count = face ? list_reversed(cut, sign, face) : 0;
+    ebpo_status status = face ? EBPO_OK : ebpo_fail_memory(error, 4 * (uint64_t)cut->faces->count);
+    if (count > 0) {
+        options.threads = cut->faces->boolean->threads;
+        options.progress = *progress;
+        status = make_mesh(cut->faces, face, count, &mesh, error);
+        if (status == EBPO_OK)
+            status = ebpo_mesh_check(&mesh, options.threads, *progress, &report, error);
+        if (status == EBPO_OK)
+            status = ebpo_mesh_self_intersections(&mesh, &report, &options, stop_at_first, &found,
+                                                  NULL, error);
+        ebpo_mesh_free(&mesh);
+    }
+    free(face);
+    return status == EBPO_OK && found ? ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                                                  "operand 1 is reversed where %s", base_not_simple)
+                                      : status;
+}
+
+/* --- all of it --- */
+
 /* Returns true if each edge occurs in the selected triangles equally often in both directions.
  *
  * An edge of only one triangle is not tested if the triangle's face is whole. Then the edge's other
@@ -366,6 +442,8 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
                 : ebpo_fail(error, EBPO_E_FORMAT,
                             "the result is not closed; check that the operands are closed (ebpo "
                             "verify)");
+    if (status == EBPO_OK && cut->faces->changed_only)
+        status = check_reversed(cut, *sign, progress, error);
     free_edges(&e);
     free(parent);
     return status;

@@ -32,13 +32,16 @@ static ebpo_status build_tree(ebpo_mesh *mesh, ebpo_tree *tree, ebpo_error *erro
     return status == EBPO_OK ? ebpo_build(mesh, &report, NULL, &options, tree, error) : status;
 }
 
-static ebpo_status open_tree(ebpo_region_model *out, const ebpo_tree *tree, ebpo_error *error)
+static ebpo_status open_tree(ebpo_region_model *out, const ebpo_tree *tree, const char *temp_dir,
+                             ebpo_error *error)
 {
     ebpo_write_options write_options = EBPO_WRITE_OPTIONS_INIT;
     ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_workspace_options workspace_options = EBPO_WORKSPACE_OPTIONS_INIT;
     ebpo_workspace *workspace;
+    workspace_options.temp_dir = temp_dir;
     write_options.threads = model_options.threads = 1;
-    ebpo_status status = ebpo_workspace_new(NULL, &workspace, error);
+    ebpo_status status = ebpo_workspace_new(&workspace_options, &workspace, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_tree_store(tree, ebpo_workspace_folder(workspace), "ebpo-region", &write_options,
@@ -51,7 +54,8 @@ static ebpo_status open_tree(ebpo_region_model *out, const ebpo_tree *tree, ebpo
 
 /* Makes the model of a closed mesh. */
 static ebpo_status make_model(ebpo_region_model *out, const double (*corner)[3], uint32_t corners,
-                              const uint32_t (*face)[3], uint32_t faces, ebpo_error *error)
+                              const uint32_t (*face)[3], uint32_t faces, const char *temp_dir,
+                              ebpo_error *error)
 {
     ebpo_tree tree = { 0 };
     ebpo_mesh mesh = { .vertex_count = corners, .face_count = faces };
@@ -65,7 +69,7 @@ static ebpo_status make_model(ebpo_region_model *out, const double (*corner)[3],
         status = build_tree(&mesh, &tree, error);
     }
     if (status == EBPO_OK)
-        status = open_tree(out, &tree, error);
+        status = open_tree(out, &tree, temp_dir, error);
     ebpo_tree_free(&tree);
     ebpo_mesh_free(&mesh);
     return status;
@@ -79,7 +83,8 @@ void ebpo_region_model_free(ebpo_region_model *region)
 
 /* --- boxes --- */
 
-ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6], ebpo_error *error)
+ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6], const char *temp_dir,
+                            ebpo_error *error)
 {
     static const uint32_t face[12][3] = { { 0, 2, 3 }, { 0, 3, 1 }, { 4, 5, 7 }, { 4, 7, 6 },
                                           { 0, 1, 5 }, { 0, 5, 4 }, { 2, 6, 7 }, { 2, 7, 3 },
@@ -94,7 +99,7 @@ ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6], ebpo_er
     for (int i = 0; i < 8; i++)
         for (int k = 0; k < 3; k++)
             corner[i][k] = box[i >> k & 1 ? 3 + k : k];
-    return make_model(out, (const double(*)[3])corner, 8, face, 12, error);
+    return make_model(out, (const double(*)[3])corner, 8, face, 12, temp_dir, error);
 }
 
 /* --- half-spaces --- */
@@ -222,7 +227,7 @@ static void make_corners(const half_space *h, double corner[4][3])
 }
 
 ebpo_status ebpo_region_half_space(ebpo_region_model *out, const double plane[4],
-                                   const double box[6], ebpo_error *error)
+                                   const double box[6], const char *temp_dir, ebpo_error *error)
 {
     static const uint32_t face[4][3] = { { 0, 1, 2 }, { 0, 3, 1 }, { 1, 3, 2 }, { 2, 3, 0 } };
     half_space h;
@@ -238,5 +243,5 @@ ebpo_status ebpo_region_half_space(ebpo_region_model *out, const double plane[4]
         if (!isfinite(corner[i / 3][i % 3]))
             return ebpo_fail(error, EBPO_E_LIMIT,
                              "plane: the model is too large to be cut by a plane; scale it");
-    return make_model(out, (const double(*)[3])corner, 4, face, 4, error);
+    return make_model(out, (const double(*)[3])corner, 4, face, 4, temp_dir, error);
 }

@@ -11,11 +11,12 @@ typedef struct ebpo_region_model {
     ebpo_model *model;
 } ebpo_region_model;
 
-/* Makes the model of a box, given by its lower and its upper corner. Fails with EBPO_E_ARGUMENT if
- * a coordinate is not finite, or if on an axis the lower corner is not below the upper corner. Must
+/* Makes the model of a box, given by its lower and its upper corner. temp_dir: folder for the
+ * model's file; NULL: the default folder for temporary files. Fails with EBPO_E_ARGUMENT if a
+ * coordinate is not finite, or if on an axis the lower corner is not below the upper corner. Must
  * be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_region_box(ebpo_region_model *out, const double box[6],
-                                          ebpo_error *error);
+                                          const char *temp_dir, ebpo_error *error);
 
 /* Makes the model of the part of the half-space plane[0] x + plane[1] y + plane[2] z <= plane[3]
  * that is near a box. The model is a tetrahedron with one face in the plane. The corners of this
@@ -25,7 +26,8 @@ EBPO_MUST_USE ebpo_status ebpo_region_box(ebpo_region_model *out, const double b
  * the box. Fails with EBPO_E_ARGUMENT if a number is not finite or the normal is 0, and with
  * EBPO_E_LIMIT if the box is too large. Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_region_half_space(ebpo_region_model *out, const double plane[4],
-                                                 const double box[6], ebpo_error *error);
+                                                 const double box[6], const char *temp_dir,
+                                                 ebpo_error *error);
 
 void ebpo_region_model_free(ebpo_region_model *region);
 

@@ -83,6 +83,12 @@ typedef struct ebpo_boolean_options {
      * axis k, only row[3] / row[k] is rounded.
      */
     const double *planes;
+
+    /*
+     * Folder for the small temporary files of the box and the half-spaces. NULL: $TMPDIR, or
+     * /var/tmp if TMPDIR is not set.
+     */
+    const char *temp_dir;
 } ebpo_boolean_options;
 
 #define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
@@ -98,8 +104,8 @@ typedef struct ebpo_boolean ebpo_boolean;
  * EBPO_E_ARGUMENT: an index is out of range; a node refers to itself or to a later node; an
  * operation, box, plane or pose (ebpo_pose_check) is not valid; or there is a complement, but no
  * box. EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
- * surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node, or
- * the number of the operand (from 1 on) and its file.
+ * surface. EBPO_E_ABSENT: an operand's file has no mesh. EBPO_E_IO: `temp_dir` cannot hold files.
+ * Messages give the index of the node, or the number of the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
@@ -338,9 +344,9 @@ typedef struct ebpo_boolean_mesh_options {
      * `removed` (columns `first` and `count`) of the mesh has the ranges of the faces of operand 0
      * that are not faces of the result. Indices are indices in the file of operand 0.
      * ebpo_mesh_write_ply writes `removed` as an element. The mesh and the faces of operand 0
-     * outside these ranges together are the result. Faces of operand 0 outside the box of the other
-     * operands are unchanged, even if they intersect each other. Only the part of operand 0 in this
-     * box is read, and its faces must fit in memory. `volume` and `attributes` must be false.
+     * outside these ranges together are the result. Self-intersections of operand 0 are not cut, so
+     * faces that stay may intersect each other. Only the part of operand 0 in the box of the other
+     * operands is read, and its faces must fit in memory. `volume` and `attributes` must be false.
      */
     bool changed_only;
 
@@ -428,9 +434,9 @@ typedef struct ebpo_boolean_mesh_report {
  * conditions is met: the expression does not use operand 0; `volume` is true; `attributes` is true.
  * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices.
  * EBPO_E_FORMAT: an operand is not closed, although its file says that it is a solid.
- * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 has one of these properties in the box
- * of the other operands: faces that intersect each other, faces without area, or winding numbers
- * other than 0 and 1. Also the errors of reading. On failure `out` is cleared.
+ * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 is cut or reversed where its faces
+ * intersect each other, have no area, or have a side with a winding number other than 0 and 1. Also
+ * the errors of reading. On failure `out` is cleared.
  *
  * Threads: one at a time per expression.
  */

@@ -402,8 +402,8 @@ static int check_values(const values *v, const boolean_operands *operands)
                                 : v->crossings    ? "crossings"
                                 : v->changed_only ? "changed-only"
                                 : v->colours      ? "operand-colours"
-                                : v->temp_dir     ? "temp-dir"
-                                                  : NULL;
+                                : v->temp_dir && !v->box && v->sections.count == 0 ? "temp-dir"
+                                                                                   : NULL;
     if (result_option && !writes_result(v))
         return command_usage("boolean", "--%s needs --output, and excludes --cells", result_option);
     if (v->changed_only && (v->volume || v->crossings || !words_end_with(v->out, ".ply")))
@@ -437,6 +437,7 @@ static int read_regions(const values *v, double box[6], double (*plane)[4],
     out->box = v->box ? box : NULL;
     out->planes = plane[0];
     out->plane_count = (uint32_t)v->sections.count;
+    out->temp_dir = v->temp_dir;
     return EXIT_OK;
 }
 
@@ -456,14 +457,14 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
     return code;
 }
 
-/* If the exact result is written with --memory, makes the workspace, and sets the limit of each
- * model. All models together may use a quarter of the memory. */
+/* If the exact result is written with --memory or --temp-dir, makes the workspace. With --memory,
+ * sets the limit of each model; all models together may use a quarter of the memory. */
 static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
                         ebpo_workspace **out)
 {
-    const memory_values memory = { v->query.memory, v->temp_dir };
+    const memory_values memory = { model_options->memory ? v->query.memory : NULL, v->temp_dir };
     ebpo_error error = EBPO_ERROR_INIT;
-    if (!writes_result(v) || model_options->memory == 0)
+    if (!writes_result(v) || (model_options->memory == 0 && !v->temp_dir))
         return EXIT_OK;
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;

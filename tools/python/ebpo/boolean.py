@@ -98,6 +98,7 @@ def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | 
     doubles: True: float64 coordinates; False: float32 if all models have float32.
     volume: True: compute the volume.
     memory: budget in bytes for the process; the rest is stored in temporary files in temp_dir. None: no limit.
+    temp_dir: folder for these files, and for the small files of box and planes.
 
     >>> matrix = [[1, 0, 0, .5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     >>> boolean("A - B", [cube, cube], poses=[None, matrix]).vertices.max(axis=0).tolist()
@@ -108,14 +109,15 @@ def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | 
     poses = [None] * len(models) if poses is None else poses
     if len(poses) != len(models):
         raise ValueError(f"{len(models)} models, but {len(poses)} poses")
-    if temp_dir is not None and memory is None:
-        raise ValueError("temp_dir needs memory")
+    if temp_dir is not None and memory is None and box is None and planes is None:
+        raise ValueError("temp_dir needs memory, box or planes")
+    folder = None if temp_dir is None else path(temp_dir, "temp_dir")
     nodes = Parser(expression, len(models)).all()
     handles = [model.model for model in models]
     operands = (c.ebpo_boolean_operand * len(models))()
     for operand, given, where in zip(operands, handles, poses):
         operand.model, operand.pose = given.pointer, pose_of(where)
-    options = made(c.ebpo_boolean_options, threads=threads or 0)
+    options = made(c.ebpo_boolean_options, threads=threads or 0, temp_dir=folder)
     corners = None if box is None else numbers(box, "box", 6)
     rows = None if planes is None else numbers(planes, "planes", 4)
     if corners is not None:
@@ -127,8 +129,7 @@ def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | 
                          keep=handles)
     workspace = None
     if memory is not None:
-        space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
-                     temp_dir=None if temp_dir is None else path(temp_dir, "temp_dir"))
+        space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory), temp_dir=folder)
         workspace = Handle.made("ebpo_workspace_new", ctypes.byref(space), free="ebpo_workspace_free")
     mesh, report = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace), made(c.ebpo_boolean_mesh_report)
     with Reporter(progress) as reported:
