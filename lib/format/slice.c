@@ -351,6 +351,10 @@ static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
+    if (maps && chunks->file->info.parts & EBPO_PART_MAPS)
+        /* requested together with the faces, before the vertices are known */
+        hint_rows(chunks, EBPO_A_FACE_SOURCE, slice->shared, slice->shared_count, slice->first_face,
+                  slice->face_count);
     status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->shared, slice->shared_count,
                          slice->first_face, slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)

@@ -868,3 +868,26 @@ void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, 
     }
     free(row);
 }
+
+void ebpo_subtrees_hint_before(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t subtree,
+                               uint32_t needs)
+{
+    const ebpo_info *info = &chunks->file->info;
+    uint64_t subtrees = info->level[info->subtree_level].gray_count;
+    ebpo_subtree_row row;
+    bool is_last = subtree == subtrees;
+    hinting t = { .chunks = chunks, .hints = hints, .needs = needs };
+    if (ebpo_subtree_table_row(chunks, subtree - is_last, &row, NULL) != EBPO_OK)
+        return;
+    const uint64_t *sums = is_last ? row.after : row.before;
+    uint64_t face = sums[EBPO_S_FACES_BEFORE] + sums[EBPO_S_FACES],
+             vertex = sums[EBPO_S_VERTICES_BEFORE] + sums[EBPO_S_VERTICES],
+             face_end = is_last ? info->face_count : row.face,
+             vertex_end = is_last ? info->vertex_count : row.vertex;
+    face_end = face_end > face + EBPO_FACE_BLOCK ? face + EBPO_FACE_BLOCK : face_end;
+    vertex_end = vertex_end > vertex + EBPO_FACE_BLOCK ? vertex + EBPO_FACE_BLOCK : vertex_end;
+    hint_rows(&t, EBPO_A_FACES, 0, face, face_end);
+    hint_rows(&t, EBPO_A_VERTICES, 0, vertex, vertex_end);
+    if (needs & EBPO_NEEDS_MAPS)
+        hint_rows(&t, EBPO_A_FACE_SOURCE, 0, face, face_end);
+}

@@ -98,4 +98,12 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level,
 void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, uint64_t count,
                         uint32_t needs, int last_level, bool faces);
 
+/* For remote files: adds to `hints` the chunks, not in memory, of the faces and vertices that are
+ * new in leaves in no subtree, after subtree - 1 and before `subtree`, depth first (the number of
+ * subtrees, which must not be 0: after the last subtree). With EBPO_NEEDS_MAPS, also the chunks of
+ * source indices. Reads the table's row. Adds at most the first EBPO_FACE_BLOCK faces and vertices.
+ */
+void ebpo_subtrees_hint_before(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t subtree,
+                               uint32_t needs);
+
 #endif

@@ -18,6 +18,7 @@
 #include "core/fp_env.h"
 #include "core/hash.h"
 #include "query/holes.h"
+#include "query/load_ahead.h"
 #include "query/model_parts.h"
 #include "query/query_model.h"
 
@@ -600,6 +601,9 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     ebpo_context_let_go(c);
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
+    /* a subtree of the file needs no hint here, because its load sends one */
+    if (ebpo_is_lone_leaf(m, below))
+        ebpo_context_hint(c, &below, 1);
     uint64_t key = ebpo_context_key(c, below);
     bool hit = true;
     ebpo_status status = ebpo_cache_get(m->cache, key, &item, &hit, error);

@@ -2,11 +2,14 @@
 """Tests models for asyncio: results, round trips, cancellation, errors, and a web server."""
 import asyncio
 import contextlib
+import gc
 import http.server
 import pathlib
 import re
 import subprocess
 import threading
+import weakref
+from unittest import mock
 
 from package_support import GENERATE, Case, model, np, points, run
 
@@ -127,6 +130,41 @@ class Async(Case):
                 remote.slow = False
                 np.testing.assert_array_equal((await far.distance(P))[0], self.expected[1][0])
         asyncio.run(body())
+
+    def test_cancelled_in_the_thread(self):
+        """After a cancellation, the arrays that the running call writes to still exist."""
+        arrays, exist, running, goes_on, ended = [], [], *(threading.Event() for _ in range(3))
+
+        def zeros(*arguments):
+            array = zeros_of_numpy(*arguments)
+            arrays.append(weakref.ref(array))
+            return array
+
+        def call(name, *arguments):
+            if name != "ebpo_inside_many":
+                return call_of_library(name, *arguments)
+            running.set()
+            goes_on.wait(10)
+            exist.extend(each() is not None for each in arrays)
+            ended.set()
+            return None
+
+        async def body():
+            async with await ebpo.open_async(Remote(self.data)) as far:
+                with mock.patch.object(np, "zeros", zeros), mock.patch.object(ebpo.asynchronous, "call", call):
+                    task = asyncio.create_task(far.inside(P))
+                    await asyncio.to_thread(running.wait, 10)
+                    task.cancel()
+                    await asyncio.wait([task])
+                    self.assertTrue(task.cancelled())
+                    del task
+                    gc.collect()
+                    goes_on.set()
+                    await asyncio.to_thread(ended.wait, 10)
+
+        zeros_of_numpy, call_of_library = np.zeros, ebpo.asynchronous.call
+        asyncio.run(body())
+        self.assertTrue(exist and all(exist), exist)
 
     def test_errors(self):
         async def body():

@@ -7,12 +7,13 @@ import shutil
 import signal
 import threading
 import time
+from unittest import mock
 
 from package_support import Case, command_results, model, np, points, run
 
 import ebpo
 from catalogue_support import by_command, caps_of, cut_by_sample, on_triangles, same
-from ebpo.catalogue import Catalogue, Where
+from ebpo.catalogue import LONG, Catalogue, Where, interruptible
 from ebpo.open_models import process_models
 
 P = points(6000, seed=5, reach=3)
@@ -236,8 +237,34 @@ class Interrupts(Case):
             catalogue.distance(p)
         self.assertLess(time.monotonic() - began, 10)
         timer.join()
-        # No thread remains that could write into arrays that are freed.
+        # No thread remains that could write into arrays that are freed. The thread of the query may still be ending.
+        until = time.monotonic() + 1
+        while len(os.listdir("/proc/self/task")) > before and time.monotonic() < until:
+            time.sleep(.01)
         self.assertEqual(len(os.listdir("/proc/self/task")), before)
+
+    def test_exceptions_of_signal_handlers_wait_for_the_thread(self):
+        def stop(*_):
+            raise TimeoutError
+
+        def work(_progress):
+            time.sleep(.3)
+            ended.append(True)
+
+        ended, before = [], signal.signal(signal.SIGALRM, stop)
+        try:
+            signal.setitimer(signal.ITIMER_REAL, .05)
+            with self.assertRaises(TimeoutError):
+                interruptible(work, LONG)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
+        self.assertTrue(ended, "the arrays of the query are freed while the thread runs")
+
+    def test_no_thread(self):
+        catalogue = Catalogue.of([spheres()[0]])
+        with mock.patch.object(threading.Thread, "start", side_effect=RuntimeError("no threads")):
+            self.assertEqual(catalogue.winding(np.zeros((LONG, 3))).shape, (LONG,))
 
 
 class Untrusted(Case):

@@ -24,9 +24,10 @@ typedef struct result {
     uint64_t waves;
 } result;
 
-/* Runs one cold query: the distance of a point, or its class. */
+/* Runs one cold query: the distance of a point, or its class. `cut_level`: as in
+ * ebpo_model_options. */
 static result run_query(const ebpo_file *file, const counted_source *far, const double p[3],
-                        bool inside)
+                        bool inside, int cut_level)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model;
@@ -35,6 +36,7 @@ static result run_query(const ebpo_file *file, const counted_source *far, const 
     ebpo_inside_result where = { .where = EBPO_OUT };
     uint64_t opened = far ? far->batches + far->alone : 0;
     options.threads = 1;
+    options.cut_level = cut_level;
     options.memory = 64 << 20;
     ck_assert(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
     ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
@@ -59,10 +61,45 @@ START_TEST(test_remote_query_round_trips)
         ebpo_test_circle((uint32_t)(ebpo_test_random(&state) % 1000), 1000, &cosine, &sine);
         double p[3] = { 2.71 * cosine, 2.71 * sine, 0.01 };
         ebpo_file *far = counted_open(&c, l.packed, true);
-        result a = run_query(far, &c, p, n % 2), b = run_query(l.without, NULL, p, n % 2);
+        result a = run_query(far, &c, p, n % 2, -1), b = run_query(l.without, NULL, p, n % 2, -1);
         counted_close(&c, far);
         ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
         ck_assert(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* The faces, source indices and vertices of a leaf that is in no subtree of the file are requested
+ * together. */
+START_TEST(test_remote_leaf_round_trips)
+{
+    enum { WAVES = 2 }; /* 4 when each array is requested alone */
+    static const double half[3][3] = { { 0.5, 0, 0 }, { 0, 0.5, 0 }, { 0, 0, 0.5 } };
+    two_layouts l;
+    counted_source c;
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 200, 120);
+    double p[2][3];
+    for (int n = 0; n < 2; n++) { /* one solid before all subtrees, one after them */
+        double offset[3] = { n ? 6 : -6, n ? 6 : -6, n ? 6 : -6 };
+        ebpo_mesh small = ebpo_test_tetrahedron(1);
+        ebpo_test_transform(&small, half, offset);
+        for (int k = 0; k < 3; k++)
+            p[n][k] = offset[k] + 0.1;
+        ebpo_test_append(&mesh, &small);
+        ebpo_mesh_free(&small);
+    }
+    two_layouts_build(&l, mesh, 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (int n = 0; n < 4; n++) {
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        int cut = ebpo_file_info(far)->subtree_level;
+        result a = run_query(far, &c, p[n / 2], n % 2, cut),
+               b = run_query(l.without, NULL, p[n / 2], n % 2, -1);
+        ck_assert_int_gt(cut, 1);
+        counted_close(&c, far);
+        ck_assert_msg(a.waves <= WAVES, "%d: %d waves", n, (int)a.waves);
+        ck_assert(a.distance == b.distance && a.where == b.where);
+        ck_assert(n % 2 == 0 || a.where == EBPO_IN);
     }
     two_layouts_close(&l);
 }
@@ -91,7 +128,7 @@ START_TEST(test_remote_deep_query_round_trips)
     static const double p[3] = { 2.1, 0.1, 0.05 };
     counted_source c;
     ebpo_file *far = counted_open(&c, l.packed, true);
-    result a = run_query(far, &c, p, false), b = run_query(l.without, NULL, p, false);
+    result a = run_query(far, &c, p, false, -1), b = run_query(l.without, NULL, p, false, -1);
     counted_close(&c, far);
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
     ck_assert_msg(c.requested < c.size / 3, "%d of %d bytes", (int)c.requested, (int)c.size);
@@ -106,7 +143,7 @@ START_TEST(test_remote_axis_query_bytes)
     static const double p[3] = { 0.05, 0.02, 0.01 };
     counted_source c;
     ebpo_file *far = counted_open(&c, l.packed, true);
-    result a = run_query(far, &c, p, false), b = run_query(l.without, NULL, p, false);
+    result a = run_query(far, &c, p, false, -1), b = run_query(l.without, NULL, p, false, -1);
     counted_close(&c, far);
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
     ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
@@ -207,11 +244,11 @@ START_TEST(test_false_top_bytes_changes_no_result)
     static const uint64_t false_bytes[] = { 0, 1, 1 << 16, INT64_MAX, UINT64_MAX };
     static const double p[3] = { 2.71, 0, 0.01 };
     counted_source c;
-    result right = run_query(l.without, NULL, p, true);
+    result right = run_query(l.without, NULL, p, true, -1);
     for (size_t i = 0; i < sizeof false_bytes / sizeof *false_bytes; i++) {
         set_top_bytes(l.packed, false_bytes[i]);
         ebpo_file *far = counted_open(&c, l.packed, true);
-        result found = run_query(far, &c, p, true);
+        result found = run_query(far, &c, p, true, -1);
         counted_close(&c, far);
         ck_assert(found.distance == right.distance && found.where == right.where);
         ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
@@ -379,6 +416,7 @@ TEST_SUITE(round_trips)
     tcase_set_timeout(small, 900);
     tcase_add_checked_fixture(small, scratch_enter, scratch_leave);
     tcase_add_test(small, test_remote_query_round_trips);
+    tcase_add_test(small, test_remote_leaf_round_trips);
     suite_add_tcase(suite, small);
     tcase_set_timeout(large, 900);
     tcase_add_unchecked_fixture(large, make_large, free_large);

@@ -103,9 +103,9 @@ class AsyncModel:
 
     async def _batch(self, function: str, rows: np.ndarray, options: Any, dtype: np.dtype) -> np.ndarray:
         results, done = np.empty(len(rows), dtype), np.zeros(len(rows), bool)
-        options.done = done.ctypes.data
 
-        def work() -> None:
+        def work() -> None:  # keeps its arrays, because after a cancellation the thread still uses them
+            options.done = done.ctypes.data
             with self._model._context() as context:
                 call(function, context, rows.ctypes.data, len(rows), ctypes.byref(options), results.ctypes.data)
 

@@ -242,7 +242,10 @@ class Catalogue:
 
 
 def interruptible(work: Callable[[Any], None], rows: int) -> None:
-    """Call work(progress). In the main thread, which receives interrupts, another thread runs long work."""
+    """Call work(progress). In the main thread, which runs signal handlers, another thread runs long work.
+
+    An exception of a signal handler, such as KeyboardInterrupt, stops the work, and is raised after its end.
+    """
     if rows < LONG or threading.current_thread() is not threading.main_thread():
         work(c.ebpo_progress())
         return
@@ -266,10 +269,12 @@ def interruptible(work: Callable[[Any], None], rows: int) -> None:
         while not ended.is_set():
             try:
                 if not once.locked():
-                    thread = threading.Thread(target=body, daemon=True)
-                    thread.start()
+                    try:
+                        threading.Thread(target=body, daemon=True).start()
+                    except RuntimeError:  # no further thread could be started
+                        body()
                 ended.wait()
-            except KeyboardInterrupt as error:
+            except BaseException as error:
                 stopped.set()
                 interrupt = error
     if interrupt:
