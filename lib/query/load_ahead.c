@@ -15,9 +15,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "format/pick_rows.h"
 #include "format/reader.h"
-#include "format/subtree_index.h"
 #include "geometry/cells.h"
 #include "query/load_ahead.h"
 #include "query/nearest.h"
@@ -108,134 +106,18 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* Returns the row, in the file's table of subtrees, of the subtree that contains the node
- * top->below[below]. (This node may be deeper than the root of the file's subtree.) Returns
- * UINT64_MAX if the node is in no subtree, or no row is found. */
-static uint64_t table_row(const ebpo_model *m, uint64_t below)
-{
-    const ebpo_node *root = &m->top->below[below];
-    int level = root->cell.level;
-    if (level < m->info->subtree_level || root->pruned)
-        return UINT64_MAX;
-    if (level == m->info->subtree_level)
-        return root->type == EBPO_GRAY ? root->rank : UINT64_MAX;
-    ebpo_subtree_row row;
-    unsigned column =
-        ebpo_subtree_column(m->info, level, root->type == EBPO_GRAY ? EBPO_S_GRAY : EBPO_S_LEAF);
-    return ebpo_subtree_table_find(m->chunks, column, root->rank, &row, NULL) == EBPO_OK
-               ? row.subtree
-               : UINT64_MAX;
-}
-
-bool ebpo_is_lone_leaf(const ebpo_model *m, uint64_t below)
-{
-    const ebpo_node *root = &m->top->below[below];
-    return root->type == EBPO_LEAF && root->cell.level <= m->info->subtree_level;
-}
-
-/* Returns the number of subtrees in the file. */
-static uint64_t subtree_count(const ebpo_model *m)
-{
-    return m->info->level[m->info->subtree_level].gray_count;
-}
-
-/* Returns the first octcode, at the deepest level, of the cells in this cell. These codes are in
- * depth-first order. */
-static uint64_t first_code(ebpo_cell cell)
-{
-    return ebpo_octcode_of_cell(cell) << 3 * (EBPO_MAX_LEVEL - cell.level);
-}
-
-/* Returns the index, in the file, of the first subtree after a leaf that is in no subtree, depth
- * first; the number of subtrees if there is none. Returns UINT64_MAX if this is not known. */
-static uint64_t subtree_after(const ebpo_model *m, uint64_t below)
-{
-    const ebpo_top *top = m->top;
-    if (top->cut_level < m->info->subtree_level || subtree_count(m) == 0)
-        return UINT64_MAX;
-    uint64_t code = first_code(top->below[below].cell), next = UINT64_MAX, found = below;
-    for (uint64_t i = 0; i < top->below_count; i++) {
-        uint64_t other = first_code(top->below[i].cell);
-        if (other > code && other < next && top->below[i].cell.level >= m->info->subtree_level &&
-            !ebpo_is_lone_leaf(m, i)) {
-            next = other;
-            found = i;
-        }
-    }
-    const ebpo_node *root = &top->below[found];
-    return found == below                               ? subtree_count(m)
-           : root->cell.level == m->info->subtree_level ? root->rank /* also if it is pruned */
-                                                        : table_row(m, found);
-}
-
-/* A leaf that is in no subtree of the file. */
-typedef struct lone_leaf {
-    uint32_t below;
-    uint64_t after; /* subtree_after */
-} lone_leaf;
-
-/* Adds to `hints` the chunks of a leaf. Shared faces and their vertices are omitted: only the
- * leaf's list names them. */
-static void hint_lone_leaf(const ebpo_context *c, const lone_leaf *leaf, ebpo_hints *hints)
-{
-    const ebpo_node *root = &c->model->top->below[leaf->below];
-    uint32_t needs = ebpo_subtree_needs(c->planes);
-    ebpo_run run = { .groups = 0 };
-    run.rank[EBPO_LEAF] = root->rank;
-    run.count[EBPO_LEAF] = 1;
-    ebpo_runs_hint(c->model->chunks, hints, root->cell.level, &run, 1, needs);
-    ebpo_subtrees_hint_before(c->model->chunks, hints, leaf->after, needs);
-}
-
-static int compare_rows(const void *x, const void *y)
-{
-    uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
-    return (a > b) - (a < b);
-}
-
-/* Sorts rows in ascending order and removes repetitions; returns the new count. */
-static uint64_t sort_rows(uint64_t *rows, uint64_t count)
-{
-    uint64_t kept = 0;
-    if (count)
-        qsort(rows, count, sizeof *rows, compare_rows);
-    for (uint64_t i = 0; i < count; i++)
-        if (i == 0 || rows[i] != rows[kept - 1])
-            rows[kept++] = rows[i];
-    return kept;
-}
-
 void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t count)
 {
     const ebpo_model *m = c->model;
-    ebpo_hints hints = EBPO_HINTS_INIT(m->file);
     if (m->info->subtree_level == 0 || !ebpo_input_prefetches(&m->file->in) || count == 0)
         return;
-    uint64_t found = 0, leaves = 0, last = subtree_count(m) - 1;
-    uint64_t *rows = ebpo_alloc(2 * count, sizeof *rows);
-    lone_leaf *leaf = ebpo_alloc(count, sizeof *leaf);
-    for (uint64_t i = 0; rows && leaf && i < count; i++) {
-        if (ebpo_cache_has(m->cache, ebpo_context_key(c, below[i])))
-            continue;
-        bool is_lone = ebpo_is_lone_leaf(m, below[i]);
-        uint64_t row = is_lone ? subtree_after(m, below[i]) : table_row(m, below[i]);
-        if (row != UINT64_MAX && is_lone)
-            leaf[leaves++] = (lone_leaf){ below[i], row };
-        else if (row != UINT64_MAX)
-            rows[found++] = row;
-    }
-    found = sort_rows(rows, found);
-    for (uint64_t i = 0; i < leaves; i++) /* the rows from which faces and vertices follow */
-        rows[found + i] = leaf[i].after < last ? leaf[i].after : last;
-    ebpo_subtree_table_hint(m->chunks, rows, found + leaves);
-    for (uint64_t i = 0; i < found; i++)
-        ebpo_subtrees_hint(m->chunks, &hints, rows[i], 1, ebpo_subtree_needs(c->planes),
-                           EBPO_LEVELS_MAX, true);
-    for (uint64_t i = 0; i < leaves; i++)
-        hint_lone_leaf(c, &leaf[i], &hints);
-    ebpo_hint_all(&hints);
-    free(rows);
-    free(leaf);
+    uint64_t absent = 0;
+    uint32_t *needed = ebpo_alloc(count, sizeof *needed);
+    for (uint64_t i = 0; needed && i < count; i++)
+        if (!ebpo_cache_has(m->cache, ebpo_context_key(c, below[i])))
+            needed[absent++] = below[i];
+    ebpo_top_hint(m->top, m->chunks, needed, absent, ebpo_subtree_needs(c->planes));
+    free(needed);
 }
 
 /* --- batches --- */

@@ -22,10 +22,6 @@ unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double l
 /* Maximum number of subtrees in one hint, except for hints of batches. */
 enum { EBPO_HINTED_MAX = 64 };
 
-/* Returns true if top->below[below] is a leaf that is in no subtree of the file: a leaf at the
- * level of the roots of the file's subtrees, or above. The model loads it like a subtree. */
-bool ebpo_is_lone_leaf(const ebpo_model *model, uint64_t below);
-
 /* Sends one prefetch hint for `count` subtrees that queries will visit soon, except subtrees that
  * are in memory. Does nothing if the file is not remote or has no table of subtrees. */
 void ebpo_context_hint(const ebpo_context *context, const uint32_t *below, uint64_t count);

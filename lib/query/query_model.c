@@ -18,7 +18,6 @@
 #include "core/fp_env.h"
 #include "core/hash.h"
 #include "query/holes.h"
-#include "query/load_ahead.h"
 #include "query/model_parts.h"
 #include "query/query_model.h"
 
@@ -601,10 +600,10 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     ebpo_context_let_go(c);
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
-    /* a subtree of the file needs no hint here, because its load sends one */
-    if (ebpo_is_lone_leaf(m, below))
-        ebpo_context_hint(c, &below, 1);
     uint64_t key = ebpo_context_key(c, below);
+    /* a subtree of the file needs no hint here, because its load sends one */
+    if (ebpo_top_has_lone_leaf(m->top, m->info, below) && !ebpo_cache_has(m->cache, key))
+        ebpo_top_hint(m->top, m->chunks, &below, 1, ebpo_subtree_needs(c->planes));
     bool hit = true;
     ebpo_status status = ebpo_cache_get(m->cache, key, &item, &hit, error);
     c->loaded += !hit;
