@@ -3,10 +3,10 @@
  * A patch simplifies the faces below one node of the octree, and becomes a tile. The patches of the
  * node's children become the tile's children. Viewers replace the tile by its children (REPLACE).
  * If the mesh is exported, a patch without patches below has one child: a tile with the model's
- * faces that the patch simplifies (except in a subset by a box). Tiles are written one after the other, and then tileset.json.
- * The table of patches, the bounds of all tiles, and one tile are in memory. A tile's
- * geometricError is the greatest of the certified errors of this tile and the tiles below, because
- * readers expect that children have no greater error.
+ * faces that the patch simplifies (except in a subset by a box). Tiles are written one after the
+ * other, and then tileset.json. The table of patches, the bounds of all tiles, and one tile are in
+ * memory. A tile's geometricError is the greatest of the certified errors of this tile and the
+ * tiles below, because readers expect that children have no greater error.
  *
  * Coordinates are relative to an origin, which is the translation of the root tile. In glTF, y
  * points upwards, and readers of 3D Tiles turn y to z. So the glTF nodes of tiles first turn z to

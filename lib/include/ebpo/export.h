@@ -37,10 +37,10 @@ typedef enum ebpo_export_format {
 
     /*
      * 3D Tiles 1.1 in a new folder: tileset.json, a tile for each patch of the simplified surface,
-     * and, with ebpo_export_options.mesh except in a subset by a box, tiles with the model's faces.
-     * Tiles are GLB files as for ebpo_export_options.surface. The geometricError of a tile with a
-     * patch is the greatest error (ebpo_patch.error plus rounding) of this tile and the tiles below.
-     * The geometricError of a tile with faces is the rounding of the coordinates. Viewers show the
+     * and, with ebpo_export_options.mesh, tiles with the model's faces, except in a subset by a
+     * box. Tiles are GLB files as for ebpo_export_options.surface. The geometricError of a tile
+     * with a patch is the greatest error (ebpo_patch.error plus rounding) of this tile and the
+     * tiles below; that of a tile with faces is the rounding of the coordinates. Viewers show the
      * model's z axis upwards. The table of all patches and one patch at a time are in memory.
      */
     EBPO_EXPORT_TILES
