@@ -129,6 +129,8 @@ test('after a trap, the module is not called again', async () => {
     1, 15, 2, 0x60, 1, 0x7f, 1, 0x7f, 0x60, 5, 0x7f, 0x7c, 0x7c, 0x7c, 0x7f, 1, 0x7f, 3, 3, 2, 0, 1,
     7, 31, 2, ...names.flatMap((name, i) => [name.length, ...new TextEncoder().encode(name), 0, i]), 10, 10, 2, 4, 0, 0x41, 16, 0x0b, 3, 0, 0, 0x0b]));
   const heap = new Heap(module), query = new OneQuery(heap, 0);
+  for (const call of [() => query.inside([0n, 0, 0], -1), () => query.distance([0, 0, 0], -1, 1n, 0), () => query.ray([0, 0, 0, 0, 0, Symbol('z')], 1, 0)])
+    assert.throws(call, TypeError); // the module was not called, and can still be used
   assert.throws(() => query.inside([0, 0, 0], -1), (error) => error instanceof EbpoError && /failed in ebpo_js_inside_one/.test(error.message));
   for (const call of [() => query.inside([0, 0, 0], -1), () => heap.call('malloc', 8)])
     assert.throws(call, (error) => error.status === 'EBPO_E_INTERNAL' && /has failed before/.test(error.message));

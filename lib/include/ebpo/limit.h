@@ -40,8 +40,8 @@ typedef struct ebpo_limit {
     size_t struct_size;
 
     /*
-     * Least possible volume of the level: sum of the volumes of the hulls of gray nodes and leaves,
-     * and of the cells of black nodes. The nodes are those of ebpo_lod_level.
+     * Sum of the volumes of the hulls of gray nodes and leaves, and of the cells of black nodes. No
+     * convex envelopes of the level have a smaller volume. The nodes are those of ebpo_lod_level.
      */
     double volume;
 

@@ -9,7 +9,8 @@ const three = (numbers, at) => {
 };
 
 /** Each method makes its arrays itself and calls its own exported function, because engines optimize calls and
- * constructors only where they see the same one each time. */
+ * constructors only where they see the same one each time. Arguments are converted to numbers before the call, so
+ * that an exception in the conversion is not taken for a trap of the module. */
 export class OneQuery {
   #heap;
   #query;
@@ -32,15 +33,16 @@ export class OneQuery {
     if (status)
       throw this.#heap.error(this.#query, status);
     if (!this.#numbers?.length) // the memory has grown
-      this.#numbers = new Float64Array(this.#heap.memory.buffer, this.#heap.call('ebpo_js_numbers', this.#query), 10);
+      this.#numbers = new Float64Array(this.#heap.memory.buffer, this.#heap.call('ebpo_js_numbers', this.#query) >>> 0, 10);
     return this.#numbers;
   }
 
   inside(p, level) {
+    const px = +p[0], py = +p[1], pz = +p[2], deepest = +level;
     let status;
     this.#heap.ready();
     try {
-      status = this.#insideOne(this.#query, p[0], p[1], p[2], level);
+      status = this.#insideOne(this.#query, px, py, pz, deepest);
     } catch (cause) {
       throw this.#heap.trapped('ebpo_js_inside_one', cause);
     }
@@ -51,10 +53,11 @@ export class OneQuery {
   }
 
   distance(p, level, maxDistance, unsigned) {
+    const px = +p[0], py = +p[1], pz = +p[2], deepest = +level, farthest = +maxDistance;
     let status;
     this.#heap.ready();
     try {
-      status = this.#distanceOne(this.#query, p[0], p[1], p[2], level, maxDistance, unsigned);
+      status = this.#distanceOne(this.#query, px, py, pz, deepest, farthest, unsigned);
     } catch (cause) {
       throw this.#heap.trapped('ebpo_js_distance_one', cause);
     }
@@ -67,10 +70,11 @@ export class OneQuery {
   }
 
   ray(r, tMax, sides) {
+    const ox = +r[0], oy = +r[1], oz = +r[2], dx = +r[3], dy = +r[4], dz = +r[5], end = +tMax;
     let status;
     this.#heap.ready();
     try {
-      status = this.#rayOne(this.#query, r[0], r[1], r[2], r[3], r[4], r[5], tMax, sides);
+      status = this.#rayOne(this.#query, ox, oy, oz, dx, dy, dz, end, sides);
     } catch (cause) {
       throw this.#heap.trapped('ebpo_js_ray_one', cause);
     }

@@ -13,13 +13,13 @@ const fourDigits = (v) => String(Number(v.toPrecision(4)));
 
 function modelFacts() {
   const size = model.max.map((v, i) => fourDigits(v - model.min[i])).join(' × ');
-  const inside = model.kind === 'solid', capped = !inside && model.volume_hi > model.volume_lo;
+  const inside = model.kind === 'solid', capped = !inside && !(model.volume_lo === 0 && model.volume_hi === 0);
   return [
     fact('faces', format.count(model.faces)),
     fact('vertices', format.count(model.vertices), model.coordinates),
     fact('kind', model.kind, inside ? model.rule : capped ? 'holes closed by caps' : 'no inside'),
     ...(inside ? [fact('volume', model.volume === null ? 'beyond a double' : fourDigits(model.volume), model.unit)] : []),
-    ...(capped ? [fact('volume', `${fourDigits(model.volume_lo)} to ${fourDigits(model.volume_hi)}`, model.unit)] : []),
+    ...(capped ? [fact('volume', model.volume_hi === null ? `at least ${fourDigits(model.volume_lo)}` : `${fourDigits(model.volume_lo)} to ${fourDigits(model.volume_hi)}`, model.unit)] : []),
     fact('area', fourDigits(model.area)),
     fact('size', size, `diagonal ${fourDigits(model.diagonal)}`),
     ...(model.source ? [fact('source', model.source, format.bytes(model.source_bytes))] : []),
