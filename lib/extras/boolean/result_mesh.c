@@ -636,7 +636,7 @@ ebpo_status ebpo_result_mesh_make(const ebpo_cut_mesh *cut, const int8_t *sign,
     ebpo_carrying_end(&o.carrying);
     ebpo_carrying_free(&o.carrying);
     if (status == EBPO_OK && o.measures)
-        report->volume = ebpo_volume_sum_interval(&o.volume);
+        report->volume = ebpo_volume_sum_interval(&o.volume, &report->scaled, &report->exponent);
     ebpo_volume_sum_end(&o.volume);
     for (uint32_t i = 0; i < EBPO_BOOLEAN_OPERANDS_MAX; i++)
         free(o.component_sign[i]);

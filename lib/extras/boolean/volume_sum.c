@@ -112,17 +112,27 @@ static void join_sums(mpz_t out, const ebpo_volume_sum *s)
     mpz_add(out, out, s->by_integers);
 }
 
-double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent)
+/* Converts six times a volume, in units of 2^EBPO_VOLUME_UNIT, to the results of
+ * ebpo_volume_sum_value. */
+static double round_volume(const mpz_t all, double *scaled, int64_t *exponent)
 {
-    mpz_t all, six;
-    mpz_init(all);
+    mpz_t six;
     mpz_init_set_ui(six, 6);
-    join_sums(all, s);
     double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
     int bits = mpz_sgn(all) ? (int)mpz_sizeinbase(all, 2) : -EBPO_VOLUME_UNIT;
     *scaled = ebpo_round_quotient(all, six, -bits);
     *exponent = EBPO_VOLUME_UNIT + bits;
-    mpz_clears(all, six, NULL);
+    mpz_clear(six);
+    return value;
+}
+
+double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent)
+{
+    mpz_t all;
+    mpz_init(all);
+    join_sums(all, s);
+    double value = round_volume(all, scaled, exponent);
+    mpz_clear(all);
     return value;
 }
 
@@ -153,21 +163,25 @@ void ebpo_volume_sum_add_rational(ebpo_volume_sum *s, mpq_t (*t)[3], int sign)
     mpq_clears(sum, term, NULL);
 }
 
-ebpo_value_bounds ebpo_volume_sum_interval(const ebpo_volume_sum *s)
+ebpo_value_bounds ebpo_volume_sum_interval(const ebpo_volume_sum *s, double *scaled,
+                                           int64_t *exponent)
 {
     ebpo_value_bounds out = { .kind = EBPO_VALUE_EXACT };
-    mpz_t all, six;
+    double scaled_hi;
+    int64_t exponent_hi;
+    mpz_t all;
     mpz_init(all);
-    mpz_init_set_ui(six, 6);
     join_sums(all, s);
-    out.lo = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
+    out.lo = round_volume(all, scaled, exponent);
     mpz_add_ui(all, all, s->rounded);
-    out.hi = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
-    if (out.lo != out.hi) { /* rounding to the nearest double may have moved both bounds inwards */
+    out.hi = round_volume(all, &scaled_hi, &exponent_hi);
+    if (out.lo != out.hi || *scaled != scaled_hi ||
+        *exponent !=
+            exponent_hi) { /* rounding to the nearest double may have moved both bounds inwards */
         out.kind = EBPO_VALUE_INTERVAL;
         out.lo = nextafter(out.lo, -INFINITY);
         out.hi = nextafter(out.hi, INFINITY);
     }
-    mpz_clears(all, six, NULL);
+    mpz_clear(all);
     return out;
 }

@@ -34,8 +34,9 @@ void ebpo_volume_sum_merge(ebpo_volume_sum *s, const ebpo_volume_sum *more);
  * Its absolute value is 1/12 to 1/6, or 0. No face may have been rounded (s->rounded is 0). */
 double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent);
 
-/* Returns the double nearest to the volume, or an interval if the rounding of faces leaves open
- * which double is nearest. */
-ebpo_value_bounds ebpo_volume_sum_interval(const ebpo_volume_sum *s);
+/* Returns the double nearest to the volume, and sets *scaled and *exponent as ebpo_volume_sum_value
+ * does. If the rounding of faces leaves open which doubles are nearest, returns an interval. */
+ebpo_value_bounds ebpo_volume_sum_interval(const ebpo_volume_sum *s, double *scaled,
+                                           int64_t *exponent);
 
 #endif

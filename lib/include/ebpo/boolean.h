@@ -408,6 +408,14 @@ typedef struct ebpo_boolean_mesh_report {
 
     /* With `changed_only`: number of faces of operand 0 in the ranges of `removed`. */
     uint64_t removed_faces;
+
+    /*
+     * If `volume` has the kind EBPO_VALUE_EXACT: the volume as scaled * 2^exponent, for volumes out
+     * of the range of doubles, for which `volume` is infinite or 0. `scaled` is rounded to the
+     * nearest double, ties to even.
+     */
+    double scaled;
+    int64_t exponent;
 } ebpo_boolean_mesh_report;
 
 #define EBPO_BOOLEAN_MESH_REPORT_INIT EBPO_SIZED(ebpo_boolean_mesh_report)

@@ -131,16 +131,23 @@ static void explain_bound(const cell_result *a, char *out, size_t capacity)
 
 static const char *const volume_kinds[] = { "exact", "interval", "bound" };
 
+/* Prints an exact volume: the nearest double, or scaled * 2^exponent if it is out of the range of
+ * doubles. */
+static void print_exact(double volume, double scaled, int64_t exponent)
+{
+    char exact[32], cell[TABLE_CELL];
+    printf("volume    %s, exact but for one rounding\n",
+           table_in_range(scaled, exponent) ? words_real(volume, exact)
+                                            : table_scaled(cell, 9, scaled, exponent));
+}
+
 static void print_volume(const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
-    char why[2048], exact[32], lo[32], hi[32], cell[TABLE_CELL];
+    char why[2048], lo[32], hi[32];
     explain_bound(a, why, sizeof why);
     if (is_exact(a))
-        printf("volume    %s, exact but for one rounding\n",
-               table_in_range(a->exact.scaled, a->exact.exponent)
-                   ? words_real(a->exact.volume.lo, exact)
-                   : table_scaled(cell, 9, a->exact.scaled, a->exact.exponent));
+        print_exact(a->exact.volume.lo, a->exact.scaled, a->exact.exponent);
     if (a->no_cells) {
         printf("by cells  not known: %s\n", a->why_no_cells);
         return;
@@ -158,21 +165,24 @@ static void print_volume(const cell_result *a)
 }
 
 /* Prints the volume of the result that was written. */
-static void print_result_volume(const ebpo_value_bounds *volume)
+static void print_result_volume(const ebpo_boolean_mesh_report *r)
 {
     char lo[32], hi[32];
-    if (volume->kind == EBPO_VALUE_EXACT)
-        printf("volume    %s, exact but for one rounding\n", words_real(volume->lo, lo));
+    if (r->volume.kind == EBPO_VALUE_EXACT)
+        print_exact(r->volume.lo, r->scaled, r->exponent);
     else
-        printf("volume    %s to %s, an interval\n", words_real(volume->lo, lo),
-               words_real(volume->hi, hi));
+        printf("volume    %s to %s, an interval\n", words_real(r->volume.lo, lo),
+               words_real(r->volume.hi, hi));
 }
 
-static void result_volume_to_json(json *j, const ebpo_value_bounds *volume)
+static void result_volume_to_json(json *j, const ebpo_boolean_mesh_report *r)
 {
-    json_real(j, "volume_lo", volume->lo);
-    json_real(j, "volume_hi", volume->hi);
-    json_text(j, "volume_kind", volume_kinds[volume->kind]);
+    for (int i = 0; i < 2; i++)
+        if (r->volume.kind == EBPO_VALUE_EXACT)
+            table_json(j, i ? "volume_hi" : "volume_lo", r->scaled, r->exponent);
+        else
+            json_real(j, i ? "volume_hi" : "volume_lo", i ? r->volume.hi : r->volume.lo);
+    json_text(j, "volume_kind", volume_kinds[r->volume.kind]);
 }
 
 static void volume_to_json(json *j, const cell_result *a)
@@ -227,7 +237,7 @@ static void print_cells(const cell_result *a)
         else if (a->v->out)
             print_written(a);
         if (a->volume && writes_result(a->v))
-            print_result_volume(&a->output.report.volume);
+            print_result_volume(&a->output.report);
         else if (a->volume)
             print_volume(a);
         return;
@@ -242,7 +252,7 @@ static void print_cells(const cell_result *a)
         json_uint(&j, "faces", a->faces_written);
     }
     if (a->volume && writes_result(a->v))
-        result_volume_to_json(&j, &a->output.report.volume);
+        result_volume_to_json(&j, &a->output.report);
     else if (a->volume)
         volume_to_json(&j, a);
     json_finish(&j);
