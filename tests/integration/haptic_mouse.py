@@ -27,8 +27,8 @@ def play(ebpo, folder, send, paint, *more):
     record = os.path.join(folder, "record")
     paint = os.path.join(folder, paint)
     p = subprocess.Popen([ebpo, "haptic", "--json", "--device", "spacenav", "--record", record, "--paint", paint,
-                          "--pen-radius", "0.02", *more, os.path.join(folder, "cube.ebpo.h5")], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                         text=True, env={**os.environ, "SPNAV_SOCKET": path})
+                          "--pen-radius", "0.02", *more, os.path.join(folder, "cube.ebpo.h5")],
+                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "SPNAV_SOCKET": path})
     daemon.settimeout(20)
     connection = daemon.accept()[0]
     while not os.path.exists(paint):  # made before the first step
