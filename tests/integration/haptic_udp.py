@@ -1,6 +1,7 @@
 """Tests a haptic device over UDP, untrusted senders of invalid packets, and samples: haptic_udp.py EBPO BRIDGE..."""
 import json
 import re
+import signal
 import socket
 import struct
 import subprocess
@@ -90,13 +91,29 @@ def press(device, to, sequence):
 
 
 def bridge(ebpo, model, program):
-    """A sample that connects a device of another library presses on the top of the cube, with a force of the device."""
-    p, to = begin(ebpo, model, "--seconds", "20")
-    printed = subprocess.run([program, str(to[1]), "0.4", "1.2", "0.5", "1"], check=True, stdout=subprocess.PIPE,
+    """A sample that connects a device of another library presses on the top of the cube, with a force of the device.
+
+    The hand gets at most the energy that it gives, with the tolerance of a motion of 0.6 mm in one step."""
+    p, to = begin(ebpo, model, "--seconds", "20", "--stiffness", "1000")
+    printed = subprocess.run([program, str(to[1]), "0.4", "1.2", "0.5", "1", "1000"], check=True, stdout=subprocess.PIPE,
                              text=True, timeout=60).stdout
     out, err = p.communicate(timeout=60)
     assert p.returncode == 0 and json.loads(out)["contacts"] > 50, (p.returncode, out, err)
-    assert printed.endswith("strongest force up 3.30\n"), printed  # 3.3: the greatest force of the stub
+    energy = re.search(r" (frames|positions), last force 0\.00, energy (-?[\d.]+), strongest force up 3\.30\n$", printed)
+    assert energy, printed  # 3.3: the greatest force of the stub
+    assert float(energy[2]) <= 1000 * 0.0006 ** 2 * 1.0001, printed
+
+
+def interrupt(ebpo, model, program):
+    """SIGINT ends a sample with force 0, and ebpo haptic."""
+    p, to = begin(ebpo, model, "--seconds", "20")
+    sample = subprocess.Popen([program, str(to[1]), "0.4", "1.2", "0.5", "1", "400"], stdout=subprocess.PIPE, text=True)
+    time.sleep(0.7)  # in contact
+    sample.send_signal(signal.SIGINT)
+    printed = sample.communicate(timeout=60)[0]
+    out, err = p.communicate(timeout=10)
+    assert p.returncode == 0 and json.loads(out)["contacts"] > 50, (p.returncode, out, err)
+    assert sample.returncode == 0 and "last force 0.00" in printed and "up 3.30" in printed, (sample.returncode, printed)
 
 
 def main(ebpo, *bridges):
@@ -133,6 +150,7 @@ def main(ebpo, *bridges):
         assert p.returncode == 1 and "no device has sent its position in 2 seconds (1 invalid packets" in err, err
         for program in bridges:
             bridge(ebpo, model, program)
+            interrupt(ebpo, model, program)
 
 
 if __name__ == "__main__":

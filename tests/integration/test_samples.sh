@@ -132,7 +132,7 @@ for i in $(seq 60); do
     [ -n "$port" ] && break
     sleep 0.5
 done
-"$1" "$port" 0.3 0.4 1.5 0.8 >"$work/felt" 2>&1 || { cat "$work/felt"; fail "touch_device gets replies"; }
+"$1" "$port" 0.3 0.4 1.5 0.8 100 >"$work/felt" 2>&1 || { cat "$work/felt"; fail "touch_device gets replies"; }
 wait $touching || fail "ebpo haptic ends with its device"
 [ "$(cat "$work/felt")" = "some replies, a force up, proxy at 0.30 0.40 1.00" ] ||
     { cat "$work/felt"; fail "touch_device feels the cube"; }

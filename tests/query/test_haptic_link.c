@@ -69,7 +69,6 @@ static void begin(simulation *s, const network *net, bool controlled)
     s->link.stiffness = stiffness;
     s->link.force_max = INFINITY;
     memcpy(s->hand, above, sizeof above);
-    memcpy(s->link.position, above, sizeof above);
     memcpy(s->pose.v, above, sizeof above);
 }
 
@@ -191,30 +190,150 @@ START_TEST(test_haptic_link_is_needed)
 }
 END_TEST
 
+/* Returns a link whose hand has given energy in 50 steps of 1 mm, against the force `push`. */
+static haptic_link pressed_link(double hand[3], const double push[3])
+{
+    haptic_link link = { .stiffness = stiffness, .force_max = 4 };
+    double force[3];
+    for (int i = 0; i < 50; i++) {
+        hand[2] -= 0.001;
+        haptic_link_receive(&link, (uint64_t)i + 1, push);
+        haptic_link_step(&link, 0.001, hand, force);
+    }
+    ck_assert_double_eq(force[2], 4);
+    return link;
+}
+
 /* Without replies to new positions, the force is 0 after HAPTIC_LINK_ZERO, also if the replies to
- * an old position go on. Positions and forces that are not finite change nothing. */
+ * an old position go on. Forces that are not finite change nothing. */
 START_TEST(test_haptic_link_decays)
 {
     const double push[3] = { 0, 0, 5 }, bad[3] = { 0, NAN, 0 };
     for (int repeats = 0; repeats < 2; repeats++) {
-        haptic_link link = { .stiffness = stiffness, .force_max = 4 };
         double hand[3] = { 0 }, force[3], before = INFINITY;
-        for (int i = 0; i < 50; i++) { /* the hand gives energy */
-            hand[2] -= 0.001;
-            haptic_link_receive(&link, (uint64_t)i + 1, push);
-            haptic_link_step(&link, 0.001, hand, force);
-        }
-        ck_assert_double_eq(force[2], 4);
+        haptic_link link = pressed_link(hand, push);
         for (int i = 1; i <= 120; i++, before = force[2]) {
             if (repeats)
                 haptic_link_receive(&link, 50, push);
             haptic_link_receive(&link, 51, bad);
-            haptic_link_step(&link, 0.001, i % 2 ? hand : bad, force);
+            haptic_link_step(&link, 0.001, hand, force);
             ck_assert_double_le(force[2], before);
             ck_assert_msg(i > 48 ? i < 101 || force[2] == 0 : force[2] == 4, "%d: %g", i, force[2]);
         }
         ck_assert_double_eq(link.energy, 0); /* given energy is lost */
     }
+}
+END_TEST
+
+/* At a position that is not finite, and at a motion longer than force_max / stiffness, the force is
+ * 0 at once. The unknown motion changes neither the energy nor the longest motion. The first
+ * position is the start. */
+START_TEST(test_haptic_link_unknown_motions)
+{
+    const double push[3] = { 0, 0, 5 }, bad[3] = { 0, NAN, 0 }, far[3] = { 0, 0, -9 };
+    const double *first[3] = { bad, far, NULL };
+    for (int i = 0; i < 3; i++) {
+        double hand[3] = { 3, -2, 7 }, force[3], after[3];
+        haptic_link link = { .stiffness = stiffness, .force_max = 4 };
+        if (first[i]) {
+            link = pressed_link(hand, push);
+            haptic_link_receive(&link, 51, push);
+            haptic_link_step(&link, 0.001, first[i], force);
+            ck_assert_double_eq(force[2], 0);
+        }
+        double longest = link.longest;
+        ck_assert_double_le(longest, 0.0011);
+        haptic_link_receive(&link, 52, push);
+        haptic_link_step(&link, 0.001, hand, force);
+        ck_assert_double_eq(force[2], 0);
+        ck_assert_double_eq(link.energy, 0);
+        ck_assert_double_eq(link.longest, longest);
+        memcpy(after, hand, sizeof after);
+        after[2] -= 0.0005; /* the next motion is known */
+        haptic_link_step(&link, 0.001, after, force);
+        ck_assert_double_gt(force[2], 0);
+        ck_assert_double_le(force[2], stiffness * fmax(longest, 0.00051));
+    }
+}
+END_TEST
+
+/* After a time that is negative or not a number, the force is 0 until the next reply. */
+START_TEST(test_haptic_link_bad_times)
+{
+    const double push[3] = { 0, 0, 5 }, times[3] = { -0.001, NAN, INFINITY };
+    for (int i = 0; i < 3; i++) {
+        double hand[3] = { 0 }, force[3];
+        haptic_link link = pressed_link(hand, push);
+        haptic_link_step(&link, times[i], hand, force);
+        ck_assert_double_eq(force[2], 0);
+        haptic_link_step(&link, 0.001, hand, force);
+        ck_assert_double_eq(force[2], 0);
+        haptic_link_receive(&link, 51, push);
+        haptic_link_step(&link, 0.001, hand, force);
+        ck_assert_double_gt(force[2], 0);
+    }
+}
+END_TEST
+
+/* Packets that are not replies to sent positions are ignored. The flag of a stopped haptic object
+ * ends the device with force 0. */
+START_TEST(test_haptic_link_checks_replies)
+{
+    const double hand[3] = { 0 }, unit[4] = { 0, 0, 0, 1 };
+    struct sockaddr_in at = { .sin_family = AF_INET };
+    socklen_t length = sizeof at;
+    haptic_link link;
+    double force[3];
+    struct {
+        haptic_reply_packet reply;
+        char more[9];
+    } bad[8] = { 0 };
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    int server = socket(AF_INET, SOCK_DGRAM, 0);
+    ck_assert_int_eq(bind(server, (const struct sockaddr *)&at, sizeof at), 0);
+    ck_assert_int_eq(getsockname(server, (struct sockaddr *)&at, &length), 0);
+    ck_assert(!haptic_link_open(&link, ntohs(at.sin_port), 0, 4));
+    close(link.socket);
+    ck_assert(haptic_link_open(&link, ntohs(at.sin_port), stiffness, 4));
+    ck_assert(haptic_link_exchange(&link, hand, unit, false, force));
+    length = sizeof at;
+    ck_assert_int_eq(recvfrom(server, &bad[0], sizeof bad[0], 0, (struct sockaddr *)&at, &length),
+                     80);
+    for (int i = 0; i < 8; i++)
+        bad[i].reply = (haptic_reply_packet){
+            .magic = "EBPT", .version = 1, .kind = 2, .sequence = 1, .force = { 0, 0, 5 }
+        };
+    bad[0].reply.magic[0] = 'e';
+    bad[1].reply.version = 2;
+    bad[2].reply.kind = 1;
+    bad[3].reply.sequence = 3; /* two positions are sent */
+    bad[4].reply.force[1] = NAN;
+    for (int i = 0; i < 8; i++) /* 5: too short; 6: too long; 7: valid */
+        sendto(server, &bad[i],
+               i == 5   ? 191
+               : i == 6 ? 193
+                        : 192,
+               0, (const struct sockaddr *)&at, length);
+    ck_assert(haptic_link_exchange(&link, hand, unit, false, force));
+    ck_assert_uint_eq(link.sequence, 1);
+    ck_assert_double_eq(link.received[2], 5);
+    link.sequence = 0;
+    for (int i = 0; i < 7; i++)
+        sendto(server, &bad[i],
+               i == 5   ? 191
+               : i == 6 ? 193
+                        : 192,
+               0, (const struct sockaddr *)&at, length);
+    link.sent = 1; /* the next position has number 2 */
+    ck_assert(haptic_link_exchange(&link, hand, unit, false, force));
+    ck_assert_uint_eq(link.sequence, 0);
+    bad[7].reply.sequence = 2;
+    bad[7].reply.flags = EBPO_HAPTIC_STOPPED;
+    sendto(server, &bad[7], 192, 0, (const struct sockaddr *)&at, length);
+    ck_assert(!haptic_link_exchange(&link, hand, unit, false, force));
+    ck_assert_double_eq(force[2], 0);
+    haptic_link_close(&link);
+    close(server);
 }
 END_TEST
 
@@ -226,6 +345,9 @@ TEST_SUITE(haptic_link)
     tcase_add_loop_test(tc, test_haptic_link_is_passive, 0, NETWORKS);
     tcase_add_test(tc, test_haptic_link_is_needed);
     tcase_add_test(tc, test_haptic_link_decays);
+    tcase_add_test(tc, test_haptic_link_unknown_motions);
+    tcase_add_test(tc, test_haptic_link_bad_times);
+    tcase_add_test(tc, test_haptic_link_checks_replies);
     suite_add_tcase(suite, tc);
     return suite;
 }

@@ -1,5 +1,6 @@
 /* The pen of `ebpo haptic --paint` on the top of a cube: when it is lifted, its least step, opacity
- * by pressure, undo, and the lock that it shares with the pages of the viewer. */
+ * by pressure, undo, brushes, and the lock that it shares with the pages of the viewer. */
+#include <arpa/inet.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -7,9 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "check_main.h"
 #include "cli/command.h"
+#include "cli/commands/haptic_device.h"
 #include "cli/commands/haptic_paint.h"
 #include "query_support.h"
 
@@ -202,6 +205,59 @@ START_TEST(test_pen_opacity_follows_pressure)
 }
 END_TEST
 
+/* Returns the opacity of all strokes together at a position, at most 1. */
+static double opacity_at(const pen_test *t, double x)
+{
+    double clear = 1;
+    for (uint64_t i = 0; i < t->strokes; i++) {
+        ebpo_paint_stroke s = stroke_at(t, i);
+        bool covers = false;
+        for (uint64_t k = 0; k < s.point_count; k++)
+            covers |= hypot(s.points[k].place[0] - x, s.points[k].place[1] - 0.5) <=
+                      s.radius * s.points[k].size / 32768;
+        clear *= covers ? 1 - (s.colour & 255) / 255.0 : 1;
+    }
+    return 1 - clear;
+}
+
+/* A pen that is put down at one position has one stroke there, with the opacity of its greatest
+ * pressure. If it moves before it is lifted, it adds a stroke of the least opacity where it is
+ * lifted. Pages get no stroke again that was finished before. */
+START_TEST(test_pen_opacity_does_not_accumulate)
+{
+    for (int moves = 0; moves < 2; moves++) {
+        pen_test t;
+        char *text;
+        size_t length;
+        haptic_paint_cursor cursor = HAPTIC_PAINT_CURSOR_INIT;
+        FILE *out = open_memstream(&text, &length);
+        begin(&t);
+        t.pen.fade = 0;
+        t.pen.pen.colour = 0xff000080;
+        open_pen(&t);
+        for (int i = -200; i < 600; i++) { /* first another contact */
+            double pressure = i < 0 ? 0.5 : fmin(1, fmin(i / 200.0, (600 - i) / 200.0));
+            double x = i < 0 ? 0.1 : 0.3 + moves * fmax(0, fmin(0.2, 0.001 * (i - 200)));
+            haptic_sample s = touch_at(i + 200, x, pressure);
+            s.lifted = i > -100 && i < 0;
+            haptic_paint_take(t.paint, &s, 1);
+            if (i % 7 == 0)
+                haptic_paint_write_news(t.paint, &cursor, out);
+        }
+        fclose(out);
+        uint64_t strokes = read_strokes(&t);
+        ck_assert_msg(strokes == (moves ? 3 : 2), "%d: %d strokes", moves, (int)strokes);
+        ck_assert_double_eq_tol(opacity_at(&t, 0.3), 128 / 255.0, 1e-12);
+        double last = opacity_at(&t, 0.3 + 0.2 * moves), least = moves * 8 / 255.0;
+        ck_assert_double_eq_tol(1 - last, (1 - 128 / 255.0) * (1 - least), 1e-12);
+        ck_assert_ptr_nonnull(strstr(text, "\"number\":0"));
+        ck_assert_ptr_null(strstr(strstr(text, "\"number\":1"), "\"number\":0"));
+        free(text);
+        end(&t);
+    }
+}
+END_TEST
+
 /* Each undo removes all strokes of a contact, but none that were in the file before. */
 START_TEST(test_pen_undo_removes_contacts)
 {
@@ -211,7 +267,7 @@ START_TEST(test_pen_undo_removes_contacts)
         t.pen.fade = run;
         open_pen(&t);
         for (int i = 0; i < 400; i++) {
-            haptic_sample s = touch_at(i, 0.1 + 0.001 * i, i % 200 / 200.0);
+            haptic_sample s = touch_at(i, 0.1 + 0.002 * i, i % 200 / 200.0);
             s.lifted = i % 200 < 20 || i % 200 > 160;
             haptic_paint_take(t.paint, &s, 1);
         }
@@ -221,6 +277,26 @@ START_TEST(test_pen_undo_removes_contacts)
          */
         ck_assert_uint_eq(read_strokes(&t), 11);
     }
+    end(&t);
+}
+END_TEST
+
+/* After an undo in contact, nothing is painted until the pen was lifted. */
+START_TEST(test_pen_paints_nothing_after_undo)
+{
+    pen_test t;
+    begin(&t);
+    open_pen(&t);
+    for (int i = 0; i < 600; i++) {
+        haptic_sample s = touch_at(i, 0.1 + 0.001 * i, 1);
+        s.flags = i >= 150 && i < 160 ? 0 : s.flags; /* a gap that does not lift the pen */
+        s.lifted = i >= 300 && i < 350;
+        haptic_paint_take(t.paint, &s, 1);
+        if (i == 100)
+            ck_assert(haptic_paint_command(t.paint, "undo"));
+    }
+    ck_assert_uint_eq(read_strokes(&t), 1);
+    ck_assert_double_gt(stroke_at(&t, 0).points[0].place[0], 0.44);
     end(&t);
 }
 END_TEST
@@ -271,21 +347,22 @@ static void move_brush(pen_test *t, double tilt, double depth)
     }
 }
 
-/* A brush paints its pressed points at each step of half the radius, as one contact. A tilted brush
+/* A brush paints its pressed points at each step of half the radius, as one stroke. A tilted brush
  * paints with its lower edge. */
 START_TEST(test_pen_brush_paints_its_shape)
 {
     for (int tilted = 0; tilted < 2; tilted++) {
         pen_test t;
+        const uint64_t count = tilted ? 33 : 64; /* of 121 */
         begin(&t);
         t.pen.full_force = 0.1;
         move_brush(&t, tilted ? 0.5 : 0, 0.01);
-        ck_assert_uint_eq(read_strokes(&t), 21);
+        ck_assert_uint_eq(read_strokes(&t), 1);
+        ebpo_paint_stroke s = stroke_at(&t, 0);
+        ck_assert_uint_eq(s.point_count, 21 * count);
         for (uint64_t i = 0; i < 21; i++) {
-            ebpo_paint_stroke s = stroke_at(&t, i);
             double low[2] = { 1, 1 }, high[2] = { 0, 0 };
-            ck_assert_uint_eq(s.point_count, tilted ? 33 : 64); /* of 121 */
-            for (uint64_t k = 0; k < s.point_count; k++) {
+            for (uint64_t k = i * count; k < (i + 1) * count; k++) {
                 ck_assert_double_eq(s.points[k].place[2], 1);
                 ck_assert_int_eq(s.points[k].pressure, 6553);
                 for (int c = 0; c < 2; c++) {
@@ -305,6 +382,60 @@ START_TEST(test_pen_brush_paints_its_shape)
 }
 END_TEST
 
+/* Presses a brush of one point, at a distance from the top of the cube as kept by a tool, for 100
+ * steps at one position and then moves it fast. */
+static void press_point(pen_test *t, double height, double depth, double depth_step)
+{
+    static const double point[1][3] = { { 0, 0, 0 } };
+    t->pen.points = point;
+    t->pen.point_count = 1;
+    open_pen(t);
+    for (int i = 0; i < 200; i++) {
+        haptic_sample s = touch_at(i, 0.1 + (i < 100 ? 0 : 0.005 * (i - 99)), 0);
+        s.touch[2] += height;
+        s.depth = depth + i * depth_step;
+        memcpy(s.proxy, s.touch, sizeof s.proxy);
+        s.rotation[3] = s.normal[2] = 1;
+        haptic_paint_take(t->paint, &s, 1);
+    }
+}
+
+/* A brush that presses harder has one stroke, with the opacity of the greatest pressure. It prints
+ * at most once in 5 ms. */
+START_TEST(test_pen_brush_has_bounded_prints)
+{
+    pen_test t;
+    begin(&t);
+    t.pen.fade = 0;
+    press_point(&t, 0, 0, 0.0125); /* full pressure after 80 steps */
+    ck_assert_uint_eq(read_strokes(&t), 1);
+    ebpo_paint_stroke s = stroke_at(&t, 0);
+    ck_assert_uint_eq(s.colour, 0xff0000ff);
+    ck_assert_uint_ge(s.point_count, 20);
+    ck_assert_uint_le(s.point_count, 37); /* 17 pressures, and 20 prints in 100 ms */
+    end(&t);
+}
+END_TEST
+
+/* A brush paints at the distance that its skin keeps it from the surface, also if it presses
+ * little. Without a surface, it tries again. */
+START_TEST(test_pen_brush_reaches_through_skin)
+{
+    for (int far = 0; far < 2; far++) {
+        pen_test t;
+        begin(&t);
+        t.pen.skin = 0.005;
+        t.pen.full_force = 0.01;
+        press_point(&t, far ? 0.015 : 0.005, 1e-4, far ? 1e-4 : 0);
+        ck_assert_uint_eq(read_strokes(&t), 1);
+        ebpo_paint_stroke s = stroke_at(&t, 0);
+        ck_assert_double_le(s.points[0].place[0], 0.1 + 1e-9);
+        ck_assert_double_gt(s.points[s.point_count - 1].place[0], 0.55);
+        end(&t);
+    }
+}
+END_TEST
+
 /* An undo removes all that a brush has painted in a contact. */
 START_TEST(test_pen_brush_is_undone)
 {
@@ -315,6 +446,61 @@ START_TEST(test_pen_brush_is_undone)
     ck_assert(!haptic_paint_command(t.paint, "undo"));
     ck_assert_uint_eq(read_strokes(&t), 0);
     end(&t);
+}
+END_TEST
+
+/* A device on UDP: its socket, the driver, and the number of sent positions. */
+typedef struct udp_test {
+    int socket;
+    haptic_device device;
+    uint8_t sent;
+} udp_test;
+
+/* Does a step of the driver, after a position of the device if `sends`. Returns true if the pen is
+ * lifted. flags: of the result. */
+static bool step_udp(udp_test *u, bool sends, uint32_t flags)
+{
+    uint8_t packet[80] = { 'E', 'B', 'P', 'T', 1, 0, 1 };
+    const double one = 1;
+    haptic_pose pose;
+    haptic_result result = { .flags = flags };
+    packet[8] = ++u->sent;
+    memcpy(packet + 72, &one, sizeof one); /* not rotated */
+    if (sends)
+        ck_assert_int_eq(send(u->socket, packet, sizeof packet, 0), sizeof packet);
+    ck_assert(u->device.read(u->device.self, 0, &pose));
+    u->device.write(u->device.self, &result);
+    return pose.lifted;
+}
+
+/* After a silence, the pen stays lifted until the proxy has followed the device, for any time. */
+START_TEST(test_pen_follows_after_silence)
+{
+    const struct timespec silence = { 0, 260000000 }, wait = { 0, 60000000 };
+    struct sockaddr_in at = { .sin_family = AF_INET };
+    socklen_t length = sizeof at;
+    udp_test u = { .socket = socket(AF_INET, SOCK_DGRAM, 0) };
+    char name[32];
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    ck_assert_int_eq(bind(u.socket, (const struct sockaddr *)&at, sizeof at), 0);
+    ck_assert_int_eq(getsockname(u.socket, (struct sockaddr *)&at, &length), 0);
+    close(u.socket); /* its port is free now */
+    u.socket = socket(AF_INET, SOCK_DGRAM, 0);
+    snprintf(name, sizeof name, "udp:%d", ntohs(at.sin_port));
+    ck_assert(haptic_udp_open(&u.device, name));
+    ck_assert_int_eq(connect(u.socket, (const struct sockaddr *)&at, sizeof at), 0);
+    (void)step_udp(&u, true, 0);
+    ck_assert(!step_udp(&u, true, 0));
+    ck_assert(!step_udp(&u, true, EBPO_HAPTIC_WAITING)); /* no silence */
+    nanosleep(&silence, NULL);
+    ck_assert(step_udp(&u, false, 0)); /* the proxy is at the old position */
+    ck_assert(step_udp(&u, true, EBPO_HAPTIC_WAITING));
+    nanosleep(&wait, NULL);
+    ck_assert(step_udp(&u, true, EBPO_HAPTIC_PATH_UNFINISHED));
+    ck_assert(step_udp(&u, true, EBPO_HAPTIC_CONTACT));
+    ck_assert(!step_udp(&u, true, EBPO_HAPTIC_CONTACT));
+    u.device.end(u.device.self);
+    close(u.socket);
 }
 END_TEST
 
@@ -381,10 +567,15 @@ Suite *test_suite(void)
     tcase_add_test(tc, test_pen_has_least_step);
     tcase_add_test(tc, test_pen_slices_are_equal);
     tcase_add_test(tc, test_pen_opacity_follows_pressure);
+    tcase_add_test(tc, test_pen_opacity_does_not_accumulate);
     tcase_add_test(tc, test_pen_undo_removes_contacts);
+    tcase_add_test(tc, test_pen_paints_nothing_after_undo);
     tcase_add_test(tc, test_pen_takes_pressure_of_stylus);
     tcase_add_test(tc, test_pen_brush_paints_its_shape);
+    tcase_add_test(tc, test_pen_brush_has_bounded_prints);
+    tcase_add_test(tc, test_pen_brush_reaches_through_skin);
     tcase_add_test(tc, test_pen_brush_is_undone);
+    tcase_add_test(tc, test_pen_follows_after_silence);
     tcase_add_test(tc, test_pen_shares_lock);
     suite_add_tcase(suite, tc);
     return suite;

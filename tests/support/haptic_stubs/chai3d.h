@@ -1,5 +1,6 @@
 /* A stub of the part of CHAI3D that samples/haptic_chai3d.cpp uses: declarations, and a device that
- * moves 0.3 m down and up again in a second, and is then unplugged. */
+ * moves 0.3 m down and up again in a second, and is then unplugged. It begins 0.05 m beside its
+ * origin, and measures the energy that it gives to the hand. */
 #ifndef EBPO_TESTS_STUB_CHAI3D_H
 #define EBPO_TESTS_STUB_CHAI3D_H
 
@@ -43,14 +44,17 @@ class cGenericHapticDevice
     bool calibrate() { return true; }
     bool close()
     {
-        std::printf("device: %d positions, strongest force up %.2f\n", count, strongest);
+        std::printf("device: %d positions, last force %.2f, energy %.9f, strongest force up %.2f\n",
+                    count, last.z(), energy, strongest);
         return true;
     }
     cHapticDeviceInfo getSpecifications() { return {}; }
     bool getPosition(cVector3d &out)
     {
         count++;
-        out = cVector3d(0, 0, -0.3 * (count < 500 ? count : 1000 - count) / 500);
+        out = cVector3d(0, 0.05, -0.3 * (count < 500 ? count : 1000 - count) / 500);
+        energy += last.z() * (out.z() - before.z()); /* begins without a force */
+        before = out;
         return count < 1000;
     }
     bool getRotation(cMatrix3d &) { return true; }
@@ -61,13 +65,15 @@ class cGenericHapticDevice
     }
     bool setForce(const cVector3d &force)
     {
+        last = force;
         strongest = force.z() > strongest ? force.z() : strongest;
         return true;
     }
 
   private:
     int count = 0;
-    double strongest = 0;
+    double strongest = 0, energy = 0;
+    cVector3d before, last;
 };
 
 typedef cGenericHapticDevice *cGenericHapticDevicePtr;

@@ -368,6 +368,7 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
     pen.rate = v->rate;
     pen.points = (const double(*)[3])j->points;
     pen.point_count = v->spread > 0 ? 0 : j->point_count; /* a spray paints around the contact */
+    pen.skin = v->skin;
     pen.diagonal = model_diagonal(ebpo_file_info(j->file));
     return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
 }

@@ -31,8 +31,16 @@ enum { SLICE = 16 };
 
 /* The format has one opacity for each stroke. If the opacity follows the pressure, it has LEVELS
  * steps, and a contact has a stroke for each change. It changes when it is a whole level from the
- * current one, so that it does not change back and forth. */
+ * current one, so that it does not change back and forth. Strokes blend, so a pen that is put down
+ * or lifted at one position must not add strokes there: while the pen is within a radius of where
+ * the stroke began, a stroke of the new opacity replaces the stroke. A lower opacity replaces only
+ * strokes that began because the pressure fell. */
 enum { LEVELS = 16 };
+
+/* Shortest time between two prints of a brush, and greatest number of points in one of its strokes,
+ * which is copied for each print. */
+static const double PRINT_MS = 5;
+enum { PRINT_POINTS = 1 << 15 };
 
 /* Shortest step of the pen, as a share of the model's diagonal. It bounds the work for a movement
  * with a thin pen. */
@@ -53,11 +61,19 @@ struct haptic_paint {
     /* Used by the thread that paints. */
     ebpo_paint_drawing *drawing; /* NULL: the pen is lifted */
     double touched;              /* time of the last sample in contact */
+    ebpo_paint_input first;      /* first position of the stroke */
     ebpo_paint_input last;       /* last position of `drawing` */
-    int level;                   /* opacity of the stroke: 1 to LEVELS */
+    double moved;                /* greatest distance from `first` */
+    bool falls;                  /* the stroke began because the pressure fell */
+    int level;                   /* opacity of the stroke: 1 to LEVELS; 0: no stroke */
+    bool undone;                 /* nothing is painted until the pen is lifted */
     bool pressed;                /* the brush has painted in this contact, at `print` */
     haptic_sample print;         /* the last step in which the brush has painted */
     double print_pressure;
+    double print_time;        /* when the brush has painted last, or has found no surface */
+    ebpo_paint_point *prints; /* [print_count], at most PRINT_POINTS: the brush's last stroke */
+    uint64_t print_count;
+    uint64_t prints_time; /* time of that stroke */
     double arm;           /* of a brush: distance of its farthest point from its origin */
     ebpo_error error;     /* first error of painting */
     pthread_mutex_t turn; /* held while a thread waits for the lock */
@@ -67,9 +83,11 @@ struct haptic_paint {
     uint64_t finished; /* number of strokes of `drawn` that will not change */
     uint64_t *contact; /* [contact_count] number of strokes of `drawn` before each contact */
     uint64_t contact_count, contact_capacity;
-    bool in_contact;  /* the last contact has not ended */
-    uint64_t changes; /* number of changes of `drawn` */
-    uint64_t epoch;   /* number of removed strokes */
+    bool in_contact;     /* the last contact has not ended */
+    uint64_t changes;    /* number of changes of `drawn` */
+    uint64_t epoch;      /* number of removals of strokes */
+    uint64_t kept;       /* number of strokes that the last removals have kept */
+    uint64_t kept_epoch; /* all removals since this epoch have kept the same number */
     uint64_t layer_changes;
     /* Used by the thread that saves. */
     ebpo_paint *saved;
@@ -197,18 +215,33 @@ static void report_painting(haptic_paint *p, const ebpo_error *error)
 /* Ends a stroke. The caller has the lock. */
 static void end_stroke(haptic_paint *p)
 {
-    if (!p->drawing)
-        return;
     ebpo_paint_drawing_free(p->drawing);
     p->drawing = NULL;
+    p->print_count = 0;
     p->finished = info_of(p->drawn).stroke_count;
+}
+
+/* Removes the strokes from number `count` on. The caller has the lock. */
+static bool remove_strokes(haptic_paint *p, uint64_t count)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t i = info_of(p->drawn).stroke_count;
+    while (i > count && ebpo_paint_remove_stroke(p->drawn, i - 1, &error) == EBPO_OK)
+        i--;
+    if (p->kept != i)
+        p->kept_epoch = p->epoch;
+    p->kept = i;
+    p->epoch++;
+    p->changes++;
+    return i == count;
 }
 
 /* Lifts the pen, which ends a contact. The caller has the lock. */
 static void lift_pen(haptic_paint *p)
 {
     end_stroke(p);
-    p->in_contact = p->pressed = false;
+    p->in_contact = p->pressed = p->falls = false;
+    p->level = 0;
 }
 
 static ebpo_status fail_memory(ebpo_error *error)
@@ -237,13 +270,49 @@ static ebpo_status begin_contact(haptic_paint *p, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns the level of opacity at a pressure. */
-static int level_at(const haptic_paint *p, double pressure)
+/* Returns the greatest distance from the beginning of the stroke, up to the next position. */
+static double moved_to(const haptic_paint *p, const ebpo_paint_input *next)
 {
-    double exact = LEVELS * (p->pen.fade + (1 - p->pen.fade) * pressure);
-    if (p->drawing && fabs(exact - p->level) < 1)
-        return p->level;
-    return (int)fmax(1, floor(exact + 0.5));
+    const double *a = p->first.place, *b = next->place;
+    return fmax(p->moved, hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]));
+}
+
+/* Returns the level of opacity at the next position of the pen. */
+static int next_level(const haptic_paint *p, const ebpo_paint_input *next)
+{
+    double exact = LEVELS * (p->pen.fade + (1 - p->pen.fade) * next->pressure);
+    int level = (int)fmax(1, floor(exact + 0.5));
+    if (p->level == 0)
+        return level;
+    bool keeps = level < p->level && !p->falls && moved_to(p, next) < p->pen.pen.radius;
+    return keeps || fabs(exact - p->level) < 1 ? p->level : level;
+}
+
+/* Moves the pen to the next position, with its level. */
+static void move_pen(haptic_paint *p, const ebpo_paint_input *next, int level)
+{
+    if (p->level == 0) {
+        p->first = *next;
+        p->moved = 0;
+    }
+    p->level = level;
+    p->moved = moved_to(p, next);
+}
+
+/* Ends a stroke before the opacity changes to another level at the next position. If the pen has
+ * not moved far, removes the stroke instead. Returns true then: the new stroke begins where that
+ * stroke began. */
+static bool replace_stroke(haptic_paint *p, const ebpo_paint_input *next, int level)
+{
+    if (moved_to(p, next) < p->pen.pen.radius) {
+        ebpo_paint_drawing_free(p->drawing);
+        p->drawing = NULL;
+        return remove_strokes(p, p->finished);
+    }
+    end_stroke(p);
+    p->falls = level < p->level;
+    p->level = 0;
+    return false;
 }
 
 /* Returns the colour of the pen with the opacity of p->level. */
@@ -303,39 +372,72 @@ static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64
     p->last = input[count - 1];
 }
 
-/* Adds a stroke with the pressed points of the brush. The caller has the lock. */
-static ebpo_status add_print(haptic_paint *p, const haptic_sample *sample, double pressure,
-                             ebpo_error *error)
+/* Adds the pressed points of the brush to `prints`. */
+static ebpo_status take_print(haptic_paint *p, const haptic_sample *sample, double pressure,
+                              ebpo_error *error)
 {
-    const ebpo_paint_pen *pen = &p->pen.pen;
-    double place[HAPTIC_BRUSH_MAX][3], near = 0x1p-12 * p->pen.diagonal;
-    ebpo_paint_point point[HAPTIC_BRUSH_MAX];
-    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    double place[HAPTIC_BRUSH_MAX][3], least = p->pen.pen.size_least;
+    /* the proxy keeps the skin from the surface */
+    double near = fmax(0x1p-12 * p->pen.diagonal, 2 * p->pen.skin);
     int count = haptic_brush_pressed(p->pen.points, p->pen.point_count, sample, near, place);
-    ebpo_status status = begin_contact(p, error);
-    for (int i = 0; i < count && status == EBPO_OK; i++) {
-        ebpo_paint_point *q = &point[stroke.point_count];
-        status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
+    for (int i = 0; i < count; i++) {
+        ebpo_paint_point *q = &p->prints[p->print_count];
+        ebpo_status status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
         if (status != EBPO_OK)
-            break;
+            return status;
         double off = hypot(hypot(q->place[0] - place[i][0], q->place[1] - place[i][1]),
                            q->place[2] - place[i][2]);
-        q->size = (uint16_t)(FULL_SIZE * (pen->size_least + pressure * (1 - pen->size_least)));
+        q->size = (uint16_t)(FULL_SIZE * (least + pressure * (1 - least)));
         q->pressure = (uint16_t)(pressure * UINT16_MAX);
-        stroke.point_count += off <= sample->depth + near; /* the surface is there */
+        p->print_count += off <= sample->depth + near; /* the surface is there */
     }
+    return EBPO_OK;
+}
+
+/* Makes `prints` the last stroke, in place of a shorter one. The caller has the lock. */
+static ebpo_status add_prints(haptic_paint *p, ebpo_error *error)
+{
+    const ebpo_paint_pen *pen = &p->pen.pen;
+    ebpo_status status = EBPO_OK;
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
     stroke.layer = pen->layer;
     stroke.kind = pen->kind;
     stroke.colour = faded_colour(p);
     stroke.radius = pen->radius;
-    stroke.time = stroke_time(p);
-    stroke.points = point;
-    if (status != EBPO_OK || stroke.point_count == 0)
-        return status;
-    status = ebpo_paint_add_stroke(p->drawn, &stroke, error);
-    p->finished = info_of(p->drawn).stroke_count;
+    stroke.time = p->prints_time;
+    stroke.points = p->prints;
+    stroke.point_count = p->print_count;
+    uint64_t count = info_of(p->drawn).stroke_count;
+    if (count > p->finished)
+        status = ebpo_paint_remove_stroke(p->drawn, count - 1, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_add_stroke(p->drawn, &stroke, error);
     p->changes++;
     return status;
+}
+
+/* Adds a print to the stroke of the brush, or begins a stroke. Returns true if points were added.
+ * The caller has the lock. */
+static bool add_print(haptic_paint *p, const haptic_sample *sample, double pressure)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (p->print_count + HAPTIC_BRUSH_MAX > PRINT_POINTS)
+        end_stroke(p);
+    if (p->print_count == 0)
+        p->prints_time = stroke_time(p);
+    uint64_t before = p->print_count;
+    ebpo_status status = begin_contact(p, &error);
+    if (status == EBPO_OK)
+        status = take_print(p, sample, pressure, &error);
+    if (status != EBPO_OK)
+        p->print_count = before;
+    bool added = p->print_count > before;
+    bool removed = before > 0 && info_of(p->drawn).stroke_count == p->finished;
+    if (status == EBPO_OK && (added || removed)) /* removed: by replace_stroke */
+        status = add_prints(p, &error);
+    if (status != EBPO_OK)
+        report_painting(p, &error);
+    return added && status == EBPO_OK;
 }
 
 /* Returns a length that no point of the brush has exceeded since it painted last. */
@@ -354,15 +456,20 @@ static double brush_motion(const haptic_paint *p, const haptic_sample *to)
  * since it painted last. The caller has the lock. */
 static void press_brush(haptic_paint *p, const haptic_sample *sample)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_paint_input next = input_of(p, sample);
     double step = fmax(p->pen.pen.radius / 2, p->step_least);
-    if (p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
-        brush_motion(p, sample) < step)
+    if (sample->time < p->print_time + PRINT_MS ||
+        (p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
+         brush_motion(p, sample) < step))
         return;
-    p->level = level_at(p, next.pressure);
-    if (add_print(p, sample, next.pressure, &error) != EBPO_OK)
-        report_painting(p, &error);
+    memcpy(next.place, sample->proxy, sizeof next.place);
+    int level = next_level(p, &next);
+    if (p->level > 0 && level != p->level)
+        (void)replace_stroke(p, &next, level);
+    move_pen(p, &next, level);
+    p->print_time = sample->time;
+    if (!add_print(p, sample, next.pressure))
+        return;
     p->print = *sample;
     p->print_pressure = next.pressure;
     p->pressed = true;
@@ -375,11 +482,15 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
     ebpo_paint_input input[SLICE + 1];
     uint64_t taken = 0, n = 0;
     bool touches = is_touching(&samples[0]);
-    if (samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS))
+    if (samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS)) {
         lift_pen(p);
+        p->undone = false;
+    }
     if (!touches)
         return 1;
     p->touched = samples[0].time;
+    if (p->undone)
+        return 1;
     if (p->pen.point_count > 0) {
         press_brush(p, &samples[0]);
         return 1;
@@ -389,14 +500,17 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
            samples[taken].time - p->touched <= p->lost_ms;
          taken++) {
         ebpo_paint_input next = input_of(p, &samples[taken]);
-        int level = level_at(p, next.pressure);
-        if (level != p->level && taken > 0)
+        int level = next_level(p, &next), before = p->level;
+        if (level != before && taken > 0)
             break;
-        if (level != p->level && p->drawing) { /* the new stroke continues the path */
-            end_stroke(p);
+        if (before > 0 && level != before && replace_stroke(p, &next, level)) {
+            input[n] = p->first;
+            input[n++].pressure = next.pressure;
+        } else if (before > 0 && level != before) { /* the new stroke continues the path */
             input[n++] = p->last;
+            move_pen(p, &p->last, level);
         }
-        p->level = level;
+        move_pen(p, &next, level);
         input[n++] = next;
         p->touched = samples[taken].time;
     }
@@ -416,24 +530,22 @@ void haptic_paint_take(void *user, const haptic_sample *samples, uint64_t count)
 
 /* --- commands --- */
 
-/* Removes the strokes of the last contact of this run that has painted. Returns false if there is
+/* Removes the strokes of the last contact of this run that has painted. If the tool still touches,
+ * it paints nothing until it was lifted. Returns false if there is
  * none. The caller has the lock. */
 static bool undo_contact(haptic_paint *p)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     uint64_t count = info_of(p->drawn).stroke_count, before = count;
     while (p->contact_count > 0 && before == count)
         before = p->contact[--p->contact_count];
     if (before == count)
         return false;
-    while (count > before && ebpo_paint_remove_stroke(p->drawn, count - 1, &error) == EBPO_OK)
-        count--;
-    p->finished = count;
+    bool removed = remove_strokes(p, before);
+    p->finished = info_of(p->drawn).stroke_count;
     if (p->copied > p->finished)
         p->copied = p->finished;
-    p->changes++;
-    p->epoch++;
-    return count == before;
+    p->undone = true;
+    return removed;
 }
 
 static bool add_layer(haptic_paint *p, const char *title)
@@ -593,8 +705,16 @@ void haptic_paint_write_news(haptic_paint *p, haptic_paint_cursor *at, FILE *out
     lock_paint(p);
     ebpo_paint_info info = info_of(p->drawn);
     ebpo_paint_stroke last = EBPO_PAINT_STROKE_INIT;
-    if (at->epoch != p->epoch && at->strokes > 0)
-        at->strokes = at->points = 0; /* everything is sent again */
+    if (at->epoch != p->epoch) {
+        ebpo_paint_stroke kept = EBPO_PAINT_STROKE_INIT;
+        bool keeps = at->epoch >= p->kept_epoch && at->epoch < p->epoch && p->kept > 0;
+        if (keeps && at->strokes > p->kept) {
+            at->strokes = p->kept;
+            ebpo_paint_get_stroke(p->drawn, p->kept - 1, &kept);
+            at->points = kept.point_count;
+        } else if (!keeps && at->strokes > 0)
+            at->strokes = at->points = 0; /* everything is sent again */
+    }
     if (info.stroke_count)
         ebpo_paint_get_stroke(p->drawn, info.stroke_count - 1, &last);
     if (at->epoch != p->epoch || at->layer_changes != p->layer_changes ||
@@ -665,6 +785,7 @@ static void free_paint(haptic_paint *p)
     pthread_mutex_destroy(&p->lock);
     pthread_mutex_destroy(&p->turn);
     free(p->contact);
+    free(p->prints);
     free(p);
 }
 
@@ -684,7 +805,12 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
         p->arm =
             fmax(p->arm, hypot(hypot(pen->points[i][0], pen->points[i][1]), pen->points[i][2]));
     p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_context_new(model, &p->context, error);
+    p->print_time = -INFINITY;
+    if (pen->point_count > 0)
+        p->prints = calloc(PRINT_POINTS, sizeof *p->prints);
+    ebpo_status status = pen->point_count > 0 && !p->prints
+                             ? fail_memory(error)
+                             : ebpo_context_new(model, &p->context, error);
     if (status == EBPO_OK)
         status = open_paints(p, file, error);
     if (status != EBPO_OK) {

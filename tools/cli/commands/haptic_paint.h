@@ -21,6 +21,7 @@ typedef struct haptic_pen {
     double fade; /* opacity at no pressure, as a share of that of the colour; 1: constant */
     const double (*points)[3]; /* [point_count] points of a brush */
     uint64_t point_count;      /* 0: not a brush; it paints at the contact */
+    double skin;               /* distance that the proxy of a brush keeps from faces */
     double diagonal;           /* of the model's box */
     double rate;               /* steps per second */
 } haptic_pen;

@@ -2,7 +2,9 @@
  * bytes for each event, 8 numbers of 4 bytes in the order of this machine:
  *     0, x, y, z, rx, ry, rz, ms     the deflection of the cap
  *     1 or 2, button                 a button is pressed or released
- * A deflection is a speed. z points away from the user, so it is the negative z of the model. */
+ * A deflection is a speed. The daemon sends changes only: a cap that is held still keeps its speed
+ * until the next event, and an unplugged mouse, too. z points away from the user, so it is the
+ * negative z of the model. */
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -14,7 +16,6 @@
 #include <unistd.h>
 
 #include "cli/command.h"
-#include "cli/tool_clock.h"
 #include "cli/commands/haptic_device.h"
 
 enum { MOTION = 0, PRESS = 1, EVENT_BYTES = 32, EVENTS_MAX = 32, FULL_DEFLECTION = 350 };
@@ -23,10 +24,6 @@ enum { MOTION = 0, PRESS = 1, EVENT_BYTES = 32, EVENTS_MAX = 32, FULL_DEFLECTION
  * second. */
 static const double FULL_SPEED = 0.25, FULL_TURN = 1;
 
-/* The tool stops if the mouse has sent no motion for this time: it may be unplugged. A deflected
- * cap is never so still. */
-static const double SILENCE_SECONDS = 0.5;
-
 typedef struct mouse {
     int socket;
     bool ended; /* spacenavd has ended */
@@ -34,7 +31,6 @@ typedef struct mouse {
     double origin[3], size[3], diagonal; /* of the model's box */
     double clearance, step_seconds;
     double speed[6];  /* deflection, divided by full deflection */
-    uint64_t moved;   /* tool_clock at the last motion */
     int32_t event[8]; /* may be incomplete */
     size_t filled;    /* bytes of `event` */
 } mouse;
@@ -45,9 +41,7 @@ static void take_event(mouse *m)
     for (int k = 0; k < 6 && e[0] == MOTION; k++)
         m->speed[k] =
             (k % 3 == 2 ? -1.0 : 1.0) * fmax(-1, fmin(1, e[k + 1] / (double)FULL_DEFLECTION));
-    if (e[0] == MOTION)
-        m->moved = tool_clock();
-    else if (e[0] == PRESS)
+    if (e[0] == PRESS)
         m->pose.lifted = !m->pose.lifted;
 }
 
@@ -93,16 +87,12 @@ static bool read_pose(void *self, uint64_t step, haptic_pose *out)
     mouse *m = self;
     (void)step;
     take_all(m);
-    if (1e-9 * (double)(tool_clock() - m->moved) < SILENCE_SECONDS) {
-        for (int k = 0; k < 3; k++) {
-            double to =
-                m->pose.position[k] + FULL_SPEED * m->diagonal * m->step_seconds * m->speed[k];
-            double wide = m->diagonal + m->clearance;
-            m->pose.position[k] =
-                fmax(m->origin[k] - wide, fmin(m->origin[k] + m->size[k] + wide, to));
-        }
-        turn_pose(m, m->step_seconds);
+    for (int k = 0; k < 3; k++) {
+        double to = m->pose.position[k] + FULL_SPEED * m->diagonal * m->step_seconds * m->speed[k];
+        double wide = m->diagonal + m->clearance;
+        m->pose.position[k] = fmax(m->origin[k] - wide, fmin(m->origin[k] + m->size[k] + wide, to));
     }
+    turn_pose(m, m->step_seconds);
     *out = m->pose;
     return !m->ended;
 }
@@ -133,7 +123,7 @@ static bool begin_mouse(void *self, double seconds, haptic_pose *first)
     m->pose.position[2] += 0.5 * m->size[2] + m->clearance + 0.05 * m->diagonal;
     m->pose.rotation[3] = 1;
     *first = m->pose;
-    return connect_daemon(m);
+    return true;
 }
 
 static void ignore_result(void *self, const haptic_result *result)
@@ -168,5 +158,5 @@ bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate
     m->clearance = clearance;
     m->step_seconds = 1 / rate;
     m->socket = -1;
-    return true;
+    return connect_daemon(m);
 }

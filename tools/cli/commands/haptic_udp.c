@@ -31,9 +31,9 @@ enum {
  * the device may be unplugged. As in samples/haptic_link.h. */
 static const double HOLD_SECONDS = 0.05, ZERO_SECONDS = 0.1;
 
-/* SILENCE_NS: time after the last position at which the pen is lifted. SETTLE_NS: time for which it
- * stays lifted after a silence, until the proxy has followed the device. */
-enum { SILENCE_NS = 250000000, SETTLE_NS = 50000000 };
+/* Time after the last position at which the pen is lifted. It stays lifted until a new position has
+ * arrived, and the proxy has followed the device. */
+enum { SILENCE_NS = 250000000 };
 
 typedef struct udp {
     int socket;
@@ -42,7 +42,7 @@ typedef struct udp {
     struct sockaddr_in device; /* address of the device */
     uint64_t sequence, tag;    /* from the last valid packet; each feedback repeats both numbers */
     uint64_t arrived;          /* tool_clock at the last valid packet */
-    uint64_t resumed;          /* tool_clock at the last valid packet after a silence */
+    bool follows;              /* no silence since the proxy was last not behind the device */
     uint64_t ignored;          /* number of invalid packets */
     haptic_pose pose;          /* the last position */
 } udp;
@@ -142,8 +142,6 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
     u->device = *from;
     u->sequence = sequence;
     u->tag = get_bytes(p + 16, 8);
-    if (is_silent(u))
-        u->resumed = tool_clock();
     u->arrived = tool_clock();
     return true;
 }
@@ -200,7 +198,8 @@ static bool read_position(void *self, uint64_t step, haptic_pose *out)
     (void)step;
     take_all(u);
     *out = u->pose;
-    out->lifted |= is_silent(u) || tool_clock() - u->resumed < SETTLE_NS;
+    u->follows &= !is_silent(u);
+    out->lifted |= !u->follows;
     return !u->ended;
 }
 
@@ -213,6 +212,8 @@ static void write_result(void *self, const haptic_result *a)
         force[k] = share * a->force[k];
         torque[k] = share * a->torque[k];
     }
+    u->follows |=
+        !is_silent(u) && !(a->flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED));
     memcpy(at, "EBPT", 4);
     at = put_bytes(at + 4, VERSION, 2);
     at = put_bytes(at, FEEDBACK, 2);
