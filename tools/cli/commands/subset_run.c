@@ -148,10 +148,11 @@ ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info, cons
         return refuse_values(error, shown, what);
     }
     bool named = v->parts && v->parts[0] != '-';
-    if (named && out->parts & ~info->parts) {
+    uint32_t requested = 0; /* parts in the list; with plus signs, out->parts has all others too */
+    if (named && subset_read_parts(v->parts, 0, &requested) && requested & ~info->parts) {
         char parts[80];
         snprintf(what, sizeof what, "--parts requests %s, which the file does not have",
-                 words_parts(parts, sizeof parts, out->parts & ~info->parts));
+                 words_parts(parts, sizeof parts, requested & ~info->parts));
         return refuse_values(error, shown, what);
     }
     if (named && out->parts & EBPO_PART_MAPS && !(out->parts & EBPO_PART_MESH))
