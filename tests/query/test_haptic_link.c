@@ -269,9 +269,28 @@ START_TEST(test_haptic_link_bad_times)
         haptic_link_step(&link, 0.001, hand, force);
         ck_assert_double_eq(force[2], 0);
         haptic_link_receive(&link, 51, push);
+        hand[2] -= 0.001;
         haptic_link_step(&link, 0.001, hand, force);
         ck_assert_double_gt(force[2], 0);
     }
+}
+END_TEST
+
+/* A long motion outside of contacts does not allow a greater force in the next contact. */
+START_TEST(test_haptic_link_forgets_motions)
+{
+    const double push[3] = { 0, 0, 5 };
+    double hand[3] = { 0 }, force[3];
+    haptic_link link = { .stiffness = stiffness, .force_max = 4 };
+    for (int i = 0; i < 10; i++) {
+        hand[0] += i < 5 ? 0.009 : 1e-4;
+        haptic_link_step(&link, 0.001, hand, force);
+    }
+    haptic_link_receive(&link, 1, push);
+    hand[0] += 1e-4;
+    haptic_link_step(&link, 0.001, hand, force);
+    ck_assert_double_gt(force[2], 0);
+    ck_assert_double_le(force[2], stiffness * 1.001e-4);
 }
 END_TEST
 
@@ -347,6 +366,7 @@ TEST_SUITE(haptic_link)
     tcase_add_test(tc, test_haptic_link_decays);
     tcase_add_test(tc, test_haptic_link_unknown_motions);
     tcase_add_test(tc, test_haptic_link_bad_times);
+    tcase_add_test(tc, test_haptic_link_forgets_motions);
     tcase_add_test(tc, test_haptic_link_checks_replies);
     suite_add_tcase(suite, tc);
     return suite;
