@@ -294,8 +294,8 @@ START_TEST(test_haptic_link_forgets_motions)
 }
 END_TEST
 
-/* Packets that are not replies to sent positions are ignored. The flag of a stopped haptic object
- * ends the device with force 0. */
+/* Packets that are not replies to sent positions are ignored. The flag of a stopped haptic object,
+ * and SIGINT, end the device with force 0. */
 START_TEST(test_haptic_link_checks_replies)
 {
     const double hand[3] = { 0 }, unit[4] = { 0, 0, 0, 1 };
@@ -347,6 +347,16 @@ START_TEST(test_haptic_link_checks_replies)
     ck_assert(haptic_link_exchange(&link, hand, unit, false, force));
     ck_assert_uint_eq(link.sequence, 0);
     bad[7].reply.sequence = 2;
+    for (int i = 0; i < 2; i++) { /* SIGINT at a force that is not 0 */
+        const double up[3] = { 0, 0, -1e-3 * (i + 1) };
+        sendto(server, &bad[7], 192, 0, (const struct sockaddr *)&at, length);
+        if (i == 1)
+            raise(SIGINT);
+        ck_assert_int_eq(haptic_link_exchange(&link, up, unit, false, force), i == 0);
+        ck_assert_int_eq(force[2] > 0, i == 0);
+    }
+    haptic_link_interrupted = 0;
+    bad[7].reply.sequence = 3;
     bad[7].reply.flags = EBPO_HAPTIC_STOPPED;
     sendto(server, &bad[7], 192, 0, (const struct sockaddr *)&at, length);
     ck_assert(!haptic_link_exchange(&link, hand, unit, false, force));
