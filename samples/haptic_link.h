@@ -6,7 +6,8 @@
  * Passive: at any time, the energy that the hand has received in total is at most the energy that
  * it has given plus stiffness times s^2, where s is the longest motion of the hand in one step.
  * The energy of a step is the force of the step before times the motion. If the force becomes 0,
- * energy that the hand has given and not received is lost, so each contact is passive by itself.
+ * energy that the hand has given and not received is lost, so each contact is passive by itself;
+ * s then begins again, unless the hand has received more than it has given.
  * The first position, positions that are not finite, and motions longer than force_max / stiffness
  * in one step are not known motions: the force is 0 at once, and s does not count them.
  *
@@ -67,7 +68,7 @@ typedef struct haptic_link {
     double position[3];        /* of the hand in the last step */
     double force[3];           /* applied since the last step */
     double energy;      /* received by the hand in total; negative: the hand has given more */
-    double longest;     /* longest motion of the hand in one step */
+    double longest;     /* s */
     double received[3]; /* force of the newest reply */
     double age;         /* seconds since the newest reply */
     uint64_t sequence;  /* of the newest reply */
@@ -132,8 +133,10 @@ static inline void haptic_link_step(haptic_link *link, double seconds, const dou
         share = haptic_link_most(link) / length;
     for (int k = 0; k < 3; k++)
         force[k] = link->force[k] = share * link->received[k];
-    if (share * length == 0) /* the contact has ended */
+    if (share * length == 0) { /* the contact has ended */
         link->energy = fmax(link->energy, 0);
+        link->longest = link->energy > 0 ? link->longest : 0;
+    }
 }
 
 static volatile sig_atomic_t haptic_link_interrupted;

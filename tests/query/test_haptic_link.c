@@ -269,14 +269,33 @@ START_TEST(test_haptic_link_bad_times)
         haptic_link_step(&link, 0.001, hand, force);
         ck_assert_double_eq(force[2], 0);
         haptic_link_receive(&link, 51, push);
+        hand[2] -= 0.001;
         haptic_link_step(&link, 0.001, hand, force);
         ck_assert_double_gt(force[2], 0);
     }
 }
 END_TEST
 
-/* Packets that are not replies to sent positions are ignored. The flag of a stopped haptic object
- * ends the device with force 0. */
+/* A long motion outside of contacts does not allow a greater force in the next contact. */
+START_TEST(test_haptic_link_forgets_motions)
+{
+    const double push[3] = { 0, 0, 5 };
+    double hand[3] = { 0 }, force[3];
+    haptic_link link = { .stiffness = stiffness, .force_max = 4 };
+    for (int i = 0; i < 10; i++) {
+        hand[0] += i < 5 ? 0.009 : 1e-4;
+        haptic_link_step(&link, 0.001, hand, force);
+    }
+    haptic_link_receive(&link, 1, push);
+    hand[0] += 1e-4;
+    haptic_link_step(&link, 0.001, hand, force);
+    ck_assert_double_gt(force[2], 0);
+    ck_assert_double_le(force[2], stiffness * 1.001e-4);
+}
+END_TEST
+
+/* Packets that are not replies to sent positions are ignored. The flag of a stopped haptic object,
+ * and SIGINT, end the device with force 0. */
 START_TEST(test_haptic_link_checks_replies)
 {
     const double hand[3] = { 0 }, unit[4] = { 0, 0, 0, 1 };
@@ -328,6 +347,16 @@ START_TEST(test_haptic_link_checks_replies)
     ck_assert(haptic_link_exchange(&link, hand, unit, false, force));
     ck_assert_uint_eq(link.sequence, 0);
     bad[7].reply.sequence = 2;
+    for (int i = 0; i < 2; i++) { /* SIGINT at a force that is not 0 */
+        const double up[3] = { 0, 0, -1e-3 * (i + 1) };
+        sendto(server, &bad[7], 192, 0, (const struct sockaddr *)&at, length);
+        if (i == 1)
+            raise(SIGINT);
+        ck_assert_int_eq(haptic_link_exchange(&link, up, unit, false, force), i == 0);
+        ck_assert_int_eq(force[2] > 0, i == 0);
+    }
+    haptic_link_interrupted = 0;
+    bad[7].reply.sequence = 3;
     bad[7].reply.flags = EBPO_HAPTIC_STOPPED;
     sendto(server, &bad[7], 192, 0, (const struct sockaddr *)&at, length);
     ck_assert(!haptic_link_exchange(&link, hand, unit, false, force));
@@ -347,6 +376,7 @@ TEST_SUITE(haptic_link)
     tcase_add_test(tc, test_haptic_link_decays);
     tcase_add_test(tc, test_haptic_link_unknown_motions);
     tcase_add_test(tc, test_haptic_link_bad_times);
+    tcase_add_test(tc, test_haptic_link_forgets_motions);
     tcase_add_test(tc, test_haptic_link_checks_replies);
     suite_add_tcase(suite, tc);
     return suite;
