@@ -66,6 +66,18 @@ class Device:
         self.sent += 1
         self.socket.sendto(PLACE.pack(b"EBPT", 1, kind, self.sent, 0, *at, 0, 0, 0, 1) + more, self.to)
 
+    def begin(self, at):
+        """Sends a position until the loop replies, so that later positions find a running loop."""
+        self.socket.settimeout(0.05)
+        for _ in range(1200):
+            self.send(at)
+            try:
+                self.socket.recv(1024)
+                return
+            except TimeoutError:
+                pass
+        check(False, "the loop did not reply")
+
     def draw(self, process, seconds, step=None, kind=1):
         """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""
         begin, sent, down = time.monotonic(), [], None
@@ -197,6 +209,7 @@ def test_stylus(t):
     paint = t.at("stylus.paint.h5")
     p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--colour", "0000ffff", "--fade", "0.5")
     device = Device(p)
+    device.begin((0.1, 0.5, 1.2))
     for i in range(60):
         device.send((0.1 + 0.01 * i, 0.5, max(0.99, 1.2 - 0.05 * i)), 1, struct.pack("<d", (0.25, 0.5, 0)[i // 20]))
         time.sleep(0.01)
@@ -262,9 +275,9 @@ def test_rough_surface(t):
     line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
     t.run("haptic", "--tool", ball, "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
     strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
-    angles = [math.atan2(s["points"][0]["place"][0], s["points"][0]["place"][2]) for s in strokes]
+    angles = [math.atan2(q["place"][0], q["place"][2]) for s in strokes for q in s["points"]]
     for k in range(5):
-        check(any(-0.4 + 0.2 * k < a < -0.2 + 0.2 * k for a in angles), "the ball did not follow the device", k, sorted(angles))
+        check(any(-0.4 + 0.2 * k < a < -0.2 + 0.2 * k for a in angles), "the ball did not follow the device", k, len(angles))
 
 
 def test_probe(t):
