@@ -3,9 +3,12 @@
  * The search is breadth first from the root. A cell is omitted if certainly |w_D| < 1/2 in it; no
  * cap touches such a cell. A cell in which |w_D| is certainly greater is not divided. Other cells
  * are divided while the number of tests is below the limit, and no deeper than the tree. Each cell
- * has a list of the caps near it, made from its parent's list (geometry/cap_bounds.h). A cell whose
- * list is longer than LIST_MAX is not divided either, and has no list: thousands of large caps that
- * overlap would be in the lists of almost all cells. */
+ * has a list of the caps near it, made from its parent's list (geometry/cap_bounds.h). A cell is
+ * not divided either, and has no list, if its list is longer than LIST_MAX and longer than its
+ * share, as one of 8^level cells, of ENTRIES_PER_EDGE entries for each border edge: thousands of
+ * large caps that overlap would be in the lists of almost all cells. The first levels may have long
+ * lists, because their entries are small groups of caps, most of which are far from the cells
+ * below. */
 #include "core/strict_fp.h"
 
 #include <limits.h>
@@ -21,11 +24,12 @@
 #include "core/parallel.h"
 #include "geometry/cap_cells.h"
 
-/* Tests of cells, which take microseconds each: always, and for each border edge. */
 enum {
+    /* Tests of cells, which take microseconds each: always, and for each border edge. */
     TESTS_ALWAYS = 1 << 14,
     TESTS_PER_EDGE = 16,
     LIST_MAX = 1024,
+    ENTRIES_PER_EDGE = 64,
     PROGRESS_CELLS = 2048, /* number of divided cells between two reports of progress */
     DETAIL_LEVELS = 3
 };
@@ -36,7 +40,7 @@ static const double threshold = 0.5;
 typedef struct cap_cell {
     ebpo_octcode code;
     bool is_end;         /* it is not divided */
-    bool has_no_list;    /* its list is too long; all its points may be inside */
+    bool has_no_list;    /* its list would be too long; all its points may be inside */
     uint64_t begin, end; /* range of its list of near caps */
     ebpo_bounded far;    /* bounds of the other caps */
 } cap_cell;
@@ -58,9 +62,9 @@ struct ebpo_capped {
 /* --- making --- */
 
 /* Tests the eight children of a cap cell and adds the cap cells among them to the next level.
- * Returns false when out of memory. */
+ * `list_max`: maximal length of their lists. Returns false when out of memory. */
 static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *parent,
-                        cap_level *next)
+                        uint64_t list_max, cap_level *next)
 {
     for (unsigned octant = 0; octant < 8; octant++) {
         cap_cell child = { .code = ebpo_octcode_child(parent->code, octant),
@@ -70,21 +74,22 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
         double low[3], high[3];
         ebpo_cell_bounds(c->box, cell, low, high);
         const ebpo_cap_box box = ebpo_cap_box_of(low, high);
-        if (!ebpo_cap_lists_narrow(&c->lists, &c->caps, &box, parent->begin, parent->end,
-                                   &child.far))
+        ebpo_status status = ebpo_cap_lists_narrow(&c->lists, &c->caps, &box, parent->begin,
+                                                   parent->end, list_max, &child.far);
+        if (status == EBPO_E_MEMORY)
             return false;
+        child.has_no_list = status == EBPO_E_LIMIT;
         child.end = c->lists.count;
-        child.has_no_list = child.end - child.begin > LIST_MAX;
         int small =
             child.has_no_list
                 ? 0
                 : ebpo_cap_small_in(front, &c->caps, low, high, c->lists.entry + child.begin,
                                     child.end - child.begin, child.far, threshold);
         child.is_end = small == 0;
-        if (small == 1 || child.has_no_list)
-            c->lists.count = child.end = child.begin;
-        if (small == 1)
+        if (small == 1) {
+            c->lists.count = child.begin;
             continue;
+        }
         if (!ebpo_grow(&next->cell, &next->capacity, next->count + 1, sizeof *next->cell))
             return false;
         next->cell[next->count++] = child;
@@ -103,14 +108,15 @@ static ebpo_status divide_level(ebpo_capped *c, ebpo_cap_front *front,
                                 ebpo_error *error)
 {
     cap_level *l = &c->level[c->deepest];
-    uint64_t divided = 0;
+    uint64_t divided = 0, share = ENTRIES_PER_EDGE * c->caps.position_count >> 3 * (c->deepest + 1),
+             list_max = share > LIST_MAX ? share : LIST_MAX;
     for (uint64_t i = 0; i < l->count; i++) {
         if (l->cell[i].is_end)
             continue;
         if (divided % PROGRESS_CELLS == 0 &&
             !ebpo_progress_step(progress, "border", tests + 8 * divided, tests_max, error))
             return EBPO_E_CANCELLED;
-        if (!divide_cell(c, front, &l->cell[i], l + 1))
+        if (!divide_cell(c, front, &l->cell[i], list_max, l + 1))
             return fail_lists(c, error);
         divided++;
     }

@@ -4,9 +4,9 @@
  * integer winding number k of faces and caps (geometry/cap_tree.h), w = k + w_D. Where |w_D| < 1/2,
  * the rule gives the same result for w and for k, as in a solid. The cells in which |w_D| may be
  * 1/2 or more are the cap cells: a thin layer around the caps. They are found once, level by level,
- * until the number of tests reaches a limit that grows with the length of the border. A cell that
- * has more than a thousand caps near it is a cap cell as a whole, so the work is limited for caps
- * that overlap.
+ * until the number of tests reaches a limit that grows with the length of the border. A cell is a
+ * cap cell as a whole if the list of groups of caps near it is too long, so the work is limited for
+ * caps that overlap.
  *
  * So the inside is a part of the union of the cap cells and of the solid that faces and caps bound
  * outside the cap cells. The boundary of this union consists of faces and of sides of cap cells.

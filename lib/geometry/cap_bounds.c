@@ -179,10 +179,12 @@ ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], d
 
 /* --- lists --- */
 
-bool ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
-                           const ebpo_cap_box *box, uint64_t begin, uint64_t end, ebpo_bounded *far)
+ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
+                                  const ebpo_cap_box *box, uint64_t begin, uint64_t end,
+                                  uint64_t most, ebpo_bounded *far)
 {
     uint32_t stack[STACK];
+    uint64_t before = lists->count;
     for (uint64_t i = begin; i < end; i++) {
         uint32_t count = 1;
         stack[0] = lists->entry[i];
@@ -197,14 +199,17 @@ bool ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
             } else if (n->radius > box->radius && has_parts(tree, entry)) {
                 count += find_parts(tree, entry, stack + count);
             } else {
-                if (!ebpo_grow(&lists->entry, &lists->capacity, lists->count + 1,
-                               sizeof *lists->entry))
-                    return false;
+                bool is_full = lists->count - before == most;
+                if (is_full || !ebpo_grow(&lists->entry, &lists->capacity, lists->count + 1,
+                                          sizeof *lists->entry)) {
+                    lists->count = before;
+                    return is_full ? EBPO_E_LIMIT : EBPO_E_MEMORY;
+                }
                 lists->entry[lists->count++] = entry;
             }
         }
     }
-    return true;
+    return EBPO_OK;
 }
 
 /* --- refined sums --- */

@@ -34,10 +34,11 @@ typedef struct ebpo_cap_lists {
 /* Makes the list of a box from the list entry[begin .. end) of a larger box, and appends it to
  * `lists`. Omits entries whose distance from the box is large compared with their size and the size
  * of the box. Adds the bounds of the omitted entries, which hold in the whole box, to *far.
- * Replaces large entries by their parts. Returns false when memory is short. */
-bool ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
-                           const ebpo_cap_box *box, uint64_t begin, uint64_t end,
-                           ebpo_bounded *far);
+ * Replaces entries that are larger than the box by their parts. Returns EBPO_E_MEMORY, or
+ * EBPO_E_LIMIT if the list would have more than `most` entries; then appends nothing. */
+ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
+                                  const ebpo_cap_box *box, uint64_t begin, uint64_t end,
+                                  uint64_t most, ebpo_bounded *far);
 
 /* A cell in which some points are inside and others may be outside, so a query must decide for each
  * point. The cell has the sum of the bounds of far discs, and a list of entries for the other

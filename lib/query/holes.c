@@ -185,7 +185,7 @@ static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_di
     near_discs near = { w->lists.count, 0, parent->far, parent->decided };
     if (!near.decided && w->has_memory)
         w->has_memory = ebpo_cap_lists_narrow(&w->lists, &w->holes->caps, box, parent->begin,
-                                              parent->end, &near.far);
+                                              parent->end, UINT64_MAX, &near.far) == EBPO_OK;
     near.end = w->lists.count;
     return near;
 }

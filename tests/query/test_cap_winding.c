@@ -440,7 +440,9 @@ static void check_boxes(judge *j, const holed *h, const double q[3], const doubl
     }
     for (int step = 0; step < 8; step++) {
         const ebpo_cap_box box = ebpo_cap_box_of(low, high);
-        ck_assert(ebpo_cap_lists_narrow(&lists, &h->tree, &box, begin, end, &far));
+        ck_assert_int_eq(ebpo_cap_lists_narrow(&lists, &h->tree, &box, begin, end, UINT64_MAX,
+                                               &far),
+                         EBPO_OK);
         begin = end;
         end = lists.count;
         ebpo_cap_front_begin(front, &h->tree, &box, lists.entry + begin, end - begin, far);

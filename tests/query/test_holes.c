@@ -564,47 +564,16 @@ START_TEST(test_envelopes_contain_inside)
 }
 END_TEST
 
-/* Calls of a progress callback for the stage "border" before the stage "envelopes". The call with
- * number `last` stops. */
-typedef struct border_calls {
-    unsigned count, last;
-    bool over;   /* the stage "envelopes" has begun */
-    bool within; /* `done` was at most `total` in all calls */
-} border_calls;
-
-static bool report_border(void *user, const char *stage, uint64_t done, uint64_t total)
-{
-    border_calls *calls = user;
-    calls->over = calls->over || strcmp(stage, "envelopes") == 0;
-    if (calls->over || strcmp(stage, "border") != 0)
-        return true;
-    calls->within = calls->within && done <= total;
-    return ++calls->count != calls->last;
-}
-
 /* Thousands of triangles as wide as the model, which overlap, so that all of them are caps near
- * every cell. All cells then count whole. Progress is reported, and can stop the search. */
+ * every cell. All cells then count whole. */
 START_TEST(test_overlapping_caps_take_bounded_work)
 {
     uint64_t state = 8;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh mesh = random_soup(&state, WIDE_FACES), copy;
-    border_calls calls = { 0, 1, false, true };
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
-    ebpo_mesh_report found;
-    ebpo_repair_record repairs = { 0 };
-    ebpo_tree tree;
     build.max_level = 4;
-    build.progress = (ebpo_progress){ report_border, &calls };
-    model_must(ebpo_mesh_copy(&mesh, &copy, &error), "copying", &error);
-    model_must(ebpo_mesh_check(&copy, 1, (ebpo_progress){ NULL, NULL }, &found, &error), "checking",
-               &error);
-    ck_assert_int_eq(ebpo_build(&copy, &found, &repairs, &build, &tree, &error), EBPO_E_CANCELLED);
-    ck_assert(calls.count == 1 && !calls.over);
-    calls.last = 0;
-    tree = model_build(mesh, &build);
-    ck_assert(calls.within && calls.count > 1);
+    ebpo_tree tree = model_build(random_soup(&state, WIDE_FACES), &build);
     model_write(&tree, scratch("wide.ebpo.h5"), NULL);
     ebpo_file *file = model_open(scratch("wide.ebpo.h5"));
     model_must(ebpo_verify(file, NULL, &report, &error), "verifying", &error);
@@ -613,6 +582,60 @@ START_TEST(test_overlapping_caps_take_bounded_work)
     for (int level = 0; level < ebpo_file_info(file)->level_count; level++)
         ck_assert_uint_eq(ebpo_file_info(file)->level[level].white_count, 0);
     ebpo_close(file);
+}
+END_TEST
+
+/* Makes triangles of size 0.002 with random centres in a unit cube. */
+static ebpo_mesh sparse_soup(uint64_t *state, uint64_t faces)
+{
+    ebpo_mesh m = random_soup(state, faces);
+    for (uint64_t f = 0; f < m.face_count; f++)
+        for (int i = 1; i < 3; i++)
+            for (int k = 0; k < 3; k++)
+                m.xyz64[3 * m.faces[3 * f + (uint64_t)i] + (uint64_t)k] =
+                    m.xyz64[3 * m.faces[3 * f] + (uint64_t)k] +
+                    0.002 * ebpo_test_random_unit(state);
+    return m;
+}
+
+/* Stops the search for cap cells at the first report after the first tests of cells. */
+static bool stop_border(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    bool *stopped = user;
+    if (strcmp(stage, "border") != 0)
+        return true;
+    ck_assert(!*stopped && done <= total);
+    *stopped = done > 0;
+    return !*stopped;
+}
+
+/* Cells with long lists of small caps are divided, so the levels become small. A
+ * callback can stop the search between levels. */
+START_TEST(test_sparse_caps_have_small_envelopes)
+{
+    uint64_t state = 4;
+    bool stopped = false;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = sparse_soup(&state, 20000), copy;
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_mesh_report found;
+    ebpo_repair_record repairs = { 0 };
+    ebpo_tree tree;
+    build.leaf_faces = 1;
+    model_must(ebpo_mesh_copy(&mesh, &copy, &error), "copying", &error);
+    tree = model_build(copy, &build);
+    double volume = 0, box = 1; /* of all leaves */
+    for (int level = 0; level < tree.info.level_count; level++)
+        volume += tree.level[level].leaf_volume;
+    for (int k = 0; k < 3; k++)
+        box *= tree.info.box_size[k];
+    ck_assert_msg(volume > 0 && volume < 0.16 * box, "%g of %g", volume, box);
+    ebpo_tree_free(&tree);
+    build.progress = (ebpo_progress){ stop_border, &stopped };
+    model_must(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &found, &error), "checking",
+               &error);
+    ck_assert_int_eq(ebpo_build(&mesh, &found, &repairs, &build, &tree, &error), EBPO_E_CANCELLED);
+    ck_assert(stopped);
 }
 END_TEST
 
@@ -833,6 +856,7 @@ TEST_SUITE(holes)
     tcase_set_timeout(wide, 300);
     tcase_add_checked_fixture(wide, scratch_enter, scratch_leave);
     tcase_add_test(wide, test_overlapping_caps_take_bounded_work);
+    tcase_add_test(wide, test_sparse_caps_have_small_envelopes);
     suite_add_tcase(suite, wide);
     if (getenv("EBPO_MODELS")) {
         TCase *real = tcase_create("scans");

@@ -43,12 +43,12 @@ static ebpo_status join_caps(ebpo_mesh *out, const ebpo_mesh *mesh, const ebpo_b
 {
     uint64_t vertices = mesh->vertex_count, faces = mesh->face_count, caps = count_caps(loops);
     memset(out, 0, sizeof *out);
-    if (caps > 3 * faces) /* more than the mesh has edges */
-        return fail_caps(error, EBPO_E_FORMAT, path,
-                         "its border is longer than the edges of its mesh; run ebpo verify");
+    if (caps > 3 * faces + loops->point_count) /* large weights in a small file */
+        return fail_caps(error, EBPO_E_LIMIT, path,
+                         "has more caps than edges of faces and points of the border together");
     if (vertices + loops->point_count > UINT32_MAX - 1 || faces + caps > UINT32_MAX - 1)
         return fail_caps(error, EBPO_E_LIMIT, path,
-                         "with its caps, the mesh has more than 2^32 - 2 faces");
+                         "with its caps, the mesh has more than 2^32 - 2 vertices or faces");
     out->vertex_count = vertices + loops->point_count;
     out->face_count = faces + caps;
     out->faces = malloc(3 * out->face_count * sizeof *out->faces + 1);

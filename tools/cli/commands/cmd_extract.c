@@ -56,6 +56,9 @@ static int check_values(const values *v, const char *in, const char *out)
             "extract", "--no-cell-faces applies to --level only; the model has no cell faces");
     if (v->caps && !v->mesh)
         return command_usage("extract", "--caps applies to --mesh only");
+    if (v->caps && v->memory.memory)
+        return command_usage("extract",
+                             "--caps keeps the whole tree in memory; omit --memory or --caps");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
     return EXIT_OK;
