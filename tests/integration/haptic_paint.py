@@ -295,8 +295,8 @@ def test_probe(t):
     while not re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen) and time.monotonic() < end:
         seen += page.recv(65536)
     p.send_signal(signal.SIGTERM)
-    p.communicate(timeout=60)
-    check(p.returncode == 0 and re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen), p.returncode, seen[-300:])
+    err = p.communicate(timeout=60)[1]
+    check(p.returncode == 0 and re.search(rb'"depth":0\.02,"colour":"#[0-9a-f]{6}"', seen), p.returncode, err, seen[-300:])
 
 
 def test_full_disk(t, recovers):

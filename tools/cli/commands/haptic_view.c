@@ -133,12 +133,12 @@ static void stream_news(void *user, http_stream *stream)
         size_t length = news ? strlen(news) : 0;
         if (length)
             sent = http_stream_send(stream, news, length);
-        else if (last)
+        free(news);
+        if (!length && last)
             break;
-        else if (++quiet == PING_TICKS)
+        if (!length && ++quiet == PING_TICKS)
             sent = http_stream_send(stream, ":\n\n", 3);
         quiet = length || quiet == PING_TICKS ? 0 : quiet;
-        free(news);
         tool_wait_until(tool_clock() + TICK_NS);
     }
     if (sent)
