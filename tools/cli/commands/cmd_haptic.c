@@ -324,7 +324,7 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
 static ebpo_status play_empty(job *j, ebpo_error *error)
 {
     const values *v = j->v;
-    uint64_t step_count = v->path ? j->device.step_count(j->device.self) : 0;
+    uint64_t step_count = v->path ? j->device.step_count : 0;
     double seconds = (step_count ? (double)step_count / v->rate : v->seconds) / 10;
     const haptic_play empty = { .rate = v->rate, .seconds = v->view ? fmin(seconds, 1) : seconds };
     haptic_request_real_time();

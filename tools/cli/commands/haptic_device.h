@@ -37,13 +37,13 @@ typedef struct haptic_device {
     /* Sets *out to the pose in a haptic step, 0, 1, ...; never waits. Returns false if the device
      * has ended. */
     bool (*read)(void *self, uint64_t step, haptic_pose *out);
-    /* Takes the feedback of the step. */
+    /* Takes the feedback of the step. NULL: the device has no feedback. */
     void (*write)(void *self, const haptic_result *result);
-    /* Returns the number of steps of the device; 0: the device has steps for any time. */
-    uint64_t (*step_count)(void *self);
     /* Ends the device, and frees `self`. */
     void (*end)(void *self);
     void *self; /* the first argument of these functions */
+    /* Number of steps of the device; 0: the device has steps for any time. */
+    uint64_t step_count;
 } haptic_device;
 
 /* haptic_path.c: reads a line 'x y z' or 'x y z qx qy qz qw' of `length` bytes, which ends with a

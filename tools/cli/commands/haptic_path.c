@@ -119,14 +119,6 @@ static bool read_pose(void *self, uint64_t step, haptic_pose *out)
     return true;
 }
 
-static void write_result(void *self, const haptic_result *result)
-{
-    (void)self;
-    (void)result;
-}
-
-static uint64_t count_steps(void *self) { return ((path *)self)->count; }
-
 static void end_path(void *self)
 {
     free(((path *)self)->pose);
@@ -138,12 +130,13 @@ bool haptic_path_open(haptic_device *out, const char *name)
     path *p = calloc(1, sizeof *p);
     bool standard = strcmp(name, "-") == 0;
     FILE *in = standard ? stdin : fopen(name, "r");
-    *out = (haptic_device){ begin_path, read_pose, write_result, count_steps, end_path, p };
+    *out = (haptic_device){ begin_path, read_pose, NULL, end_path, p, 0 };
     bool ok = p && in;
     if (!in)
         fprintf(stderr, "ebpo haptic: %s: cannot be opened: %s\n", name, strerror(errno));
     if (ok)
         ok = read_lines(p, in, standard ? "standard input" : name);
+    out->step_count = p ? p->count : 0;
     if (in && !standard)
         fclose(in);
     return ok;

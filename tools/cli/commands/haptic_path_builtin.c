@@ -88,24 +88,12 @@ static bool begin_builtin(void *self, double seconds, haptic_pose *first)
     return pose_at(self, 0, first);
 }
 
-static void write_result(void *self, const haptic_result *result)
-{
-    (void)self;
-    (void)result;
-}
-
-static uint64_t count_steps(void *self)
-{
-    (void)self;
-    return 0;
-}
-
 ebpo_status haptic_builtin_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
                                 double rate, double clearance, ebpo_error *error)
 {
     builtin_path *p = calloc(1, sizeof *p);
     ebpo_context *context = NULL;
-    *out = (haptic_device){ begin_builtin, pose_at, write_result, count_steps, free, p };
+    *out = (haptic_device){ begin_builtin, pose_at, NULL, free, p, 0 };
     ebpo_status status = ebpo_context_new(model, &context, error);
     if (status != EBPO_OK || !p)
         return status != EBPO_OK ? status : EBPO_E_MEMORY;

@@ -192,7 +192,8 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
     }
     if (p->live)
         push_step(p, i, &pose, &result);
-    p->device->write(p->device->self, &result);
+    if (p->device->write)
+        p->device->write(p->device->self, &result);
     out->width_mean += result.hi - result.lo; /* a sum until haptic_play_run divides it */
     out->width_max = fmax(out->width_max, result.hi - result.lo);
     return true;
@@ -223,7 +224,7 @@ static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times 
 
 uint64_t haptic_play_steps(const haptic_play *p)
 {
-    uint64_t count = p->haptic ? p->device->step_count(p->device->self) : 0;
+    uint64_t count = p->haptic ? p->device->step_count : 0;
     return count ? count : (uint64_t)ceil(p->rate * p->seconds);
 }
 

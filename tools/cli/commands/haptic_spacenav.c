@@ -126,18 +126,6 @@ static bool begin_mouse(void *self, double seconds, haptic_pose *first)
     return true;
 }
 
-static void ignore_result(void *self, const haptic_result *result)
-{
-    (void)self;
-    (void)result;
-}
-
-static uint64_t count_steps(void *self)
-{
-    (void)self;
-    return 0;
-}
-
 static void end_mouse(void *self)
 {
     mouse *m = self;
@@ -149,7 +137,7 @@ static void end_mouse(void *self)
 bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate, double clearance)
 {
     mouse *m = calloc(1, sizeof *m);
-    *out = (haptic_device){ begin_mouse, read_pose, ignore_result, count_steps, end_mouse, m };
+    *out = (haptic_device){ begin_mouse, read_pose, NULL, end_mouse, m, 0 };
     if (!m)
         return command_no_memory("haptic") == EXIT_OK;
     memcpy(m->origin, info->box_origin, sizeof m->origin);

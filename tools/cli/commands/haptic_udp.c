@@ -235,12 +235,6 @@ static void write_result(void *self, const haptic_result *a)
                  sizeof u->device);
 }
 
-static uint64_t count_steps(void *self)
-{
-    (void)self;
-    return 0;
-}
-
 static void end_udp(void *self)
 {
     udp *u = self;
@@ -283,7 +277,7 @@ bool haptic_udp_open(haptic_device *out, const char *name)
 {
     struct sockaddr_in at;
     udp *u = calloc(1, sizeof *u);
-    *out = (haptic_device){ begin_udp, read_position, write_result, count_steps, end_udp, u };
+    *out = (haptic_device){ begin_udp, read_position, write_result, end_udp, u, 0 };
     if (!u)
         return false;
     u->socket = -1;

@@ -323,21 +323,9 @@ static bool read_page(void *self, uint64_t step, haptic_pose *out)
     return true;
 }
 
-static void ignore_result(void *self, const haptic_result *result)
-{
-    (void)self;
-    (void)result;
-}
-
-static uint64_t count_steps(void *self)
-{
-    (void)self;
-    return 0;
-}
-
 static void end_page(void *self) { (void)self; }
 
 void haptic_view_open_device(haptic_device *out, haptic_view *view)
 {
-    *out = (haptic_device){ begin_page, read_page, ignore_result, count_steps, end_page, view };
+    *out = (haptic_device){ begin_page, read_page, NULL, end_page, view, 0 };
 }
