@@ -25,7 +25,7 @@ plan() { # build
     full-gcc) echo "1" ;;
     full-clang | full-undefined) echo "0.03 wasm" ;;
     full-sanitize) echo "0.02 wasm" ;;
-    default-gcc) echo "0.05 full viewer wasm" ;;
+    default-gcc) echo "0.05 full viewer wasm fuzz" ;; # sanitize runs the fuzz targets
     default-clang) echo "0.1 full once costly viewer wasm calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
     *-memory) echo "1" ;; # one suite

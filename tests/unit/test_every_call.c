@@ -292,7 +292,7 @@ static void survive(int call, bool with_workspace, const unsigned *kinds)
 {
     const every_call *c = call_number(call);
     const bool all = ebpo_test_scale() >= 1;
-    const uint64_t dense = all ? 200 : 3;
+    const uint64_t dense = all ? 200 : 2;
     every_call_env e;
     begin(&e, with_workspace);
     fine(c->call(&e));
