@@ -156,12 +156,13 @@ def test_erase(t):
     check(kinds == ["paints"] * 2 + ["erases"] * 2, kinds)
 
 
-def test_kill(t):
-    """After a kill, the file contains everything that was touched up to a second before."""
-    for seconds in (1.7, 2.6):
-        paint = t.at(f"killed-{seconds}.paint.h5")
-        p = t.start(paint, "--device", "udp:0", "--seconds", "9")
-        sent = Device(p).draw(p, seconds)
+def test_kill(t, faults):
+    """After a kill, the file contains everything that was touched up to a second before, also if the disk is slow."""
+    for slow in (False, True) if faults else (False,):
+        paint = t.at(f"killed-{slow}.paint.h5")
+        environment = {**os.environ, "LD_PRELOAD": faults, "EBPO_TEST_SLOW_DISK": "1"} if slow else None
+        p = t.start(paint, "--device", "udp:0", "--seconds", "9", env=environment)
+        sent = Device(p).draw(p, 2.6 if slow else 1.7)
         p.kill()
         killed = time.monotonic()
         p.wait()
@@ -193,21 +194,33 @@ def test_second_writer(t):
     check(max(q["place"][0] for q in points) >= sent[-1][1] - RADIUS, "the last points are missing")
 
 
+def replay(t, paint, path, *more):
+    """A replay of a recording paints the strokes that the device has painted. Only their dates are missing."""
+    made = paint + ".replay.paint.h5"
+    p = t.start(made, "--path", path, *more)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and err == "", p.returncode, err)
+    wanted, got = ([{**s, "time": 0} for s in t.strokes(name)] for name in (paint, made))
+    check(got == wanted, "the replay of", path, "differs:", wanted, got)
+
+
 def test_lifted_pen(t):
     """A device whose pen is lifted touches, and does not paint."""
     paint = t.at("lifted.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--record", t.at("lifted.path"))
     device = Device(p)
     device.draw(p, 0.8, kind=4)
     device.send((0, 0, 0), kind=3)
     out, err = p.communicate(timeout=60)
     check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
+    replay(t, paint, t.at("lifted.path"))
 
 
 def test_stylus(t):
     """The pressure of a stylus sets the size and the opacity of points. Without pressure, nothing is painted."""
     paint = t.at("stylus.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--colour", "0000ffff", "--fade", "0.5")
+    more = ("--colour", "0000ffff", "--fade", "0.5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--record", t.at("stylus.path"), *more)
     device = Device(p)
     device.begin((0.1, 0.5, 1.2))
     for i in range(60):
@@ -220,6 +233,7 @@ def test_stylus(t):
     check([s[0] for s in strokes] == ["#0000ff9f", "#0000ffbf"], strokes)  # 10 and 12 sixteenths
     check(strokes[0][1] == {16384} and min(strokes[1][1]) >= 16384 and max(strokes[1][1]) == 32768, strokes)
     check(strokes[1][2] < 0.52, "paint without pressure", strokes)
+    replay(t, paint, t.at("stylus.path"), *more)
 
 
 def test_unplugged(t):
@@ -402,14 +416,14 @@ def test_view(t):
     check(json.loads(out)["paint"]["strokes"] == 2, "the pen was not lifted", out)
 
 
-def main(ebpo, generate):
+def main(ebpo, generate, faults=None):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
         subprocess.run([generate, "--faces", "65536", t.at("rough.ply")], check=True, stdout=subprocess.DEVNULL)
         test_replay(t)
         test_gap(t)
         test_erase(t)
-        test_kill(t)
+        test_kill(t, faults)
         test_second_writer(t)
         test_lifted_pen(t)
         test_stylus(t)

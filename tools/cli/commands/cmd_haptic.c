@@ -445,13 +445,14 @@ static ebpo_status play_live(job *j, haptic_play *all, ebpo_error *error)
     return played ? EBPO_OK : no_memory(error, "the times of steps");
 }
 
-static ebpo_status play_device(job *j, ebpo_error *error)
+static ebpo_status play_device(job *j, const haptic_pose *first, ebpo_error *error)
 {
     const values *v = j->v;
     haptic_play all = { .rate = v->rate,
                         .seconds = v->seconds,
                         .haptic = j->haptic,
                         .device = &j->device,
+                        .first = *first,
                         .kind = j->kind,
                         .range = model_diagonal(ebpo_file_info(j->file)) / 20,
                         .points = j->points };
@@ -470,11 +471,11 @@ static ebpo_status play_device(job *j, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Writes the recorded positions in the format that --path reads. Each number has enough digits to
+/* Writes the recorded poses in the format that --path reads. Each number has enough digits to
  * restore all its bits. */
 static ebpo_status write_record(const job *j, ebpo_error *error)
 {
-    enum { LINE = 7 * (NUMBER_CAPACITY + 1) }; /* maximum length of a line: 7 numbers */
+    enum { LINE = 8 * (NUMBER_CAPACITY + 1) }; /* maximum length of a line: 8 numbers */
     char *text = malloc(j->times.step_count * LINE + 1), *at = text;
     if (!text)
         return no_memory(error, "the text of the record");
@@ -482,8 +483,13 @@ static ebpo_status write_record(const job *j, ebpo_error *error)
         const haptic_pose *p = &j->record[i];
         for (int k = 0; k < 7; k++) {
             at = number_write(at, k < 3 ? p->position[k] : p->rotation[k - 3]);
-            *at++ = k < 6 ? ' ' : '\n';
+            *at++ = ' ';
         }
+        if (p->lifted || p->pressure > 0)
+            at = number_write(at, p->lifted ? 0 : p->pressure);
+        else
+            at--; /* the force sets the pressure */
+        *at++ = '\n';
     }
     ebpo_status status = ebpo_write_file(j->v->record, text, (size_t)(at - text), error);
     free(text);
@@ -510,7 +516,7 @@ static int run_job(job *j, uint64_t memory)
     if (status == EBPO_OK)
         status = make_haptic(j, start.position, &error);
     if (status == EBPO_OK)
-        status = play_device(j, &error);
+        status = play_device(j, &start, &error);
     if (status == EBPO_OK && j->v->record)
         status = write_record(j, &error);
     if (status != EBPO_OK)

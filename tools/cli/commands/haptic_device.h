@@ -46,13 +46,14 @@ typedef struct haptic_device {
     uint64_t step_count;
 } haptic_device;
 
-/* haptic_path.c: reads a line 'x y z' or 'x y z qx qy qz qw' of `length` bytes, which ends with a
- * zero byte. Returns the number of numbers, 3 or 7; 0: an empty line or a comment; -1: other
- * text, such as numbers that are not finite. */
+/* haptic_path.c: reads a line 'x y z', 'x y z qx qy qz qw' or 'x y z qx qy qz qw pressure' of
+ * `length` bytes, which ends with a zero byte. Pressure 0: the pen is lifted. Returns the number of
+ * numbers, 3, 7 or 8; 0: an empty line or a comment; -1: other text, such as numbers that are not
+ * finite. */
 int haptic_pose_read(const char *line, size_t length, haptic_pose *out);
 
-/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
- * false after an error, reported on stderr. Call `end` in any case. */
+/* haptic_path.c: opens a file of such lines; '-': standard input. Returns false after an error,
+ * reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
 /* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT',

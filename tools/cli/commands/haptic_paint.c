@@ -1,9 +1,12 @@
 /* Two paints are in memory. The pen paints into `drawn`. `saved` belongs to the file. A thread
  * copies new strokes from `drawn` to `saved` under a lock, and then saves `saved` without the lock,
- * so that a slow disk does not delay the pen. Strokes that were copied before are equal in both,
- * except that the last stroke may be longer in `drawn`. */
+ * so that saving does not delay the pen. Strokes that were copied before are equal in both, except
+ * that the last stroke may be longer in `drawn`. A save does not wait for the disk: a second thread
+ * syncs the file, so that a slow disk does not delay the next save. */
 #include "cli/commands/haptic_paint.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <math.h>
 #include <pthread.h>
@@ -23,7 +26,7 @@
 /* Size of a point with the radius of the stroke. */
 enum { FULL_SIZE = 1 << 15 };
 
-/* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
+/* A killed process loses the paint of at most SAVE_NS, plus the time of a save without the disk. */
 enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
 
 /* Maximum number of steps that are painted while the lock is held. */
@@ -96,7 +99,8 @@ struct haptic_paint {
     uint64_t strokes_before, points_before; /* numbers of strokes and points in the opened file */
     ebpo_error save_error;                  /* of the last save */
     haptic_painted result;
-    pthread_t saver;
+    pthread_t saver, syncer;
+    atomic_bool unsynced; /* the file was saved, and not synced since then */
     atomic_bool ended;
 };
 
@@ -167,6 +171,7 @@ static ebpo_status save_paint(haptic_paint *p)
         status = ebpo_paint_checkpoint(p->saved, &error);
     if (status == EBPO_OK) {
         p->saved_changes = p->copied_changes;
+        atomic_store(&p->unsynced, true);
         p->result.saves++;
         p->result.save_seconds_max =
             fmax(p->result.save_seconds_max, 1e-9 * (double)(tool_clock() - begin));
@@ -194,6 +199,50 @@ static void *save_often(void *user)
             due = tool_clock() + SAVE_NS;
             (void)save_paint(p);
         }
+    }
+    return NULL;
+}
+
+/* Syncs a file or a folder. Returns false, with errno, on failure. */
+static bool sync_path(const char *path)
+{
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    bool synced =
+        fd >= 0 && (fsync(fd) == 0 || errno == EINVAL); /* a folder that cannot be synced */
+    int saved = errno;
+    if (fd >= 0)
+        close(fd);
+    errno = saved;
+    return synced;
+}
+
+/* Syncs the paint file and its folder if the file was saved since the last call. */
+static ebpo_status sync_paint(haptic_paint *p, ebpo_error *error)
+{
+    char folder[PATH_MAX] = ".";
+    const char *slash = strrchr(p->pen.path, '/');
+    if (!atomic_exchange(&p->unsynced, false))
+        return EBPO_OK;
+    if (slash)
+        snprintf(folder, sizeof folder, "%.*s", (int)(slash - p->pen.path) + 1, p->pen.path);
+    if (sync_path(p->pen.path) && sync_path(folder))
+        return EBPO_OK;
+    *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
+    snprintf(error->message, sizeof error->message, "%.200s: could not be synced to the disk: %s",
+             p->pen.path, strerror(errno));
+    return EBPO_E_IO;
+}
+
+static void *sync_often(void *user)
+{
+    haptic_paint *p = user;
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (bool failed = false; !atomic_load(&p->ended);) {
+        tool_wait_until(tool_clock() + POLL_NS);
+        if (sync_paint(p, &error) == EBPO_OK || failed)
+            continue;
+        failed = true;
+        fprintf(stderr, "ebpo haptic: %s; the device continues\n", error.message);
     }
     return NULL;
 }
@@ -773,6 +822,7 @@ static ebpo_status open_paints(haptic_paint *p, const ebpo_file *file, ebpo_erro
         status = choose_layer(p, error);
     if (status == EBPO_OK)
         status = ebpo_paint_checkpoint(p->saved, error);
+    atomic_store(&p->unsynced, status == EBPO_OK);
     return status == EBPO_OK ? ebpo_paint_open(p->pen.path, &p->drawn, error) : status;
 }
 
@@ -819,7 +869,11 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     }
     p->copied = p->finished = p->strokes_before = info_of(p->drawn).stroke_count;
     p->points_before = info_of(p->drawn).point_count;
-    if (command_thread(&p->saver, save_often, p) != 0) {
+    bool saves = command_thread(&p->saver, save_often, p) == 0;
+    if (!saves || command_thread(&p->syncer, sync_often, p) != 0) {
+        atomic_store(&p->ended, true);
+        if (saves)
+            pthread_join(p->saver, NULL);
         free_paint(p);
         return fail_memory(error);
     }
@@ -858,10 +912,13 @@ ebpo_status haptic_paint_close(haptic_paint *p, haptic_painted *out, ebpo_error 
         return EBPO_OK;
     atomic_store(&p->ended, true);
     pthread_join(p->saver, NULL);
+    pthread_join(p->syncer, NULL);
     lock_paint(p);
     lift_pen(p);
     unlock_paint(p);
     ebpo_status status = save_paint(p);
+    if (status == EBPO_OK)
+        status = sync_paint(p, &p->save_error);
     const ebpo_error *last = status != EBPO_OK ? &p->save_error : &p->error;
     if (last->status != EBPO_OK)
         *error = *last;

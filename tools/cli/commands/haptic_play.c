@@ -183,6 +183,8 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
         return true;
     if (!p->device->read(p->device->self, i, &pose))
         return false;
+    if (i == 0) /* a replay of the recording begins there, too */
+        pose = p->first;
     if (p->record)
         p->record[i] = pose;
     switch (p->kind) {

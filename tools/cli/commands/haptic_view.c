@@ -168,7 +168,7 @@ static int take_pose(haptic_view *view, const char *text, size_t length)
     if ((!hovers && strncmp(text, words[0], 6) != 0) ||
         haptic_pose_read(text + 6, length - 6, &pose) < 3)
         return HTTP_BAD_REQUEST;
-    pose.lifted = hovers;
+    pose.lifted |= hovers;
     pthread_mutex_lock(&view->pose_lock);
     view->pose = pose;
     view->has_pose = true;
