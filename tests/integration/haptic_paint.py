@@ -128,15 +128,22 @@ def test_replay(t):
     check(all(abs(p["place"][1] - 0.7) < 1e-9 for p in second["points"]), "paint between two contacts")
 
 
+def boxes(t, name, *corners):
+    """Makes a model of boxes, each of two corners. Returns its name."""
+    header, rows = CUBE.split("end_header\n")
+    rows, count, model = rows.splitlines(), len(corners), t.at(name + ".ebpo.h5")
+    with open(t.at(name + ".ply"), "w", encoding="ascii") as out:
+        out.write(header.replace("vertex 8", f"vertex {8 * count}").replace("face 12", f"face {12 * count}") + "end_header\n")
+        out.writelines(" ".join(str(ends[int(one)][k]) for k, one in enumerate(row.split())) + "\n" for ends in corners for row in rows[:8])
+        out.writelines(f"3 {' '.join(str(int(i) + 8 * n) for i in f.split()[1:])}\n" for n in range(count) for f in rows[8:])
+    t.run("convert", "-q", t.at(name + ".ply"), model)
+    return model
+
+
 def test_gap(t):
     """A pen that crosses a gap in less than the time of a lift paints on both sides, and not through the air."""
-    path, paint, faces = t.at("gap"), t.at("gap.paint.h5"), CUBE.split("end_header\n")[1].splitlines()
-    with open(t.at("two.ply"), "w", encoding="ascii") as out:
-        out.write(CUBE.split("end_header")[0].replace("vertex 8", "vertex 16").replace("face 12", "face 24") + "end_header\n")
-        out.writelines(f"{x + 1.3 * far:g} {y} {z}\n" for far in (0, 1) for x, y, z in (map(int, v.split()) for v in faces[:8]))
-        out.writelines(f"3 {' '.join(str(int(i) + 8 * far) for i in f.split()[1:])}\n" for far in (0, 1) for f in faces[8:])
-    model = t.at("two.ebpo.h5")
-    t.run("convert", "-q", t.at("two.ply"), model)
+    path, paint = t.at("gap"), t.at("gap.paint.h5")
+    model = boxes(t, "two", ((0, 0, 0), (1, 1, 1)), ((1.3, 0, 0), (2.3, 1, 1)))
     line(path, [(1.1 - 0.11 * min(1, i / 100), 0.2, 0.5) for i in range(150)] +
          [(0.99 + 0.32 * i / 20, 0.2 + 0.6 * i / 20, 0.5) for i in range(20)] + [(1.31, 0.8, 0.5)] * 150)
     t.run("haptic", "--path", path, "--paint", paint, "--pen-radius", str(RADIUS), model)
@@ -278,16 +285,35 @@ def test_brush(t):
         check(abs(low + wide) < 0.015 and abs(high - wide) < 0.015, low, high, wide)
 
 
+def ball(t, count):
+    """Writes points of a ball of radius 0.1. Returns the name of the file."""
+    name, heights = t.at(f"ball-{count}.txt"), [1 - (2 * i + 1) / count for i in range(count)]
+    line(name, [(0.1 * math.cos(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * math.sin(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * z)
+                for i, z in enumerate(heights)])
+    return name
+
+
+def test_corner(t):
+    """A brush in a corner paints on both sides, each as far as the motion to the device would press it in."""
+    path, paint = t.at("corner.path"), t.at("corner.paint.h5")
+    model = boxes(t, "corner", ((0, 0, 0), (2, 1, 1)), ((1.5, 0, 1.0001), (2, 1, 2)))
+    ends = [(1.41 - 0.1 * i / 200, 0.5, 1.08 + 0.2 * i / 200) for i in range(200, 0, -1)]
+    line(path, ends + [(1.41, 0.5, 1.08)] * 100)
+    t.run("haptic", "--path", path, "--tool", ball(t, 4000), "--paint", paint, "--pen-radius", "0.01", "--full-force", "9", model)
+    print_ = [q["place"] for s in json.loads(t.run("paint", "--json", "--points", paint, model))["strokes"] for q in s["points"]][-64:]
+    for k, plane, centre, deep in ((2, 1, 1.4, 0.02), (0, 1.5, 1.1, 0.01)):  # the floor and the wall
+        far = [math.hypot(q[2 - k] - centre, q[1] - 0.5) for q in print_ if abs(q[k] - plane) < 1e-9]
+        wide = math.sqrt(0.1 ** 2 - (0.1 - deep) ** 2)
+        check(len(far) > 10 and wide - 0.015 < max(far) < wide + 0.003, k, far, wide)
+
+
 def test_rough_surface(t):
     """A ball of 500 points follows the device over a rough surface: its points do not jam where they touch two faces."""
     t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
-    ball, path, paint = t.at("ball.txt"), t.at("rough.path"), t.at("rough.paint.h5")
-    heights = [1 - (2 * i + 1) / 500 for i in range(500)]
-    line(ball, [(0.1 * math.cos(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * math.sin(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * z)
-                for i, z in enumerate(heights)])
+    path, paint = t.at("rough.path"), t.at("rough.paint.h5")
     moves = [(1.2 * i / 4000 - 0.6, 1.4 - i / 900 if i < 600 else 0.7334, 0.2 * math.sin(15 * i / 4000)) for i in range(4000)]
     line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
-    t.run("haptic", "--tool", ball, "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
+    t.run("haptic", "--tool", ball(t, 500), "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
     strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
     angles = [math.atan2(q["place"][0], q["place"][2]) for s in strokes for q in s["points"]]
     for k in range(5):
@@ -429,6 +455,7 @@ def main(ebpo, generate, faults=None):
         test_stylus(t)
         test_unplugged(t)
         test_brush(t)
+        test_corner(t)
         test_probe(t)
         test_rough_surface(t)
         test_saved_elsewhere(t)

@@ -77,6 +77,7 @@ struct haptic_paint {
     ebpo_paint_point *prints; /* [print_count], at most PRINT_POINTS: the brush's last stroke */
     uint64_t print_count;
     uint64_t prints_time; /* time of that stroke */
+    haptic_brush *brush;  /* NULL: not a brush */
     double arm;           /* of a brush: distance of its farthest point from its origin */
     ebpo_error error;     /* first error of painting */
     pthread_mutex_t turn; /* held while a thread waits for the lock */
@@ -426,21 +427,19 @@ static ebpo_status take_print(haptic_paint *p, const haptic_sample *sample, doub
                               ebpo_error *error)
 {
     double place[HAPTIC_BRUSH_MAX][3], least = p->pen.pen.size_least;
+    int count;
     /* the proxy keeps the skin from the surface */
     double near = fmax(0x1p-12 * p->pen.diagonal, 2 * p->pen.skin);
-    int count = haptic_brush_pressed(p->pen.points, p->pen.point_count, sample, near, place);
-    for (int i = 0; i < count; i++) {
+    ebpo_status status =
+        haptic_brush_press(p->brush, p->context, sample, near, place, &count, error);
+    for (int i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_paint_point *q = &p->prints[p->print_count];
-        ebpo_status status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
-        if (status != EBPO_OK)
-            return status;
-        double off = hypot(hypot(q->place[0] - place[i][0], q->place[1] - place[i][1]),
-                           q->place[2] - place[i][2]);
+        status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
         q->size = (uint16_t)(FULL_SIZE * (least + pressure * (1 - least)));
         q->pressure = (uint16_t)(pressure * UINT16_MAX);
-        p->print_count += off <= sample->depth + near; /* the surface is there */
+        p->print_count += status == EBPO_OK;
     }
-    return EBPO_OK;
+    return status;
 }
 
 /* Makes `prints` the last stroke, in place of a shorter one. The caller has the lock. */
@@ -836,6 +835,7 @@ static void free_paint(haptic_paint *p)
     pthread_mutex_destroy(&p->turn);
     free(p->contact);
     free(p->prints);
+    haptic_brush_free(p->brush);
     free(p);
 }
 
@@ -856,9 +856,11 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
             fmax(p->arm, hypot(hypot(pen->points[i][0], pen->points[i][1]), pen->points[i][2]));
     p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
     p->print_time = -INFINITY;
-    if (pen->point_count > 0)
+    if (pen->point_count > 0) {
         p->prints = calloc(PRINT_POINTS, sizeof *p->prints);
-    ebpo_status status = pen->point_count > 0 && !p->prints
+        p->brush = haptic_brush_new(pen->points, pen->point_count);
+    }
+    ebpo_status status = pen->point_count > 0 && (!p->prints || !p->brush)
                              ? fail_memory(error)
                              : ebpo_context_new(model, &p->context, error);
     if (status == EBPO_OK)

@@ -167,6 +167,7 @@ static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
     memcpy(sample.device, pose->position, sizeof sample.device);
     memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);
     memcpy(sample.rotation, a->proxy.rotation, sizeof sample.rotation);
+    memcpy(sample.device_rotation, pose->rotation, sizeof sample.device_rotation);
     memcpy(sample.normal, a->normal, sizeof sample.normal);
     memcpy(sample.force, a->force, sizeof sample.force);
     memcpy(sample.touch, a->touch, sizeof sample.touch);
