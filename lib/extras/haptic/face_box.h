@@ -9,6 +9,8 @@
 
 #include <ebpo/query.h>
 
+#include "extras/collide/posed_solid.h"
+
 /* Number of faces of a leaf of the tree. */
 enum { EBPO_FACE_BOX_LEAF = 8 };
 
@@ -33,8 +35,9 @@ typedef struct ebpo_face_box {
                           * extent are loaded */
     uint64_t count, capacity; /* number of loaded faces; greatest possible number */
     uint64_t leaves;          /* number of leaves of the tree: a power of two */
-    double (*corner)[3][3];   /* [capacity] */
+    double (*corner)[3][3];   /* [capacity] in the world: posed coordinates */
     uint64_t *face;           /* [capacity] face indices for the caller (ebpo_triangles.faces) */
+    uint32_t *instance;       /* [capacity] index of the instance that has the face */
     ebpo_extent *node;        /* [2 leaves] the root is node 1, the children of node n are 2
                                * n and 2 n + 1 */
 } ebpo_face_box;
@@ -47,11 +50,16 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity);
 /* Returns the number of leaves of a tree over `count` faces. */
 uint64_t ebpo_face_box_leaves(uint64_t count);
 
-/* Loads the faces within `margin` of the box `allowed`. *fits is false if the box has too little
- * memory for these faces. */
-EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
-                                             const ebpo_extent *allowed, double margin, bool *fits,
-                                             ebpo_error *error);
+/* Empties a box, whose faces will be those within `margin` of the box `allowed`. */
+void ebpo_face_box_begin(ebpo_face_box *box, const ebpo_extent *allowed, double margin);
+/* Adds the faces of an instance of the context's model. posed: its pose; NULL: the coordinates of
+ * the model are those of the world. *fits is false if the box has too little memory for these
+ * faces. */
+EBPO_MUST_USE ebpo_status ebpo_face_box_add(ebpo_face_box *box, ebpo_context *context,
+                                            const ebpo_posed_solid *posed, uint32_t instance,
+                                            bool *fits, ebpo_error *error);
+/* Makes the tree over the faces of all instances. */
+void ebpo_face_box_end(ebpo_face_box *box);
 
 /* Finds the faces whose boxes intersect `around`, and writes their indices in box->corner to
  * found[most]. Sets *count to their number. Reduces *visits by the number of visited nodes. Returns
@@ -119,9 +127,10 @@ void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node);
 /* Removes and returns item[0], the node with the least key. */
 ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue);
 
-/* A point whose winding number is known. When the point moves, the winding number changes at each
- * face that it crosses, by exact arithmetic. */
+/* A point whose winding number in an instance is known. When the point moves, the winding number
+ * changes at each face of the instance that it crosses, by exact arithmetic. */
 typedef struct ebpo_known_winding {
+    uint32_t instance;
     double at[3];    /* the point; it is on no face */
     int32_t winding; /* winding number at the point */
     bool known;      /* false: there is no such point, and `at` and `winding` are not valid */
@@ -136,9 +145,9 @@ bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box
                              const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
                              uint64_t *work);
 
-/* Returns true if the point is on a face, or if this cannot be decided with at most `most` faces
- * and `visits` nodes and without allocating memory. found[most] is workspace. */
-bool ebpo_is_on_face(const ebpo_face_box *box, const double place[3], uint32_t *found,
-                     uint32_t most, uint32_t visits);
+/* Returns true if the point is on a face of the instance, or if this cannot be decided with at most
+ * `most` faces and `visits` nodes and without allocating memory. found[most] is workspace. */
+bool ebpo_is_on_face(const ebpo_face_box *box, uint32_t instance, const double place[3],
+                     uint32_t *found, uint32_t most, uint32_t visits);
 
 #endif

@@ -178,7 +178,8 @@ static void add_contact(const tool_piece *p, const ebpo_close_point *close, uint
     ebpo_tool_contact c = { .space = near->distance - p->skin,
                             .gap = near->distance,
                             .point = tool->number[close->point],
-                            .face = p->box->face[face] };
+                            .face = p->box->face[face],
+                            .instance = p->box->instance[face] };
     double lever[3];
     ebpo_rigid_lever((const double(*)[3])tool->end_matrix, tool->point[close->point], lever);
     ebpo_vec3_copy(near->away, c.normal);
@@ -457,6 +458,7 @@ static void report_contact(const ebpo_haptic *t, ebpo_haptic_tool_result *out)
         return;
     out->point = nearest->point;
     out->face = nearest->face;
+    out->instance = nearest->instance;
     ebpo_vec3_copy(nearest->normal, out->normal);
 }
 

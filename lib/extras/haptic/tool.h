@@ -81,6 +81,7 @@ typedef struct ebpo_tool_contact {
                            * must move away by -space */
     double gap;           /* distance of the point from the face */
     uint64_t point, face; /* indices for the caller */
+    uint32_t instance;    /* index of the face's instance */
     double normal[3];     /* unit vector from the face to the point */
 } ebpo_tool_contact;
 

@@ -63,9 +63,10 @@ bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
 /* haptic_spacenav.c: opens a 3D mouse, whose daemon spacenavd runs. The tool begins in front of the
- * model, `clearance` away. rate, clearance: as in haptic_builtin_open. Returns false after an
- * error, reported on stderr. */
-bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate, double clearance);
+ * box of the model or scene (low corner, size), `clearance` away. rate, clearance: as in
+ * haptic_builtin_open. Returns false after an error, reported on stderr. */
+bool haptic_spacenav_open(haptic_device *out, const double low[3], const double size[3],
+                          double rate, double clearance);
 
 /* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
  * out of it. rate: steps per second. clearance: radius of the tool. The path keeps this additional
