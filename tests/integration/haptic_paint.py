@@ -308,12 +308,12 @@ def test_corner(t):
 
 
 def test_rough_surface(t):
-    """A ball of 500 points follows the device over a rough surface: its points do not jam where they touch two faces."""
+    """A ball of 2,000 points follows the device over a rough surface: its points do not jam where they touch two faces."""
     t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
     path, paint = t.at("rough.path"), t.at("rough.paint.h5")
     moves = [(1.2 * i / 4000 - 0.6, 1.4 - i / 900 if i < 600 else 0.7334, 0.2 * math.sin(15 * i / 4000)) for i in range(4000)]
     line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
-    t.run("haptic", "--tool", ball(t, 500), "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
+    t.run("haptic", "--tool", ball(t, 2000), "--path", path, "--rate", "2000", "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
     strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
     angles = [math.atan2(q["place"][0], q["place"][2]) for s in strokes for q in s["points"]]
     for k in range(5):

@@ -335,7 +335,7 @@ static double exact(scene *s, const double place[3], int32_t *where)
         oracle_find_nearest(s->one[i], place, &own);
         if (own.on)
             *where = EBPO_ON;
-        else if (oracle_winding(s->one[i], place) > 0)
+        else if (oracle_winding(s->one[i], place) != 0) /* EBPO_RULE_NONZERO */
             *where = EBPO_IN;
     }
     return *where == EBPO_IN ? -near.distance : near.distance;
@@ -351,7 +351,8 @@ static bool judge_probe(scene *s, ebpo_haptic *haptic, const double place[3], ui
     in_step = false;
     double truth = exact(s, place, &where), rounding = 0x1p-36 * s->diagonal;
     ck_assert_msg(r.lo <= truth + rounding && truth <= r.hi + rounding,
-                  "%.17g is not from %.17g to %.17g", truth, r.lo, r.hi);
+                  "%.17g is not from %.17g to %.17g, where %d (%d), at %.17g %.17g %.17g, flags %u",
+                  truth, r.lo, r.hi, r.where, where, place[0], place[1], place[2], r.flags);
     ck_assert_msg(r.where == EBPO_MAYBE || r.where == where, "where %d, not %d", r.where, where);
     *sided += r.where != EBPO_MAYBE;
     if (!(r.flags & EBPO_HAPTIC_ACCURATE))

@@ -158,8 +158,10 @@ void ebpo_face_box_end(ebpo_face_box *box)
     }
 }
 
-void ebpo_face_box_begin(ebpo_face_box *box, const ebpo_extent *allowed, double margin)
+void ebpo_face_box_begin(ebpo_face_box *box, uint64_t serial, const ebpo_extent *allowed,
+                         double margin)
 {
+    box->serial = serial;
     box->count = 0;
     box->allowed = *allowed;
     for (int i = 0; i < 3; i++) {
@@ -240,9 +242,10 @@ static double min_square_of_leaf(const ebpo_face_box *box, uint64_t leaf, const 
     return least;
 }
 
-/* Returns a lower bound of the squared distance of `around` from the faces. */
+/* Returns a lower bound of the squared distance of `around` from the faces. *leaf: see
+ * ebpo_face_box_gap. */
 static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *around,
-                                  uint32_t max_visits, uint64_t *visits)
+                                  uint32_t max_visits, uint64_t *leaf, uint64_t *visits)
 {
     struct {
         uint64_t node;
@@ -252,6 +255,10 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
     double least = INFINITY;
     if (box->count == 0)
         return INFINITY;
+    if (*leaf < box->leaves) {
+        least = min_square_of_leaf(box, *leaf, around);
+        ++*visits;
+    }
     stack[depth].node = 1;
     stack[depth++].lower = box_square_distance(&box->node[1], around);
     for (uint32_t n = 0; depth > 0; n++) {
@@ -263,7 +270,11 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
         if (n >= max_visits) {
             least = lower;
         } else if (node >= box->leaves) {
-            least = fmin(least, min_square_of_leaf(box, node - box->leaves, around));
+            double square = min_square_of_leaf(box, node - box->leaves, around);
+            if (square < least) {
+                least = square;
+                *leaf = node - box->leaves;
+            }
         } else {
             double l = box_square_distance(&box->node[2 * node], around);
             double r = box_square_distance(&box->node[2 * node + 1], around);
@@ -279,9 +290,9 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
 }
 
 double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                         uint64_t *visits)
+                         uint64_t *leaf, uint64_t *visits)
 {
-    return sqrt(min_square_distance(box, around, max_visits, visits)) * (1 - 0x1p-48);
+    return sqrt(min_square_distance(box, around, max_visits, leaf, visits)) * (1 - 0x1p-48);
 }
 
 /* --- the nearest point of a face --- */
@@ -619,10 +630,10 @@ bool ebpo_is_on_face(const ebpo_face_box *box, uint32_t instance, const double p
     ebpo_extent around;
     uint32_t count;
     extent_of_segment(place, place, &around);
-    bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
+    (void)ebpo_face_box_find(box, &around, found, most, &visits, &count);
     for (uint32_t i = 0; i < count; i++)
         if (box->instance[found[i]] == instance &&
             ebpo_segment_may_intersect(place, place, (const double(*)[3])box->corner[found[i]]))
             return true;
-    return !all;
+    return false;
 }

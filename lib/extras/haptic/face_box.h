@@ -29,6 +29,7 @@ static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
 }
 
 typedef struct ebpo_face_box {
+    uint64_t serial;     /* differs for each filling of the boxes of an object; at least 1 */
     ebpo_extent allowed; /* allowed positions of the proxy: all faces that are not farther from one
                             of these positions than the margin are loaded */
     ebpo_extent loaded;  /* `allowed`, widened by the margin: all faces that intersect this
@@ -51,7 +52,8 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity);
 uint64_t ebpo_face_box_leaves(uint64_t count);
 
 /* Empties a box, whose faces will be those within `margin` of the box `allowed`. */
-void ebpo_face_box_begin(ebpo_face_box *box, const ebpo_extent *allowed, double margin);
+void ebpo_face_box_begin(ebpo_face_box *box, uint64_t serial, const ebpo_extent *allowed,
+                         double margin);
 /* Adds the faces of an instance of the context's model. posed: its pose; NULL: the coordinates of
  * the model are those of the world. *fits is false if the box has too little memory for these
  * faces. */
@@ -70,9 +72,10 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
 
 /* Returns a lower bound of the distance of `around` from the faces of the box. The bound is less
  * accurate if the search ends because of max_visits, the limit of visited nodes. Adds the number of
- * visited nodes to *visits. */
+ * visited nodes to *visits. *leaf: a leaf that may be near, at which the search begins; any value
+ * is valid. It is set to the nearest leaf that was visited. */
 double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                         uint64_t *visits);
+                         uint64_t *leaf, uint64_t *visits);
 
 /* --- distances of points and of moving balls from a face, in doubles --- */
 
@@ -145,8 +148,9 @@ bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box
                              const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
                              uint64_t *work);
 
-/* Returns true if the point is on a face of the instance, or if this cannot be decided with at most
- * `most` faces and `visits` nodes and without allocating memory. found[most] is workspace. */
+/* Returns true if the point is on a face of the instance, or if coordinates are so large or small
+ * that this cannot be decided without allocating memory. Returns false if it is on no face, or if
+ * more than `most` faces and `visits` nodes would have to be examined. found[most] is workspace. */
 bool ebpo_is_on_face(const ebpo_face_box *box, uint32_t instance, const double place[3],
                      uint32_t *found, uint32_t most, uint32_t visits);
 

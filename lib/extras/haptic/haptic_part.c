@@ -145,12 +145,12 @@ static bool extents_overlap(const ebpo_extent *a, const ebpo_extent *b)
     return true;
 }
 
-ebpo_status ebpo_haptic_parts_load(const ebpo_haptic *t, ebpo_face_box *box,
-                                   const ebpo_extent *allowed, bool *fits, ebpo_error *error)
+ebpo_status ebpo_haptic_parts_load(ebpo_haptic *t, ebpo_face_box *box, const ebpo_extent *allowed,
+                                   bool *fits, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     *fits = true;
-    ebpo_face_box_begin(box, allowed, t->margin);
+    ebpo_face_box_begin(box, ++t->serial, allowed, t->margin);
     for (uint64_t i = 0; i < t->part_count && status == EBPO_OK && *fits; i++) {
         const ebpo_haptic_part *part = &t->part[i];
         if (!part->is_posed || extents_overlap(&part->extent, &box->loaded))

@@ -114,6 +114,7 @@ struct ebpo_haptic {
 
     /* --- used by the loading thread --- */
     unsigned loader_box;    /* index of the box that the loading thread may write */
+    uint64_t serial;        /* of the newest box */
     unsigned loader_result; /* index in known[] of the result that the loading thread may write */
     double last_query[3];   /* position of the last query for a probe */
     ebpo_extent newest_allowed; /* `allowed` of the newest box */
@@ -145,7 +146,7 @@ double ebpo_haptic_part_gap(const ebpo_haptic_part *part, const double w[3]);
 
 /* haptic_part.c: loads the faces of all instances that are within t->margin of the box `allowed`.
  * *fits: as for ebpo_face_box_add. */
-EBPO_MUST_USE ebpo_status ebpo_haptic_parts_load(const ebpo_haptic *t, ebpo_face_box *box,
+EBPO_MUST_USE ebpo_status ebpo_haptic_parts_load(ebpo_haptic *t, ebpo_face_box *box,
                                                  const ebpo_extent *allowed, bool *fits,
                                                  ebpo_error *error);
 

@@ -150,7 +150,7 @@ static int32_t classify_in(ebpo_haptic *t, ebpo_haptic_part *part, const double 
                ebpo_is_on_face(box, part->probed_point.instance, place, t->found, EBPO_HAPTIC_FACES,
                                EBPO_HAPTIC_VISITS)) {
         return EBPO_ON;
-    } else if (!find_side(t, part, place, out)) {
+    } else if (!find_side(t, part, place, out)) { /* also fails if `place` is on a face */
         return EBPO_MAYBE;
     }
     return ebpo_rule_inside(part->of->model->info->rule, part->probed_point.winding) ? EBPO_IN
