@@ -95,9 +95,9 @@ static char *make_news(haptic_view *view, uint64_t *taken, haptic_paint_cursor *
     FILE *f = open_memstream(&text, &size);
     if (!f)
         return NULL;
+    write_step(view, taken, f); /* the page learns of a contact before its first paint */
     if (view->options.paint)
         haptic_paint_write_news(view->options.paint, cursor, f);
-    write_step(view, taken, f);
     if (fclose(f) == 0)
         return text;
     free(text);
