@@ -301,9 +301,10 @@ def test_corner(t):
     ends = [(1.41 - 0.1 * i / 200, 0.5, 1.08 + 0.2 * i / 200) for i in range(200, 0, -1)]
     line(path, ends + [(1.41, 0.5, 1.08)] * 100)
     t.run("haptic", "--path", path, "--tool", ball(t, 4000), "--paint", paint, "--pen-radius", "0.01", "--full-force", "9", model)
-    print_ = [q["place"] for s in json.loads(t.run("paint", "--json", "--points", paint, model))["strokes"] for q in s["points"]][-64:]
+    strokes = json.loads(t.run("paint", "--json", "--points", paint, model))["strokes"]
+    last = [q["place"] for s in strokes for q in s["points"]][-64:]
     for k, plane, centre, deep in ((2, 1, 1.4, 0.02), (0, 1.5, 1.1, 0.01)):  # the floor and the wall
-        far = [math.hypot(q[2 - k] - centre, q[1] - 0.5) for q in print_ if abs(q[k] - plane) < 1e-9]
+        far = [math.hypot(q[2 - k] - centre, q[1] - 0.5) for q in last if abs(q[k] - plane) < 1e-9]
         wide = math.sqrt(0.1 ** 2 - (0.1 - deep) ** 2)
         check(len(far) > 10 and wide - 0.015 < max(far) < wide + 0.003, k, far, wide)
 
@@ -314,7 +315,8 @@ def test_rough_surface(t):
     path, paint = t.at("rough.path"), t.at("rough.paint.h5")
     moves = [(1.2 * i / 4000 - 0.6, 1.4 - i / 900 if i < 600 else 0.7334, 0.2 * math.sin(15 * i / 4000)) for i in range(4000)]
     line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
-    t.run("haptic", "--tool", ball(t, 2000), "--path", path, "--rate", "4000", "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
+    t.run("haptic", "--tool", ball(t, 2000), "--path", path, "--rate", "4000", "--faces", "131072", "--paint", paint,
+          "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
     strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
     angles = [math.atan2(q["place"][0], q["place"][2]) for s in strokes for q in s["points"]]
     for k in range(5):
