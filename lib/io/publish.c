@@ -274,8 +274,9 @@ static bool sync_folder(const char *path)
     return fd >= 0 && sync_and_close(fd);
 }
 
-/* Closes the temporary file, sets its mode, and syncs it. For this, opens the file again by its
- * name, because a library may have written the file through another descriptor. */
+/* Closes the temporary file, sets its mode, and syncs it, unless it is `unsynced`. For this, opens
+ * the file again by its name, because a library may have written the file through another
+ * descriptor. */
 static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
 {
     errno = 0;
@@ -290,7 +291,7 @@ static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
         return ebpo_fail_errno(error, publish->shown,
                                "the new file could not get the mode of the replaced file");
     }
-    if (fd < 0 || !sync_and_close(fd))
+    if (fd < 0 || !(publish->unsynced ? close(fd) == 0 : sync_and_close(fd)))
         return ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
     return EBPO_OK;
 }
@@ -344,7 +345,7 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     if (status == EBPO_OK)
         status = put_in_place(publish, error);
     ebpo_file_lock_release(&lock);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && !publish->unsynced)
         status = sync_name(publish, error);
     ebpo_publish_abort(publish);
     return status;

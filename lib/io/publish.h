@@ -45,12 +45,13 @@ typedef struct ebpo_publish {
     int mode;        /* mode of the target when ebpo_publish_begin was called; -1: no such file */
     bool expects;    /* true: the target must still have the version `expected` at the commit */
     bool locked;     /* true: the caller holds the target's lock (file_lock.h) */
+    bool unsynced;   /* true: the commit does not wait for the disk */
     ebpo_file_version expected;
 } ebpo_publish;
 
-#define EBPO_PUBLISH_INIT                                                       \
-    {                                                                           \
-        NULL, NULL, NULL, NULL, NULL, NULL, -1, -1, -1, false, false, { false } \
+#define EBPO_PUBLISH_INIT                                                              \
+    {                                                                                  \
+        NULL, NULL, NULL, NULL, NULL, NULL, -1, -1, -1, false, false, false, { false } \
     }
 
 /* Creates the temporary file. The commit replaces an existing regular file at `path`. The new file

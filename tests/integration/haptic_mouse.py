@@ -32,7 +32,7 @@ def play(ebpo, folder, send, paint, *more):
     daemon.settimeout(20)
     connection = daemon.accept()[0]
     while not os.path.exists(paint):  # made before the first step
-        time.sleep(0.1)
+        time.sleep(0.02)
     time.sleep(0.2)
     send(connection)
     out, err = p.communicate(timeout=60)
@@ -43,7 +43,7 @@ def play(ebpo, folder, send, paint, *more):
         return json.loads(out), [[float(x) for x in line.split()] for line in lines]
 
 
-def push(connection):
+def push(connection, still=1.5):
     """Press down on the front of the cube, in events whose bytes arrive in pieces, turn, then hold the cap still."""
     for i in range(100):
         event = motion(z=350)
@@ -55,7 +55,7 @@ def push(connection):
         connection.sendall(motion(ry=-350))
         time.sleep(0.01)
     connection.sendall(motion(x=2 ** 31 - 1))  # the fastest motion is 350
-    time.sleep(1.5)  # the daemon sends changes only
+    time.sleep(still)  # the daemon sends changes only
     connection.sendall(motion())
     connection.close()
 
@@ -66,7 +66,7 @@ def main(ebpo):
         with open(ply, "w", encoding="ascii") as out:
             out.write(CUBE)
         subprocess.run([ebpo, "convert", "-q", ply, os.path.join(folder, "cube.ebpo.h5")], check=True)
-        got, poses = play(ebpo, folder, push, "p.paint.h5", "--seconds", "20")
+        got, poses = play(ebpo, folder, push, "p.paint.h5", "--seconds", "10")
         first, last = poses[0], poses[-1]
         assert first[:2] == last[1:2] * 2 and 1 < first[2] < 1.2 and first[3:] == [0, 0, 0, 1], first
         assert got["contacts"] > 100 and got["paint"]["strokes"] == 1 and last[2] < 0.9, (got, last)
@@ -76,9 +76,9 @@ def main(ebpo):
 
         def lift(connection):  # a button lifts the pen
             connection.sendall(EVENT.pack(1, 0, 1, 0, 0, 0, 0, 0) + EVENT.pack(2, 0, 0, 0, 0, 0, 0, 0))
-            push(connection)
+            push(connection, 0.1)
 
-        got, poses = play(ebpo, folder, lift, "q.paint.h5", "--seconds", "20")
+        got, poses = play(ebpo, folder, lift, "q.paint.h5", "--seconds", "10")
         assert got["contacts"] > 100 and got["paint"]["strokes"] == 0, got["paint"]
         none = os.path.join(folder, "none.paint.h5")  # not made without a daemon
         p = subprocess.run([ebpo, "haptic", "--device", "spacenav", "--paint", none, "--pen-radius", "0.02",

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 sys.dont_write_bytecode = True
 from haptic_udp import CUBE, PLACE
@@ -79,7 +80,7 @@ class Device:
         check(False, "the loop did not reply")
 
     def draw(self, process, seconds, step=None, kind=1):
-        """Presses on the top of the cube and moves along x for some time. Returns [(time, x)]."""
+        """Presses on the top of the cube and moves along x for some time, or until step(time) is true. Returns [(time, x)]."""
         begin, sent, down = time.monotonic(), [], None
         self.send((0.1, 0.5, 1.2))
         while (now := time.monotonic() - begin) < seconds and process.poll() is None:
@@ -89,8 +90,8 @@ class Device:
             x = 0.1 + (now - down) * 0.1 if down is not None else 0.1
             self.send((x, 0.5, z), kind)
             sent.append((time.monotonic(), x))
-            if step:
-                step(now)
+            if step and step(now):
+                break
             time.sleep(0.002)
         return sent
 
@@ -128,15 +129,22 @@ def test_replay(t):
     check(all(abs(p["place"][1] - 0.7) < 1e-9 for p in second["points"]), "paint between two contacts")
 
 
+def boxes(t, name, *corners):
+    """Makes a model of boxes, each of two corners. Returns its name."""
+    header, rows = CUBE.split("end_header\n")
+    rows, count, model = rows.splitlines(), len(corners), t.at(name + ".ebpo.h5")
+    with open(t.at(name + ".ply"), "w", encoding="ascii") as out:
+        out.write(header.replace("vertex 8", f"vertex {8 * count}").replace("face 12", f"face {12 * count}") + "end_header\n")
+        out.writelines(" ".join(str(ends[int(one)][k]) for k, one in enumerate(row.split())) + "\n" for ends in corners for row in rows[:8])
+        out.writelines(f"3 {' '.join(str(int(i) + 8 * n) for i in f.split()[1:])}\n" for n in range(count) for f in rows[8:])
+    t.run("convert", "-q", t.at(name + ".ply"), model)
+    return model
+
+
 def test_gap(t):
     """A pen that crosses a gap in less than the time of a lift paints on both sides, and not through the air."""
-    path, paint, faces = t.at("gap"), t.at("gap.paint.h5"), CUBE.split("end_header\n")[1].splitlines()
-    with open(t.at("two.ply"), "w", encoding="ascii") as out:
-        out.write(CUBE.split("end_header")[0].replace("vertex 8", "vertex 16").replace("face 12", "face 24") + "end_header\n")
-        out.writelines(f"{x + 1.3 * far:g} {y} {z}\n" for far in (0, 1) for x, y, z in (map(int, v.split()) for v in faces[:8]))
-        out.writelines(f"3 {' '.join(str(int(i) + 8 * far) for i in f.split()[1:])}\n" for far in (0, 1) for f in faces[8:])
-    model = t.at("two.ebpo.h5")
-    t.run("convert", "-q", t.at("two.ply"), model)
+    path, paint = t.at("gap"), t.at("gap.paint.h5")
+    model = boxes(t, "two", ((0, 0, 0), (1, 1, 1)), ((1.3, 0, 0), (2.3, 1, 1)))
     line(path, [(1.1 - 0.11 * min(1, i / 100), 0.2, 0.5) for i in range(150)] +
          [(0.99 + 0.32 * i / 20, 0.2 + 0.6 * i / 20, 0.5) for i in range(20)] + [(1.31, 0.8, 0.5)] * 150)
     t.run("haptic", "--path", path, "--paint", paint, "--pen-radius", str(RADIUS), model)
@@ -156,33 +164,34 @@ def test_erase(t):
     check(kinds == ["paints"] * 2 + ["erases"] * 2, kinds)
 
 
-def test_kill(t):
-    """After a kill, the file contains everything that was touched up to a second before."""
-    for seconds in (1.7, 2.6):
-        paint = t.at(f"killed-{seconds}.paint.h5")
-        p = t.start(paint, "--device", "udp:0", "--seconds", "9")
-        sent = Device(p).draw(p, seconds)
-        p.kill()
-        killed = time.monotonic()
-        p.wait()
-        reached = max((q["place"][0] for s in t.strokes(paint) for q in s["points"]), default=0)
-        wanted = max(x for when, x in sent if when < killed - 1)
-        check(reached >= wanted - RADIUS and wanted > 0.1, f"painted to {reached}, the pen was at {wanted}")
+def test_kill(t, faults):
+    """After a kill, the file contains everything that was touched up to a second before, also if the disk is slow."""
+    paint = t.at("killed.paint.h5")
+    environment = {**os.environ, "LD_PRELOAD": faults, "EBPO_TEST_SLOW_DISK": "1"} if faults else None
+    p = t.start(paint, "--device", "udp:0", "--seconds", "5", env=environment)
+    sent = Device(p).draw(p, 2.1)
+    p.kill()
+    killed = time.monotonic()
+    p.wait()
+    reached = max((q["place"][0] for s in t.strokes(paint) for q in s["points"]), default=0)
+    wanted = max(x for when, x in sent if when < killed - 1)
+    check(reached >= wanted - RADIUS and wanted > 0.1, f"painted to {reached}, the pen was at {wanted}")
 
 
 def test_second_writer(t):
     """Other programs can read the file, but not paint in it; the first one continues. SIGINT ends with all saved."""
     paint = t.at("one.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "5")
     device, second = Device(p), []
 
     def begin_second(now):
-        if now > 0.5 and not second:
+        if now > 0.25 and not second:
             second.append(t.start(paint, "--seconds", "1"))
             with open(paint, "rb") as reader:
                 fcntl.flock(reader, fcntl.LOCK_SH | fcntl.LOCK_NB)  # as the HDF5 library does
+        return second and second[0].poll() is not None
 
-    sent = device.draw(p, 2.5, begin_second)
+    sent = device.draw(p, 9, begin_second)
     p.send_signal(signal.SIGINT)
     out, err = p.communicate(timeout=60)
     check(p.returncode == 0 and err == "", p.returncode, err)
@@ -193,21 +202,33 @@ def test_second_writer(t):
     check(max(q["place"][0] for q in points) >= sent[-1][1] - RADIUS, "the last points are missing")
 
 
+def replay(t, paint, path, *more):
+    """A replay of a recording paints the strokes that the device has painted. Only their dates are missing."""
+    made = paint + ".replay.paint.h5"
+    p = t.start(made, "--path", path, *more)
+    out, err = p.communicate(timeout=60)
+    check(p.returncode == 0 and err == "", p.returncode, err)
+    wanted, got = ([{**s, "time": 0} for s in t.strokes(name)] for name in (paint, made))
+    check(got == wanted, "the replay of", path, "differs:", wanted, got)
+
+
 def test_lifted_pen(t):
     """A device whose pen is lifted touches, and does not paint."""
     paint = t.at("lifted.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "3", "--record", t.at("lifted.path"))
     device = Device(p)
-    device.draw(p, 0.8, kind=4)
+    device.draw(p, 0.5, kind=4)
     device.send((0, 0, 0), kind=3)
     out, err = p.communicate(timeout=60)
     check(p.returncode == 0 and json.loads(out)["contacts"] > 100 and t.strokes(paint) == [], err, out)
+    replay(t, paint, t.at("lifted.path"))
 
 
 def test_stylus(t):
     """The pressure of a stylus sets the size and the opacity of points. Without pressure, nothing is painted."""
     paint = t.at("stylus.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--colour", "0000ffff", "--fade", "0.5")
+    more = ("--colour", "0000ffff", "--fade", "0.5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "3", "--record", t.at("stylus.path"), *more)
     device = Device(p)
     device.begin((0.1, 0.5, 1.2))
     for i in range(60):
@@ -220,14 +241,15 @@ def test_stylus(t):
     check([s[0] for s in strokes] == ["#0000ff9f", "#0000ffbf"], strokes)  # 10 and 12 sixteenths
     check(strokes[0][1] == {16384} and min(strokes[1][1]) >= 16384 and max(strokes[1][1]) == 32768, strokes)
     check(strokes[1][2] < 0.52, "paint without pressure", strokes)
+    replay(t, paint, t.at("stylus.path"), *more)
 
 
 def test_unplugged(t):
     """A device whose positions are missing for a time does not paint along the way to its next position."""
     paint = t.at("unplugged.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "3")
     device = Device(p)
-    device.draw(p, 0.6)
+    device.draw(p, 0.4)
     time.sleep(0.4)
     for x in (0.7, 0.72, 0.74, 0.76):
         for _ in range(20):
@@ -249,7 +271,7 @@ def test_brush(t):
     with open(path, "w", encoding="ascii") as out:
         out.writelines(f"{0.2 + 0.0003 * i} 0.5 {max(0.99 + low, 1.1 - 0.001 * i)} {math.sin(-tilt / 2)} 0 0 {math.cos(tilt / 2)}\n"
                        for i in range(2000))
-    p = t.start(paint, "--tool", brush, "--path", path)
+    p = t.start(paint, "--tool", brush, "--path", path, "--rate", "4000")
     out, err = p.communicate(timeout=60)
     got = json.loads(out)
     check(p.returncode == 0 and err == "" and got["paint"]["lost_steps"] == 0, p.returncode, err)
@@ -264,16 +286,37 @@ def test_brush(t):
         check(abs(low + wide) < 0.015 and abs(high - wide) < 0.015, low, high, wide)
 
 
-def test_rough_surface(t):
-    """A ball of 500 points follows the device over a rough surface: its points do not jam where they touch two faces."""
-    t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
-    ball, path, paint = t.at("ball.txt"), t.at("rough.path"), t.at("rough.paint.h5")
-    heights = [1 - (2 * i + 1) / 500 for i in range(500)]
-    line(ball, [(0.1 * math.cos(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * math.sin(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * z)
+def ball(t, count):
+    """Writes points of a ball of radius 0.1. Returns the name of the file."""
+    name, heights = t.at(f"ball-{count}.txt"), [1 - (2 * i + 1) / count for i in range(count)]
+    line(name, [(0.1 * math.cos(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * math.sin(2.4 * i) * (1 - z * z) ** 0.5, 0.1 * z)
                 for i, z in enumerate(heights)])
+    return name
+
+
+def test_corner(t):
+    """A brush in a corner paints on both sides, each as far as the motion to the device would press it in."""
+    path, paint = t.at("corner.path"), t.at("corner.paint.h5")
+    model = boxes(t, "corner", ((0, 0, 0), (2, 1, 1)), ((1.5, 0, 1.0001), (2, 1, 2)))
+    ends = [(1.41 - 0.1 * i / 200, 0.5, 1.08 + 0.2 * i / 200) for i in range(200, 0, -1)]
+    line(path, ends + [(1.41, 0.5, 1.08)] * 100)
+    t.run("haptic", "--path", path, "--tool", ball(t, 4000), "--paint", paint, "--pen-radius", "0.01", "--full-force", "9", model)
+    strokes = json.loads(t.run("paint", "--json", "--points", paint, model))["strokes"]
+    last = [q["place"] for s in strokes for q in s["points"]][-64:]
+    for k, plane, centre, deep in ((2, 1, 1.4, 0.02), (0, 1.5, 1.1, 0.01)):  # the floor and the wall
+        far = [math.hypot(q[2 - k] - centre, q[1] - 0.5) for q in last if abs(q[k] - plane) < 1e-9]
+        wide = math.sqrt(0.1 ** 2 - (0.1 - deep) ** 2)
+        check(len(far) > 10 and wide - 0.015 < max(far) < wide + 0.003, k, far, wide)
+
+
+def test_rough_surface(t):
+    """A ball of 2,000 points follows the device over a rough surface: its points do not jam where they touch two faces."""
+    t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
+    path, paint = t.at("rough.path"), t.at("rough.paint.h5")
     moves = [(1.2 * i / 4000 - 0.6, 1.4 - i / 900 if i < 600 else 0.7334, 0.2 * math.sin(15 * i / 4000)) for i in range(4000)]
     line(path, [(far * math.sin(angle), y, far * math.cos(angle)) for angle, far, y in moves])
-    t.run("haptic", "--tool", ball, "--path", path, "--faces", "131072", "--paint", paint, "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
+    t.run("haptic", "--tool", ball(t, 2000), "--path", path, "--rate", "4000", "--faces", "131072", "--paint", paint,
+          "--pen-radius", "0.01", t.at("rough.ebpo.h5"))
     strokes = json.loads(t.run("paint", "--json", "--points", paint, t.at("rough.ebpo.h5")))["strokes"]
     angles = [math.atan2(q["place"][0], q["place"][2]) for s in strokes for q in s["points"]]
     for k in range(5):
@@ -302,15 +345,15 @@ def test_probe(t):
 def test_full_disk(t, recovers):
     """The loop continues when the paint cannot be saved. It is saved when there is space again."""
     paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
-    p = t.start(paint, "--device", "udp:0", "--seconds", "9", "--pen-radius", "0.0005", "--full-force", "1",
-                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+    p = t.start(paint, "--device", "udp:0", "--seconds", "5", "--pen-radius", "0.0005", "--full-force", "1")
     device = Device(p)
-    device.draw(p, 3)
+    resource.prlimit(p.pid, resource.RLIMIT_FSIZE, limit)
+    device.draw(p, 2.2)
     check(p.poll() is None, "the loop ended")
     saved = t.point_count(paint)  # the file is complete, but old
     if recovers:
         resource.prlimit(p.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-        device.draw(p, 1)
+        device.draw(p, 1, lambda now: now > 0.4 and t.point_count(paint) > saved)
     else:
         p.send_signal(signal.SIGTERM)
     device.send((0, 0, 0), kind=3)
@@ -331,8 +374,8 @@ def test_saved_elsewhere(t):
         os.mkdir(name)
     for moved in (False, True):
         paint = os.path.join(folder, f"{moved}.paint.h5")
-        p = t.start(paint, "--device", "udp:0", "--seconds", "9", env={**os.environ, "TMPDIR": other})
-        Device(p).draw(p, 0.8)
+        p = t.start(paint, "--device", "udp:0", "--seconds", "3", env={**os.environ, "TMPDIR": other})
+        Device(p).draw(p, 0.4)
         if moved:
             os.rename(folder, t.at("moved"))
         else:
@@ -380,7 +423,7 @@ def test_view(t):
     os.mkdir(viewer)
     with open(os.path.join(viewer, "index.html"), "w", encoding="ascii") as out:
         out.write("<p>the page</p>")
-    p = t.start(paint, "--view", "--viewer", viewer, "--port", "0", "--device", "viewer", "--seconds", "9")
+    p = t.start(paint, "--view", "--viewer", viewer, "--port", "0", "--device", "viewer", "--seconds", "5")
     port = int(re.search(r"127\.0\.0\.1:(\d+)/", p.stderr.readline())[1])
     for site, status in (("cross-site", b" 403 "), ("same-site", b" 403 "), ("same-origin", b" 200 ")):
         head, page = request(port, "GET /live", "Sec-Fetch-Site: " + site)
@@ -402,25 +445,18 @@ def test_view(t):
     check(json.loads(out)["paint"]["strokes"] == 2, "the pen was not lifted", out)
 
 
-def main(ebpo, generate):
+def main(ebpo, generate, faults=None):
     with tempfile.TemporaryDirectory() as folder:
         t = Test(ebpo, folder)
         subprocess.run([generate, "--faces", "65536", t.at("rough.ply")], check=True, stdout=subprocess.DEVNULL)
         test_replay(t)
-        test_gap(t)
-        test_erase(t)
-        test_kill(t)
-        test_second_writer(t)
-        test_lifted_pen(t)
-        test_stylus(t)
-        test_unplugged(t)
-        test_brush(t)
-        test_probe(t)
-        test_rough_surface(t)
-        test_saved_elsewhere(t)
-        test_view(t)
-        test_full_disk(t, True)
-        test_full_disk(t, False)
+        test_erase(t)  # of the strokes that test_replay has painted
+        others = (test_rough_surface, lambda _: test_full_disk(t, True), lambda _: test_full_disk(t, False),
+                  lambda _: test_kill(t, faults), test_second_writer, test_stylus, test_lifted_pen, test_unplugged,
+                  test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_gap)
+        with ThreadPoolExecutor(3) as pool:  # they wait for their devices most of the time
+            for result in [pool.submit(test, t) for test in others]:
+                result.result()
 
 
 main(*sys.argv[1:])

@@ -363,6 +363,8 @@ ssize_t pwrite(int fd, const void *data, size_t size, off_t at)
 int fsync(int fd)
 {
     REAL(fsync);
+    if (getenv("EBPO_TEST_SLOW_DISK"))
+        sleep(2);
     return fails(FAULT_SYNC, CALLER) ? -1 : real.fsync(fd);
 }
 

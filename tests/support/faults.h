@@ -6,6 +6,7 @@
  *   EBPO_TEST_FAULT_FOREIGN=1       counts calls of other libraries instead of this project's
  *   EBPO_TEST_NAMED=1               file systems do not support unnamed files (O_TMPFILE)
  *   EBPO_TEST_PAUSE=1               a temporary file is unlinked only after a second
+ *   EBPO_TEST_SLOW_DISK=1           fsync takes two seconds longer
  *
  * Calls count from the start of main. Only calls of this project count, or of the C library on its
  * behalf. */

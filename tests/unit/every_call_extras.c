@@ -275,7 +275,12 @@ static ebpo_status touch(ebpo_model *model, ebpo_error *error)
     double path[EBPO_HAPTIC_PATH_MAX][3];
     ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
     options.faces = 1 << 12;
-    ebpo_status status = ebpo_haptic_new(model, &options, away, &touch, error);
+    const ebpo_haptic_instance instance = { model, EBPO_POSE_INIT };
+    ebpo_status status = ebpo_haptic_new_posed(&instance, 1, &options, away, &touch, error);
+    if (status == EBPO_OK) {
+        ebpo_haptic_free(touch);
+        status = ebpo_haptic_new(model, &options, away, &touch, error);
+    }
     if (status != EBPO_OK)
         return status;
     ebpo_haptic_probe_result sensed;

@@ -77,7 +77,10 @@ async function testRecording(tab) {
   const haptic = await device('--path', at('letter.txt'), '--paint', at('letter.paint.h5'), '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
   await tab.goto(`${haptic.address}?file=models/0/ball.ebpo.h5&live=live&view=0,0,2.6`);
   await idle(tab);
+  await tab.waitForFunction(() => window.ebpoViewer.live.connected, undefined, TIMEOUT);
+  const programs = () => tab.evaluate(() => window.ebpoViewer.scene.renderer.info.programs.length), compiled = await programs();
   await tab.waitForFunction(() => window.ebpoViewer.live.ended, undefined, TIMEOUT);
+  assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
   const { code, report, err } = await haptic.ended;
   assert.equal(code, 0, err);
   assert.ok(!err.includes('has left'), err);

@@ -55,10 +55,13 @@ export function addLive({ scene, query }, pen) {
   }
 
   function takePaint(news) {
+    const first = submits && !submits.arrived && news.strokes.length;
     live.paints++;
-    if (submits && news.strokes.length)
-      submits.arrived ??= Date.now();
+    if (first)
+      submits.arrived = Date.now();
     pen.receive(news);
+    if (first && state.info)
+      scene.draw(); // the next frame of the browser may be late
   }
 
   on('frame', () => {
@@ -154,6 +157,7 @@ export function addLive({ scene, query }, pen) {
     for (const name of ['pointerdown', 'pointermove', 'pointerup'])
       $('canvas').parentElement.addEventListener(name, move, { capture: true });
     pen.begin(command);
+    pen.warmUp(); // the device begins when this page is connected
     connect();
     addEventListener('pagehide', () => source.close());
     window.ebpoViewer.live = live;

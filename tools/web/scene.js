@@ -323,6 +323,13 @@ export class Scene {
     }
   }
 
+  /** Draws at once. Use it rarely: frames of the browser wait until the graphics card is ready for them. */
+  draw() {
+    cancelAnimationFrame(this.requested);
+    this.asked = Infinity; // the interval since the last frame is not measured
+    this.#draw();
+  }
+
   #draw() {
     const began = performance.now(), interval = this.asked - this.ended < PAUSE_MS ? began - this.began : undefined; // the browser begins a frame when the last one is on its way to the screen
     this.began = began;

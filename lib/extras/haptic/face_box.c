@@ -32,7 +32,7 @@ uint64_t ebpo_face_box_leaves(uint64_t count)
 
 uint64_t ebpo_face_box_bytes(uint64_t capacity)
 {
-    return capacity * (sizeof(double[3][3]) + sizeof(uint64_t)) +
+    return capacity * (sizeof(double[3][3]) + sizeof(uint64_t) + sizeof(uint32_t)) +
            2 * ebpo_face_box_leaves(capacity) * sizeof(ebpo_extent);
 }
 
@@ -43,13 +43,15 @@ ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error 
     uint64_t nodes = 2 * ebpo_face_box_leaves(capacity);
     out->corner = ebpo_alloc(capacity, sizeof *out->corner);
     out->face = ebpo_alloc(capacity, sizeof *out->face);
+    out->instance = ebpo_alloc(capacity, sizeof *out->instance);
     out->node = ebpo_alloc(nodes, sizeof *out->node);
-    if (!out->corner || !out->face || !out->node) {
+    if (!out->corner || !out->face || !out->instance || !out->node) {
         ebpo_face_box_free(out);
         return ebpo_fail_memory(error, ebpo_face_box_bytes(capacity));
     }
     memset(out->corner, 0xff, capacity * sizeof *out->corner);
     memset(out->face, 0xff, capacity * sizeof *out->face);
+    memset(out->instance, 0xff, capacity * sizeof *out->instance);
     /* NAN, so that nodes intersect nothing and the box contains nothing */
     memset(out->node, 0xff, nodes * sizeof *out->node);
     for (int i = 0; i < 3; i++)
@@ -61,25 +63,23 @@ void ebpo_face_box_free(ebpo_face_box *box)
 {
     free(box->corner);
     free(box->face);
+    free(box->instance);
     free(box->node);
     *box = (ebpo_face_box){ 0 };
 }
 
 typedef struct loading {
     ebpo_face_box *box;
+    const ebpo_posed_solid *posed; /* NULL: not posed */
+    uint32_t instance;
     bool fits;
 } loading;
 
-static bool receive_triangles(void *user, const ebpo_triangles *triangles)
+static bool extents_intersect(const ebpo_extent *a, const ebpo_extent *b)
 {
-    loading *l = user;
-    ebpo_face_box *box = l->box;
-    l->fits = triangles->count <= box->capacity - box->count;
-    if (!l->fits)
-        return false;
-    memcpy(box->corner + box->count, triangles->corners, triangles->count * sizeof *box->corner);
-    memcpy(box->face + box->count, triangles->faces, triangles->count * sizeof *box->face);
-    box->count += triangles->count;
+    for (int i = 0; i < 3; i++)
+        if (!(a->min[i] <= b->max[i] && a->max[i] >= b->min[i]))
+            return false;
     return true;
 }
 
@@ -91,7 +91,55 @@ static void widen_extent(ebpo_extent *e, const double min[3], const double max[3
     }
 }
 
-static void make_tree(ebpo_face_box *box)
+static bool face_intersects(const double face[3][3], const ebpo_extent *around)
+{
+    ebpo_extent e;
+    ebpo_vec3_copy(face[0], e.min);
+    ebpo_vec3_copy(face[0], e.max);
+    widen_extent(&e, face[1], face[1]);
+    widen_extent(&e, face[2], face[2]);
+    return extents_intersect(&e, around);
+}
+
+/* Adds a face if it intersects box->loaded. Returns false if there is no space for it. */
+static bool add_posed_face(loading *l, const double corner[3][3], uint64_t face)
+{
+    ebpo_face_box *box = l->box;
+    double posed[3][3];
+    for (int k = 0; k < 3; k++)
+        ebpo_posing_apply(&l->posed->posing, corner[k], posed[k]);
+    if (!face_intersects((const double(*)[3])posed, &box->loaded))
+        return true;
+    l->fits = box->count < box->capacity;
+    if (!l->fits)
+        return false;
+    memcpy(box->corner[box->count], posed, sizeof posed);
+    box->face[box->count] = face;
+    box->instance[box->count++] = l->instance;
+    return true;
+}
+
+static bool receive_triangles(void *user, const ebpo_triangles *triangles)
+{
+    loading *l = user;
+    ebpo_face_box *box = l->box;
+    for (uint64_t i = 0; l->posed && i < triangles->count; i++)
+        if (!add_posed_face(l, triangles->corners[i], triangles->faces[i]))
+            return false;
+    if (l->posed)
+        return true;
+    l->fits = triangles->count <= box->capacity - box->count;
+    if (!l->fits)
+        return false;
+    memcpy(box->corner + box->count, triangles->corners, triangles->count * sizeof *box->corner);
+    memcpy(box->face + box->count, triangles->faces, triangles->count * sizeof *box->face);
+    for (uint64_t i = 0; i < triangles->count; i++)
+        box->instance[box->count + i] = l->instance;
+    box->count += triangles->count;
+    return true;
+}
+
+void ebpo_face_box_end(ebpo_face_box *box)
 {
     static const ebpo_extent empty = { { INFINITY, INFINITY, INFINITY },
                                        { -INFINITY, -INFINITY, -INFINITY } };
@@ -110,43 +158,31 @@ static void make_tree(ebpo_face_box *box)
     }
 }
 
-ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
-                               const ebpo_extent *allowed, double margin, bool *fits,
-                               ebpo_error *error)
+void ebpo_face_box_begin(ebpo_face_box *box, uint64_t serial, const ebpo_extent *allowed,
+                         double margin)
 {
-    loading l = { box, true };
-    double min[3], max[3];
+    box->serial = serial;
     box->count = 0;
     box->allowed = *allowed;
     for (int i = 0; i < 3; i++) {
-        min[i] = allowed->min[i] - margin;
-        max[i] = allowed->max[i] + margin;
+        box->loaded.min[i] = allowed->min[i] - margin;
+        box->loaded.max[i] = allowed->max[i] + margin;
     }
-    ebpo_vec3_copy(min, box->loaded.min);
-    ebpo_vec3_copy(max, box->loaded.max);
+}
+
+ebpo_status ebpo_face_box_add(ebpo_face_box *box, ebpo_context *context,
+                              const ebpo_posed_solid *posed, uint32_t instance, bool *fits,
+                              ebpo_error *error)
+{
+    loading l = { box, posed, instance, true };
+    double min[3], max[3];
+    ebpo_vec3_copy(box->loaded.min, min);
+    ebpo_vec3_copy(box->loaded.max, max);
+    if (posed)
+        ebpo_unpose_box(posed, box->loaded.min, box->loaded.max, min, max);
     ebpo_status status = ebpo_triangles_in_box(context, min, max, receive_triangles, &l, error);
     *fits = l.fits;
-    if (status == EBPO_OK && l.fits)
-        make_tree(box);
     return status;
-}
-
-static bool extents_intersect(const ebpo_extent *a, const ebpo_extent *b)
-{
-    for (int i = 0; i < 3; i++)
-        if (!(a->min[i] <= b->max[i] && a->max[i] >= b->min[i]))
-            return false;
-    return true;
-}
-
-static bool face_intersects(const double face[3][3], const ebpo_extent *around)
-{
-    ebpo_extent e;
-    ebpo_vec3_copy(face[0], e.min);
-    ebpo_vec3_copy(face[0], e.max);
-    widen_extent(&e, face[1], face[1]);
-    widen_extent(&e, face[2], face[2]);
-    return extents_intersect(&e, around);
 }
 
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
@@ -206,9 +242,10 @@ static double min_square_of_leaf(const ebpo_face_box *box, uint64_t leaf, const 
     return least;
 }
 
-/* Returns a lower bound of the squared distance of `around` from the faces. */
+/* Returns a lower bound of the squared distance of `around` from the faces. *leaf: see
+ * ebpo_face_box_gap. */
 static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *around,
-                                  uint32_t max_visits, uint64_t *visits)
+                                  uint32_t max_visits, uint64_t *leaf, uint64_t *visits)
 {
     struct {
         uint64_t node;
@@ -218,6 +255,10 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
     double least = INFINITY;
     if (box->count == 0)
         return INFINITY;
+    if (*leaf < box->leaves) {
+        least = min_square_of_leaf(box, *leaf, around);
+        ++*visits;
+    }
     stack[depth].node = 1;
     stack[depth++].lower = box_square_distance(&box->node[1], around);
     for (uint32_t n = 0; depth > 0; n++) {
@@ -229,7 +270,11 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
         if (n >= max_visits) {
             least = lower;
         } else if (node >= box->leaves) {
-            least = fmin(least, min_square_of_leaf(box, node - box->leaves, around));
+            double square = min_square_of_leaf(box, node - box->leaves, around);
+            if (square < least) {
+                least = square;
+                *leaf = node - box->leaves;
+            }
         } else {
             double l = box_square_distance(&box->node[2 * node], around);
             double r = box_square_distance(&box->node[2 * node + 1], around);
@@ -245,9 +290,9 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
 }
 
 double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                         uint64_t *visits)
+                         uint64_t *leaf, uint64_t *visits)
 {
-    return sqrt(min_square_distance(box, around, max_visits, visits)) * (1 - 0x1p-48);
+    return sqrt(min_square_distance(box, around, max_visits, leaf, visits)) * (1 - 0x1p-48);
 }
 
 /* --- the nearest point of a face --- */
@@ -525,6 +570,8 @@ static crossing cross_faces(ebpo_known_winding *start, const ebpo_face_box *box,
     if (!all)
         return TOO_MANY;
     for (uint32_t i = 0; i < count; i++) {
+        if (box->instance[found[i]] != start->instance)
+            continue;
         int sign = segment_crosses(start->at, to, (const double(*)[3])box->corner[found[i]]);
         if (sign == CROSSES_DEGENERATE)
             return DEGENERATE;
@@ -577,15 +624,16 @@ bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box
     return false;
 }
 
-bool ebpo_is_on_face(const ebpo_face_box *box, const double place[3], uint32_t *found,
-                     uint32_t most, uint32_t visits)
+bool ebpo_is_on_face(const ebpo_face_box *box, uint32_t instance, const double place[3],
+                     uint32_t *found, uint32_t most, uint32_t visits)
 {
     ebpo_extent around;
     uint32_t count;
     extent_of_segment(place, place, &around);
-    bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
+    (void)ebpo_face_box_find(box, &around, found, most, &visits, &count);
     for (uint32_t i = 0; i < count; i++)
-        if (ebpo_segment_may_intersect(place, place, (const double(*)[3])box->corner[found[i]]))
+        if (box->instance[found[i]] == instance &&
+            ebpo_segment_may_intersect(place, place, (const double(*)[3])box->corner[found[i]]))
             return true;
-    return !all;
+    return false;
 }

@@ -9,6 +9,8 @@
 
 #include <ebpo/query.h>
 
+#include "extras/collide/posed_solid.h"
+
 /* Number of faces of a leaf of the tree. */
 enum { EBPO_FACE_BOX_LEAF = 8 };
 
@@ -27,14 +29,16 @@ static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
 }
 
 typedef struct ebpo_face_box {
+    uint64_t serial;     /* differs for each filling of the boxes of an object; at least 1 */
     ebpo_extent allowed; /* allowed positions of the proxy: all faces that are not farther from one
                             of these positions than the margin are loaded */
     ebpo_extent loaded;  /* `allowed`, widened by the margin: all faces that intersect this
                           * extent are loaded */
     uint64_t count, capacity; /* number of loaded faces; greatest possible number */
     uint64_t leaves;          /* number of leaves of the tree: a power of two */
-    double (*corner)[3][3];   /* [capacity] */
+    double (*corner)[3][3];   /* [capacity] in the world: posed coordinates */
     uint64_t *face;           /* [capacity] face indices for the caller (ebpo_triangles.faces) */
+    uint32_t *instance;       /* [capacity] index of the instance that has the face */
     ebpo_extent *node;        /* [2 leaves] the root is node 1, the children of node n are 2
                                * n and 2 n + 1 */
 } ebpo_face_box;
@@ -47,11 +51,17 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity);
 /* Returns the number of leaves of a tree over `count` faces. */
 uint64_t ebpo_face_box_leaves(uint64_t count);
 
-/* Loads the faces within `margin` of the box `allowed`. *fits is false if the box has too little
- * memory for these faces. */
-EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
-                                             const ebpo_extent *allowed, double margin, bool *fits,
-                                             ebpo_error *error);
+/* Empties a box, whose faces will be those within `margin` of the box `allowed`. */
+void ebpo_face_box_begin(ebpo_face_box *box, uint64_t serial, const ebpo_extent *allowed,
+                         double margin);
+/* Adds the faces of an instance of the context's model. posed: its pose; NULL: the coordinates of
+ * the model are those of the world. *fits is false if the box has too little memory for these
+ * faces. */
+EBPO_MUST_USE ebpo_status ebpo_face_box_add(ebpo_face_box *box, ebpo_context *context,
+                                            const ebpo_posed_solid *posed, uint32_t instance,
+                                            bool *fits, ebpo_error *error);
+/* Makes the tree over the faces of all instances. */
+void ebpo_face_box_end(ebpo_face_box *box);
 
 /* Finds the faces whose boxes intersect `around`, and writes their indices in box->corner to
  * found[most]. Sets *count to their number. Reduces *visits by the number of visited nodes. Returns
@@ -62,9 +72,10 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
 
 /* Returns a lower bound of the distance of `around` from the faces of the box. The bound is less
  * accurate if the search ends because of max_visits, the limit of visited nodes. Adds the number of
- * visited nodes to *visits. */
+ * visited nodes to *visits. *leaf: a leaf that may be near, at which the search begins; any value
+ * is valid. It is set to the nearest leaf that was visited. */
 double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                         uint64_t *visits);
+                         uint64_t *leaf, uint64_t *visits);
 
 /* --- distances of points and of moving balls from a face, in doubles --- */
 
@@ -119,9 +130,10 @@ void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node);
 /* Removes and returns item[0], the node with the least key. */
 ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue);
 
-/* A point whose winding number is known. When the point moves, the winding number changes at each
- * face that it crosses, by exact arithmetic. */
+/* A point whose winding number in an instance is known. When the point moves, the winding number
+ * changes at each face of the instance that it crosses, by exact arithmetic. */
 typedef struct ebpo_known_winding {
+    uint32_t instance;
     double at[3];    /* the point; it is on no face */
     int32_t winding; /* winding number at the point */
     bool known;      /* false: there is no such point, and `at` and `winding` are not valid */
@@ -136,9 +148,10 @@ bool ebpo_known_winding_move(ebpo_known_winding *start, const ebpo_face_box *box
                              const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
                              uint64_t *work);
 
-/* Returns true if the point is on a face, or if this cannot be decided with at most `most` faces
- * and `visits` nodes and without allocating memory. found[most] is workspace. */
-bool ebpo_is_on_face(const ebpo_face_box *box, const double place[3], uint32_t *found,
-                     uint32_t most, uint32_t visits);
+/* Returns true if the point is on a face of the instance, or if coordinates are so large or small
+ * that this cannot be decided without allocating memory. Returns false if it is on no face, or if
+ * more than `most` faces and `visits` nodes would have to be examined. found[most] is workspace. */
+bool ebpo_is_on_face(const ebpo_face_box *box, uint32_t instance, const double place[3],
+                     uint32_t *found, uint32_t most, uint32_t visits);
 
 #endif

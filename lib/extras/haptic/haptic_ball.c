@@ -211,18 +211,36 @@ static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error
     return EBPO_OK;
 }
 
-/* Computes values that depend on the model: its box, default lengths, tolerances, and the size of
- * boxes. */
-static ebpo_status measure_model(ebpo_haptic *t, ebpo_error *error)
+static const ebpo_info *info_of(const ebpo_haptic_part *part)
 {
-    const ebpo_info *info = ebpo_file_info(t->model->file);
-    double most = 0;
-    t->solid = info->solid;
+    return ebpo_file_info(part->of->model->file);
+}
+
+/* Returns the default search radius: the least of all instances. */
+static double default_search_radius(const ebpo_haptic *t)
+{
+    double least = INFINITY;
+    for (uint64_t i = 0; i < t->part_count; i++) {
+        const ebpo_extent *e = &t->part[i].extent;
+        least = fmin(least, 3 * ebpo_vec3_scaled_distance(e->min, e->max) /
+                                sqrt(fmax(1, (double)info_of(&t->part[i])->face_count)));
+    }
+    return least;
+}
+
+/* Computes values that depend on the instances: their box, default lengths, tolerances, and the
+ * size of boxes. */
+static ebpo_status measure_parts(ebpo_haptic *t, ebpo_error *error)
+{
+    double most = 0, faces = 0;
+    for (uint64_t i = 0; i < t->part_count; i++)
+        faces += (double)info_of(&t->part[i])->face_count;
+    t->root = t->part[0].extent;
     for (int i = 0; i < 3; i++) {
-        double low = info->box_origin[i], high = low + info->box_size[i];
-        double wider = 0x1p-50 * (fabs(low) + fabs(high)); /* rounding of low + high */
-        t->root.min[i] = low - wider;
-        t->root.max[i] = high + wider;
+        for (uint64_t k = 1; k < t->part_count; k++) {
+            t->root.min[i] = fmin(t->root.min[i], t->part[k].extent.min[i]);
+            t->root.max[i] = fmax(t->root.max[i], t->part[k].extent.max[i]);
+        }
         most = fmax(most, fmax(fabs(t->root.min[i]), fabs(t->root.max[i])));
     }
     t->diagonal = ebpo_vec3_scaled_distance(t->root.min, t->root.max);
@@ -238,22 +256,19 @@ static ebpo_status measure_model(ebpo_haptic *t, ebpo_error *error)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the skin must be at least %g, for rounding of coordinates", least);
     if (t->options.search_radius == 0)
-        t->options.search_radius = 3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
+        t->options.search_radius = default_search_radius(t);
     t->options.search_radius = fmax(t->options.search_radius, 4 * t->options.skin);
     t->contact_distance = wide + t->options.skin;
     t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
     t->margin = wide + (t->tool ? 4 * t->options.skin : t->options.search_radius);
     t->max_piece = t->diagonal;
-    t->half_side = fmin(1, sqrt((double)t->options.faces / fmax(1, (double)info->face_count))) *
-                   t->diagonal / 8;
+    t->half_side = fmin(1, sqrt((double)t->options.faces / fmax(1, faces))) * t->diagonal / 8;
     return EBPO_OK;
 }
 
-static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
+static ebpo_status make_buffers(ebpo_haptic *t, ebpo_error *error)
 {
-    ebpo_status status = ebpo_context_new(t->model, &t->proxy_context, error);
-    if (status == EBPO_OK)
-        status = ebpo_context_new(t->model, &t->loading, error);
+    ebpo_status status = EBPO_OK;
     for (int i = 0; i < EBPO_HAPTIC_BOXES && status == EBPO_OK; i++)
         status = ebpo_face_box_new(&t->box[i], t->options.faces, error);
     if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_BALL)
@@ -263,33 +278,45 @@ static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
     atomic_store(&t->waiting_box, 2);
     t->loader_result = 1;
     atomic_store(&t->waiting_result, 2);
-    if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_PROBE)
-        status = ebpo_held_levels_read(t->model->file, &t->levels, error);
     return status;
 }
 
-/* Checks that a ball or a tool may begin with a point at `place`: no face is within
+/* Checks that a ball or a tool may begin with a point at `place`: no face of an instance is within
  * contact_distance plus half a skin, and the point is not inside the solid. */
-static ebpo_status check_point(ebpo_haptic *t, const double place[3], double contact_distance,
-                               ebpo_error *error)
+static ebpo_status check_point_in(const ebpo_haptic *t, const ebpo_haptic_part *part,
+                                  const double place[3], double contact_distance, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result near;
-    options.max_distance = contact_distance + t->options.skin / 2;
-    ebpo_status status = ebpo_distance(t->proxy_context, place, &options, &near, error);
+    double p[3], uncertainty;
+    ebpo_haptic_part_point(part, place, p, &uncertainty);
+    options.max_distance = (contact_distance + t->options.skin / 2) / part->scale + uncertainty;
+    ebpo_status status = ebpo_distance(part->of->placing, p, &options, &near, error);
     if (status == EBPO_OK && near.distance <= options.max_distance && near.distance >= 0)
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "at the initial position, the distance of the device from a face is %g; it "
             "must be greater than %g",
-            near.distance, options.max_distance);
-    if (status != EBPO_OK || !t->solid)
+            near.distance * part->scale, options.max_distance * part->scale);
+    if (status != EBPO_OK || !part->solid)
         return status;
     ebpo_inside_result inside;
-    status = ebpo_inside(t->proxy_context, place, NULL, &inside, error);
+    status = ebpo_inside(part->of->placing, p, NULL, &inside, error);
     return status != EBPO_OK || inside.where == EBPO_OUT
                ? status
                : ebpo_fail(error, EBPO_E_ARGUMENT, "the position is in the solid; begin outside");
+}
+
+/* Checks a point for all instances. */
+static ebpo_status check_point(const ebpo_haptic *t, const double place[3], double contact_distance,
+                               ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < t->part_count && status == EBPO_OK; i++)
+        if (!t->part[i].is_posed ||
+            ebpo_haptic_part_gap(&t->part[i], place) <= contact_distance + t->options.skin)
+            status = check_point_in(t, &t->part[i], place, contact_distance, error);
+    return status;
 }
 
 /* Checks the initial position. A probe may be anywhere; a tool begins without rotation. */
@@ -358,7 +385,8 @@ ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error 
         ebpo_haptic_report(t, device);
         return status;
     }
-    t->probed_point.known = false;
+    for (uint64_t i = 0; i < t->part_count; i++)
+        t->part[i].probed_point.known = false;
     if (t->tool) {
         ebpo_rigid initial = { .rotation = { 0, 0, 0, 1 } };
         ebpo_vec3_copy(place, initial.place);
@@ -378,8 +406,10 @@ ebpo_status ebpo_haptic_check(ebpo_haptic *t, ebpo_error *error)
     return failure.status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &failure);
 }
 
-ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *options,
-                            const double place[3], ebpo_haptic **out, ebpo_error *error)
+/* Makes the object for instances [count]; posed: as for ebpo_haptic_parts_new. */
+static ebpo_status make_object(const ebpo_haptic_instance *instances, uint64_t count, bool posed,
+                               const ebpo_haptic_options *options, const double place[3],
+                               ebpo_haptic **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_haptic_options checked = EBPO_HAPTIC_OPTIONS_INIT;
@@ -392,7 +422,6 @@ ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *option
     ebpo_haptic *t = ebpo_alloc_zero(1, sizeof *t);
     if (!t)
         return ebpo_fail_memory(error, sizeof *t);
-    t->model = model;
     t->options = checked;
     t->failure = (ebpo_error)EBPO_ERROR_INIT;
     pthread_mutex_init(&t->mutex, NULL);
@@ -401,9 +430,11 @@ ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *option
         status = ebpo_tool_new(checked.points, checked.point_count, &t->tool, error);
     t->options.points = NULL; /* the caller may free the points */
     if (status == EBPO_OK)
-        status = measure_model(t, error);
+        status = ebpo_haptic_parts_new(t, instances, count, posed, error);
     if (status == EBPO_OK)
-        status = make_parts(t, error);
+        status = measure_parts(t, error);
+    if (status == EBPO_OK)
+        status = make_buffers(t, error);
     if (status == EBPO_OK)
         status = ebpo_haptic_reset(t, place, error);
     if (status == EBPO_OK)
@@ -411,6 +442,20 @@ ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *option
     else
         ebpo_haptic_free(t);
     return status;
+}
+
+ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *options,
+                            const double place[3], ebpo_haptic **out, ebpo_error *error)
+{
+    const ebpo_haptic_instance instance = { model, EBPO_POSE_INIT };
+    return make_object(&instance, 1, false, options, place, out, error);
+}
+
+ebpo_status ebpo_haptic_new_posed(const ebpo_haptic_instance *instances, uint64_t count,
+                                  const ebpo_haptic_options *options, const double place[3],
+                                  ebpo_haptic **out, ebpo_error *error)
+{
+    return make_object(instances, count, true, options, place, out, error);
 }
 
 void ebpo_haptic_free(ebpo_haptic *t)
@@ -421,10 +466,8 @@ void ebpo_haptic_free(ebpo_haptic *t)
     for (int i = 0; i < EBPO_HAPTIC_BOXES; i++)
         ebpo_face_box_free(&t->box[i]);
     ebpo_ball_walk_free(&t->walk);
-    ebpo_held_levels_free(&t->levels);
     ebpo_tool_free(t->tool);
-    ebpo_context_free(t->proxy_context);
-    ebpo_context_free(t->loading);
+    ebpo_haptic_parts_free(t);
     pthread_mutex_destroy(&t->mutex);
     free(t);
 }

@@ -19,23 +19,61 @@
 #include "extras/haptic/haptic_parts.h"
 #include "geometry/vec3.h"
 
-/* Queries distance and winding number at out->place, and sets the other members of *out. */
-static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error *error)
+/* Sets the nearest point of `out` to that of an instance if it is nearer. p: out->place in the
+ * coordinates of the model. */
+static ebpo_status query_distance(const ebpo_haptic_part *part, const double p[3],
+                                  ebpo_probe_query *out, ebpo_error *error)
 {
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result near;
-    ebpo_inside_result inside = { .where = EBPO_OUT };
-    ebpo_status status = ebpo_distance(t->loading, out->place, NULL, &near, error);
-    if (status == EBPO_OK && t->solid)
-        status = ebpo_inside(t->loading, out->place, NULL, &inside, error);
-    if (status != EBPO_OK)
+    options.unsigned_distance = true;
+    ebpo_status status = ebpo_distance(part->of->loading, p, &options, &near, error);
+    if (status != EBPO_OK || !(near.distance * part->scale < out->distance))
         return status;
-    out->distance = fabs(near.distance);
+    out->distance = near.distance * part->scale;
     ebpo_vec3_copy(near.point, out->point);
     ebpo_vec3_copy(near.normal, out->normal);
-    out->winding = inside.winding;
-    out->on_face = inside.where == EBPO_ON;
-    out->valid = true;
+    if (part->is_posed)
+        ebpo_posing_apply(&part->posed.posing, near.point, out->point);
+    for (int i = 0; i < 3 && part->is_posed; i++)
+        out->normal[i] = ebpo_vec3_dot(part->posed.rotation[i], near.normal);
     return EBPO_OK;
+}
+
+/* Sets the side of out->place with respect to a solid. p: as for query_distance. */
+static ebpo_status query_side(const ebpo_haptic_part *part, const double place[3],
+                              const double p[3], ebpo_probe_side *out, ebpo_error *error)
+{
+    ebpo_status status;
+    if (part->is_posed) {
+        ebpo_posed_sides sides;
+        status = ebpo_posed_solid_sides(&part->posed, part->of->loading, place, &sides, error);
+        *out = (ebpo_probe_side){ sides.above, sides.on };
+    } else {
+        ebpo_inside_result inside;
+        status = ebpo_inside(part->of->loading, p, NULL, &inside, error);
+        *out = (ebpo_probe_side){ inside.winding, inside.where == EBPO_ON };
+    }
+    return status;
+}
+
+/* Queries distance and winding numbers at out->place, and sets the other members of *out. */
+static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    out->distance = INFINITY;
+    for (uint64_t i = 0; i < t->part_count && status == EBPO_OK; i++) {
+        const ebpo_haptic_part *part = &t->part[i];
+        double p[3], uncertainty, gap = ebpo_haptic_part_gap(part, out->place);
+        ebpo_haptic_part_point(part, out->place, p, &uncertainty);
+        out->side[i] = (ebpo_probe_side){ 0, false };
+        if (gap < out->distance)
+            status = query_distance(part, p, out, error);
+        if (status == EBPO_OK && part->solid && gap == 0)
+            status = query_side(part, out->place, p, &out->side[i], error);
+    }
+    out->valid = status == EBPO_OK;
+    return status;
 }
 
 /* Queries distance and winding number at the probe's position, and passes them to the haptic step.
@@ -149,7 +187,7 @@ static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *
     ebpo_extent allowed;
     for (bool fits = false; !fits;) {
         place_box(t, goal, &allowed);
-        ebpo_status status = ebpo_face_box_load(box, t->loading, &allowed, t->margin, &fits, error);
+        ebpo_status status = ebpo_haptic_parts_load(t, box, &allowed, &fits, error);
         if (status != EBPO_OK)
             return status;
         if (fits)

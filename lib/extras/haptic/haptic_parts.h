@@ -1,5 +1,5 @@
-/* Defines the object of a haptic session. Its members are in groups; a comment at the head of each
- * group states which thread may use its members. */
+/* Defines the object of a haptic session, and the instances of models that it touches. Its members
+ * are in groups; a comment at the head of each group states which thread may use its members. */
 #ifndef EBPO_HAPTIC_HAPTIC_PARTS_H
 #define EBPO_HAPTIC_HAPTIC_PARTS_H
 
@@ -28,29 +28,54 @@ enum {
     EBPO_HAPTIC_PIECES = EBPO_HAPTIC_PATH_MAX - 1
 };
 
+/* A model, and what both threads need to query it. Its instances share it. */
+typedef struct ebpo_haptic_model {
+    ebpo_model *model;
+    ebpo_context *placing;   /* used by the thread of haptic steps, for placing the proxy */
+    ebpo_context *loading;   /* used by the loading thread */
+    ebpo_held_levels levels; /* upper levels of the octree, for probes */
+} ebpo_haptic_model;
+
+/* An instance: a model at a pose. */
+typedef struct ebpo_haptic_part {
+    const ebpo_haptic_model *of;
+    bool is_posed; /* false: the coordinates of the model are those of the world */
+    ebpo_posed_solid posed;
+    ebpo_extent extent; /* contains all faces */
+    double scale;       /* length in the world of a unit of the model */
+    bool solid;
+    ebpo_known_winding probed_point; /* last position of the probe, with its winding number */
+} ebpo_haptic_part;
+
+/* The side of a position with respect to an instance. */
+typedef struct ebpo_probe_side {
+    int32_t winding;
+    bool on_face; /* the position is on a face of the instance */
+} ebpo_probe_side;
+
 /* Exact results of the loading thread for a position of the probe. */
 typedef struct ebpo_probe_query {
     double place[3];            /* the position */
-    double distance;            /* distance from the nearest face, 0 or more; infinite if the model
-                                 * has no faces */
+    double distance;            /* distance from the nearest face, 0 or more; infinite if there are
+                                 * no faces */
     double point[3], normal[3]; /* nearest point, and normal of its face */
-    int32_t winding;
-    bool valid;   /* the results have been set */
-    bool on_face; /* the position is on a face */
+    ebpo_probe_side *side;      /* [part_count] */
+    bool valid;                 /* the results have been set */
 } ebpo_probe_query;
 
 struct ebpo_haptic {
     /* --- constant members --- */
-    ebpo_model *model;
+    ebpo_haptic_model *models; /* [model_count] */
+    ebpo_haptic_part *part;    /* [part_count] only probed_point changes, in haptic steps */
+    uint64_t model_count, part_count;
     ebpo_haptic_options options;
     ebpo_extent root; /* contains all faces */
-    double diagonal;  /* diagonal of the root cell */
+    double diagonal;  /* diagonal of `root` */
+    double slack;     /* of a probe: bound of the rounding of coordinates */
     double contact_distance,
         band;      /* contact_distance: radius plus skin, used as ebpo_ball_motion.radius; band:
                       tolerance of contact, used as ebpo_ball_motion.band */
     double margin; /* faces within this distance of the proxy are loaded */
-    bool solid;
-    ebpo_held_levels levels; /* upper levels of the octree, for probes */
 
     /* --- used by the thread of haptic steps --- */
     unsigned current_box, previous_box;   /* indices of the current and the previous box */
@@ -70,11 +95,9 @@ struct ebpo_haptic {
     ebpo_haptic_stats stats;
     uint32_t found[EBPO_HAPTIC_FACES];                    /* workspace: faces around the proxy */
     ebpo_near_node nearest_queue[EBPO_HAPTIC_VISITS + 2]; /* workspace of the search for faces */
-    double gap[EBPO_HAPTIC_FACES];   /* distances of the faces in `found` from the ball */
-    double away[3];                  /* direction away from the nearest face, if one was found */
-    ebpo_context *proxy_context;     /* for placing the proxy */
-    ebpo_known_winding probed_point; /* last probe's position and winding number */
-    unsigned step_result;            /* index in known[] of the result that steps use */
+    double gap[EBPO_HAPTIC_FACES]; /* distances of the faces in `found` from the ball */
+    double away[3];                /* direction away from the nearest face, if one was found */
+    unsigned step_result;          /* index in known[] of the result that steps use */
 
     /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
@@ -90,8 +113,8 @@ struct ebpo_haptic {
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_max;
 
     /* --- used by the loading thread --- */
-    ebpo_context *loading;
     unsigned loader_box;    /* index of the box that the loading thread may write */
+    uint64_t serial;        /* of the newest box */
     unsigned loader_result; /* index in known[] of the result that the loading thread may write */
     double last_query[3];   /* position of the last query for a probe */
     ebpo_extent newest_allowed; /* `allowed` of the newest box */
@@ -105,6 +128,27 @@ struct ebpo_haptic {
     pthread_mutex_t mutex; /* protects `failure`; never locked by a haptic step */
     ebpo_error failure;
 };
+
+/* haptic_part.c: makes the instances [count] and what they share. posed: false if there is one
+ * instance, whose pose is not used. A probe also gets the upper levels of the octrees. */
+EBPO_MUST_USE ebpo_status ebpo_haptic_parts_new(ebpo_haptic *t,
+                                                const ebpo_haptic_instance *instances,
+                                                uint64_t count, bool posed, ebpo_error *error);
+void ebpo_haptic_parts_free(ebpo_haptic *t);
+
+/* haptic_part.c: computes the point p, in coordinates of the instance's model, for a point w of the
+ * world. *uncertainty: as for ebpo_unpose; 0 if the instance is not posed. */
+void ebpo_haptic_part_point(const ebpo_haptic_part *part, const double w[3], double p[3],
+                            double *uncertainty);
+
+/* haptic_part.c: returns a lower bound of the distance of w from the faces of the instance. */
+double ebpo_haptic_part_gap(const ebpo_haptic_part *part, const double w[3]);
+
+/* haptic_part.c: loads the faces of all instances that are within t->margin of the box `allowed`.
+ * *fits: as for ebpo_face_box_add. */
+EBPO_MUST_USE ebpo_status ebpo_haptic_parts_load(ebpo_haptic *t, ebpo_face_box *box,
+                                                 const ebpo_extent *allowed, bool *fits,
+                                                 ebpo_error *error);
 
 /* haptic_step.c: moves the ball's proxy towards the goal, until faces, the end of the current box
  * or a limit of `work` stop the proxy. Returns bits of ebpo_haptic_flag. */

@@ -32,7 +32,7 @@ static void narrow_bounds(bounds *b, double lo, double hi)
 /* Bounds the rounding error of a length between points of the model. */
 static double rounding_of(const ebpo_haptic *t, double length)
 {
-    return t->levels.slack + EBPO_LENGTH_SLACK * length;
+    return t->slack + EBPO_LENGTH_SLACK * length;
 }
 
 /* Narrows the bounds by the faces of the current box. Returns true if the nearest face is known. */
@@ -44,6 +44,7 @@ static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     out->work += near.work;
     out->flags |= near.flags;
     out->face = near.face;
+    out->instance = near.instance;
     ebpo_vec3_copy(near.normal, out->normal);
     ebpo_vec3_copy(near.point, out->point);
     ebpo_vec3_copy(near.weight, out->weight);
@@ -78,45 +79,98 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return far == 0;
 }
 
-/* Finds the winding number at `place` by a move to `place` from the last position with a known
- * winding number. If the box does not contain that position, the move begins at the position of the
- * newest exact result. Returns false if the winding number is not found. */
-static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
+/* Narrows the bounds by the upper levels of the octrees. An instance whose box is farther away than
+ * the upper bound is omitted. */
+static void bound_by_levels(const ebpo_haptic *t, const double place[3], bounds *b)
+{
+    double lo = INFINITY, hi = INFINITY;
+    for (uint64_t i = 0; i < t->part_count; i++) {
+        const ebpo_haptic_part *part = &t->part[i];
+        double p[3], uncertainty, low, high;
+        if (part->is_posed && ebpo_haptic_part_gap(part, place) > fmin(hi, b->hi))
+            continue; /* its faces are not the nearest ones */
+        ebpo_haptic_part_point(part, place, p, &uncertainty);
+        ebpo_held_levels_bound(&part->of->levels, p, t->part_count == 1 ? VISITS : VISITS / 8, &low,
+                               &high);
+        double wider = part->is_posed ? uncertainty * part->scale + t->slack : 0;
+        lo = fmin(lo, low * part->scale - wider);
+        hi = fmin(hi, high * part->scale + wider);
+    }
+    narrow_bounds(b, fmin(lo, b->hi), hi);
+}
+
+/* Finds the winding number of an instance at `place` by a move to `place` from the last position
+ * with a known winding number. If the box does not contain that position, the move begins at the
+ * position of the newest exact result. Returns false if the winding number is not found. */
+static bool find_side(ebpo_haptic *t, ebpo_haptic_part *part, const double place[3],
+                      ebpo_haptic_probe_result *out)
 {
     const ebpo_probe_query *known = &t->known[t->step_result];
+    const ebpo_probe_side *side = &known->side[part->probed_point.instance];
     const ebpo_face_box *box = &t->box[t->current_box];
     for (int attempt = 0; attempt < 2; attempt++) {
-        if (ebpo_known_winding_move(&t->probed_point, box, place, t->found, EBPO_HAPTIC_FACES,
+        if (ebpo_known_winding_move(&part->probed_point, box, place, t->found, EBPO_HAPTIC_FACES,
                                     EBPO_HAPTIC_VISITS, &out->work))
             return true;
-        if (t->probed_point.known || !known->valid || known->on_face)
+        if (part->probed_point.known || !known->valid || side->on_face)
             return false;
-        ebpo_vec3_copy(known->place, t->probed_point.at);
-        t->probed_point.winding = known->winding;
-        t->probed_point.known = true;
+        ebpo_vec3_copy(known->place, part->probed_point.at);
+        part->probed_point.winding = side->winding;
+        part->probed_point.known = true;
     }
     return false;
 }
 
-/* Returns EBPO_IN, EBPO_OUT, EBPO_ON or EBPO_MAYBE for a position. */
-static int32_t classify_position(ebpo_haptic *t, const double place[3],
-                                 ebpo_haptic_probe_result *out)
+/* Sets *winding and returns true if the winding number of an instance at `place` follows from the
+ * upper levels of its octree. */
+static bool find_in_levels(const ebpo_haptic_part *part, const double place[3], int32_t *winding)
+{
+    double p[3], uncertainty;
+    *winding = 0;
+    if (part->is_posed && ebpo_haptic_part_gap(part, place) > 0)
+        return true;
+    ebpo_haptic_part_point(part, place, p, &uncertainty);
+    return ebpo_held_levels_winding(&part->of->levels, p, uncertainty, winding);
+}
+
+/* Returns the side of `place` with respect to an instance: EBPO_IN, EBPO_OUT, EBPO_ON or
+ * EBPO_MAYBE. */
+static int32_t classify_in(ebpo_haptic *t, ebpo_haptic_part *part, const double place[3],
+                           ebpo_haptic_probe_result *out)
 {
     int32_t winding;
     const ebpo_face_box *box = &t->box[t->current_box];
-    if (!t->solid)
+    if (!part->solid)
         return EBPO_OUT;
-    if (ebpo_held_levels_winding(&t->levels, place, &winding)) {
-        ebpo_vec3_copy(place, t->probed_point.at);
-        t->probed_point.winding = winding;
-        t->probed_point.known = true;
+    if (find_in_levels(part, place, &winding)) {
+        ebpo_vec3_copy(place, part->probed_point.at);
+        part->probed_point.winding = winding;
+        part->probed_point.known = true;
     } else if (ebpo_extent_holds(&box->allowed, place) &&
-               ebpo_is_on_face(box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS)) {
+               ebpo_is_on_face(box, part->probed_point.instance, place, t->found, EBPO_HAPTIC_FACES,
+                               EBPO_HAPTIC_VISITS)) {
         return EBPO_ON;
-    } else if (!find_side(t, place, out)) {
+    } else if (!find_side(t, part, place, out)) { /* also fails if `place` is on a face */
         return EBPO_MAYBE;
     }
-    return ebpo_rule_inside(t->model->info->rule, t->probed_point.winding) ? EBPO_IN : EBPO_OUT;
+    return ebpo_rule_inside(part->of->model->info->rule, part->probed_point.winding) ? EBPO_IN
+                                                                                     : EBPO_OUT;
+}
+
+/* Returns EBPO_IN if a position is in an instance. Otherwise returns EBPO_MAYBE if it may be in
+ * one, EBPO_ON if it is on a face, or EBPO_OUT. */
+static int32_t classify_position(ebpo_haptic *t, const double place[3],
+                                 ebpo_haptic_probe_result *out)
+{
+    bool on = false, maybe = false;
+    for (uint64_t i = 0; i < t->part_count; i++) {
+        int32_t where = classify_in(t, &t->part[i], place, out);
+        if (where == EBPO_IN)
+            return EBPO_IN;
+        on |= where == EBPO_ON;
+        maybe |= where == EBPO_MAYBE;
+    }
+    return maybe ? EBPO_MAYBE : on ? EBPO_ON : EBPO_OUT;
 }
 
 /* Sets the interval of the signed distance. close: the nearest face or the exact distance is known,
@@ -154,9 +208,7 @@ void ebpo_haptic_step_probe(ebpo_haptic *t, const double place[3], ebpo_haptic_p
     (void)ebpo_haptic_take_box(t);
     bool close = bound_by_faces(t, at, out, &b);
     close |= bound_by_known(t, at, out, &b);
-    double lo, hi;
-    ebpo_held_levels_bound(&t->levels, at, VISITS, &lo, &hi);
-    narrow_bounds(&b, lo, hi);
+    bound_by_levels(t, at, &b);
     out->where = classify_position(t, at, out);
     fill_bounds(out, &b, close);
     ebpo_haptic_count(t, out->flags | (out->flags & EBPO_HAPTIC_ACCURATE ? 0 : EBPO_HAPTIC_WAITING),

@@ -62,15 +62,17 @@ typedef struct face_search {
 /* Adds the normal of a face to `sum`, weighted by the face's area and by a factor that decreases to
  * 0 at the search radius. The normal of a solid's face points outwards; the normal of a surface's
  * face is turned to the proxy's side. gap: distance of the face from the ball. */
-static void add_normal(const face_search *a, const double face[3][3], double gap, double sum[3])
+static void add_normal(const face_search *a, uint32_t number, double gap, double sum[3])
 {
+    const double(*face)[3] = (const double(*)[3])a->box->corner[number];
+    bool solid = a->t->part[a->box->instance[number]].solid;
     double e[3], f[3], n[3], d[3];
     double far = fmax(gap, 0) / a->search_radius, weight = (1 - far) * (1 - far);
     ebpo_vec3_subtract(face[1], face[0], e);
     ebpo_vec3_subtract(face[2], face[0], f);
     ebpo_vec3_subtract(a->t->proxy, face[0], d);
     ebpo_vec3_cross(e, f, n);
-    if (!a->t->solid && ebpo_vec3_dot(n, d) < 0)
+    if (!solid && ebpo_vec3_dot(n, d) < 0)
         weight = -weight;
     for (int i = 0; i < 3; i++)
         sum[i] += weight * n[i];
@@ -93,6 +95,7 @@ static void add_face(face_search *a, uint64_t f)
     a->nearest = near.distance;
     ebpo_vec3_copy(near.away, a->t->away);
     a->out->face = a->box->face[f];
+    a->out->instance = a->box->instance[f];
     for (int i = 0; i < 3; i++) {
         a->out->weight[i] = near.weight[i];
         a->out->point[i] = a->t->proxy[i] - near.distance * near.away[i];
@@ -153,7 +156,7 @@ static void report_normal(const face_search *a, double out[3])
     double sum[3] = { 0 };
     for (uint32_t i = 0; i < a->count; i++)
         if (a->t->gap[i] < a->search_radius)
-            add_normal(a, (const double(*)[3])a->box->corner[a->t->found[i]], a->t->gap[i], sum);
+            add_normal(a, a->t->found[i], a->t->gap[i], sum);
     double length = sqrt(ebpo_vec3_dot(sum, sum));
     if (!(length > 0) && a->count > 0 && a->t->options.kind == EBPO_HAPTIC_BALL) {
         ebpo_vec3_subtract(a->t->proxy, a->out->point, sum);

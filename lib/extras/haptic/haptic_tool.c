@@ -16,9 +16,15 @@
 #include "extras/haptic/haptic_parts.h"
 
 /* Limits of visited nodes in a search. CLUSTER_VISITS: around a cluster; POINT_VISITS: around a
- * point; FACE_VISITS: for the faces around a point's path. FACE_COST: work of examining a face, in
- * visited nodes. */
-enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
+ * point; KEPT_VISITS: for the kept faces of a point; FACE_VISITS: for the faces around a point's
+ * path. FACE_COST: work of examining a face, in visited nodes. */
+enum {
+    CLUSTER_VISITS = 400,
+    POINT_VISITS = 48,
+    KEPT_VISITS = 192,
+    FACE_VISITS = 256,
+    FACE_COST = 6
+};
 
 /* Distances in units of the skin. */
 static const double search_distance =
@@ -35,7 +41,8 @@ typedef struct tool_piece {
     const ebpo_face_box *box; /* NULL: the current box does not contain the proxy, because no face
                                * is near the path */
     double skin;              /* distance that the tool keeps from faces (ebpo_haptic_options) */
-    double angle;             /* angle of rotation of the piece, in radians */
+    double length, angle;     /* of the piece: length of its translation, and angle of its rotation
+                               * in radians */
     uint64_t *work;           /* work of the haptic step so far */
 } tool_piece;
 
@@ -48,6 +55,7 @@ static tool_piece make_piece(ebpo_haptic *t, uint64_t *work)
                          tool,
                          is_in_box ? box : NULL,
                          t->options.skin,
+                         sqrt(ebpo_vec3_dot(tool->motion, tool->motion)),
                          sqrt(ebpo_vec3_dot(tool->motion + 3, tool->motion + 3)) / tool->arm,
                          work };
 }
@@ -61,8 +69,10 @@ static void box_of_segment(const double p[3], const double q[3], double wide, eb
 }
 
 /* Returns a lower bound of the distance of `e` from all faces. The bound is computed from the faces
- * of the box and the boundary of the loaded region, or from the box of the model. */
-static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
+ * of the box and the boundary of the loaded region, or from the box of the model. *leaf: see
+ * ebpo_face_box_gap. */
+static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits,
+                            uint64_t *leaf)
 {
     double out = 0, inside = INFINITY;
     for (int i = 0; i < 3; i++)
@@ -72,45 +82,35 @@ static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t 
     for (int i = 0; i < 3; i++)
         inside = fmin(inside,
                       fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
-    return fmax(out, fmin(inside, ebpo_face_box_gap(p->box, e, visits, p->work)));
+    return fmax(out, fmin(inside, ebpo_face_box_gap(p->box, e, visits, leaf, p->work)));
 }
 
-/* Bounds the motion of a point, given its lever arm about the centre of rotation. */
-static double max_point_motion(const tool_piece *p, double lever)
+/* Bounds the motion of points whose distance from the tool's centre is at most `lever`. */
+static double max_motion(const tool_piece *p, double lever)
 {
-    return sqrt(ebpo_vec3_dot(p->tool->motion, p->tool->motion)) + lever * p->angle;
+    return (p->length + lever * p->angle) * (1 + 0x1p-40);
 }
 
-static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
-
-static double max_motion(const tool_piece *p, const ebpo_tool_cluster *c)
+/* Sets the end of the point's straight path if the piece is complete. */
+static void end_of_point(const tool_piece *p, uint32_t point, double out[3])
 {
-    return max_point_motion(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
-}
-
-/* Adds a point to tool->close_points with the faces around its path. Ends the piece where the point
- * comes too close to one of these faces. Returns false if the pool is full or too many faces are
- * around the path. */
-static bool add_close_point(const tool_piece *p, uint32_t point)
-{
-    ebpo_tool *tool = p->tool;
-    double from[3], lever[3], motion[3], to[3];
-    ebpo_extent e;
-    uint32_t count, visits = FACE_VISITS;
-    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
+    const ebpo_tool *tool = p->tool;
+    double lever[3];
     ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], lever);
     for (int i = 0; i < 3; i++)
-        to[i] = tool->proxy.place[i] + tool->motion[i] + lever[i];
+        out[i] = tool->proxy.place[i] + tool->motion[i] + lever[i];
+}
+
+/* Adds a point to tool->close_points with the last `count` faces of the pool, which are around its
+ * path. Ends the piece where the point comes too close to one of these faces. */
+static void add_close_point(const tool_piece *p, uint32_t point, const double from[3],
+                            const double to[3], uint32_t count)
+{
+    ebpo_tool *tool = p->tool;
+    double motion[3];
     ebpo_vec3_subtract(to, from, motion);
-    box_of_segment(from, to, search_distance * p->skin, &e);
-    if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
-        return false;
-    bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
-                                  &visits, &count);
-    *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
-    if (!all)
-        return false;
     const ebpo_ball_motion ball = { from, motion, stop_distance * p->skin, p->t->band, 0, 0 };
+    *p->work += FACE_COST * (uint64_t)count;
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
         double fraction = ebpo_ball_first_contact(
@@ -120,33 +120,137 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     tool->close_points[tool->close_count++] =
         (ebpo_close_point){ point, (uint32_t)tool->pool_count, count };
     tool->pool_count += count;
+}
+
+/* Finds the faces around the path of a point, and adds the point to tool->close_points. Returns
+ * false if the pool is full or too many faces are around the path. */
+static bool find_close_point(const tool_piece *p, uint32_t point, const double from[3])
+{
+    ebpo_tool *tool = p->tool;
+    double to[3];
+    ebpo_extent e;
+    uint32_t count, visits = FACE_VISITS;
+    end_of_point(p, point, to);
+    box_of_segment(from, to, search_distance * p->skin, &e);
+    bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
+                                  &visits, &count);
+    *p->work += FACE_VISITS - visits;
+    if (all)
+        add_close_point(p, point, from, to, count);
+    return all;
+}
+
+/* Returns true if the kept faces of a point are all faces within `reach` of its position `at`. */
+static bool are_kept(const tool_piece *p, const ebpo_kept_faces *kept, const double at[3],
+                     double reach)
+{
+    double far = 0;
+    for (int i = 0; i < 3; i++)
+        far = fmax(far, fabs(at[i] - kept->middle[i]));
+    return kept->serial == p->box->serial && far + reach <= kept->wide;
+}
+
+/* Finds the faces within `reach` of the position `at` of a point, and keeps them, if possible with
+ * those of a wider surrounding. Returns false if there are too many to be kept. */
+static bool keep_faces(const tool_piece *p, ebpo_kept_faces *kept, const double at[3], double reach)
+{
+    static const double widths[] = { 8, 1 };
+    double loaded = INFINITY;
+    for (int i = 0; i < 3; i++)
+        loaded = fmin(loaded, fmin(at[i] - p->box->loaded.min[i], p->box->loaded.max[i] - at[i]));
+    kept->serial = 0;
+    for (int k = 0; k < 2 && kept->serial == 0 && reach < loaded; k++) {
+        uint32_t visits = KEPT_VISITS;
+        ebpo_extent e;
+        kept->wide = fmin(widths[k] * reach, loaded) * (1 - 0x1p-40);
+        box_of_segment(at, at, kept->wide, &e);
+        ebpo_vec3_copy(at, kept->middle);
+        if (ebpo_face_box_find(p->box, &e, kept->face, EBPO_TOOL_KEPT, &visits, &kept->count))
+            kept->serial = p->box->serial;
+        *p->work += KEPT_VISITS - visits;
+    }
+    return are_kept(p, kept, at, reach * (1 - 0x1p-30));
+}
+
+/* Examines a point with its kept faces: sets tool->safe_until, and adds the point to
+ * tool->close_points if it may come too close to a face. motion: bound of its motion. */
+static void inspect_kept(const tool_piece *p, uint32_t point, const double from[3], double motion,
+                         double travelled)
+{
+    ebpo_tool *tool = p->tool;
+    const ebpo_kept_faces *kept = &tool->kept[point];
+    double margin = search_distance * p->skin, nearest = kept->wide, to[3];
+    uint32_t count = 0;
+    for (int i = 0; i < 3; i++)
+        nearest = fmin(nearest, kept->wide - fabs(from[i] - kept->middle[i]));
+    *p->work += FACE_COST * (uint64_t)kept->count;
+    for (uint32_t i = 0; i < kept->count; i++) {
+        ebpo_face_near near;
+        ebpo_face_nearest(from, (const double(*)[3])p->box->corner[kept->face[i]], &near);
+        double distance = near.distance - p->t->band;
+        nearest = fmin(nearest, distance);
+        if (distance - motion - margin <= 0)
+            tool->pool[tool->pool_count + count++] = kept->face[i];
+    }
+    tool->safe_until[point] = travelled + nearest - margin;
+    if (count == 0)
+        return;
+    end_of_point(p, point, to);
+    add_close_point(p, point, from, to, count);
+}
+
+/* Examines a point of a cluster. motion: bound of its motion. Returns false if the piece must be
+ * given up. */
+static bool inspect_point(const tool_piece *p, ebpo_tool_cluster *c, uint32_t point, double motion)
+{
+    ebpo_tool *tool = p->tool;
+    double margin = search_distance * p->skin, travelled = ebpo_tool_travelled(tool, c->lever);
+    double from[3];
+    if (tool->safe_until[point] - travelled - motion > 0)
+        return true;
+    if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
+        return false;
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
+    if (are_kept(p, &tool->kept[point], from, motion + margin) ||
+        keep_faces(p, &tool->kept[point], from, motion + margin)) {
+        inspect_kept(p, point, from, motion, travelled);
+        return true;
+    }
+    ebpo_extent e;
+    box_of_segment(from, from, 0, &e);
+    tool->safe_until[point] = travelled + free_distance(p, &e, POINT_VISITS, &c->leaf) - margin;
+    return tool->safe_until[point] - travelled - motion > 0 || find_close_point(p, point, from);
+}
+
+/* Examines the points of a cluster whose bounding ball may hit faces, from tool->next_point on.
+ * Returns false if the piece must be given up. If the work of the haptic step is done before, the
+ * next step continues with tool->next_point; otherwise sets it to 0. */
+static bool inspect_points(const tool_piece *p, ebpo_tool_cluster *c, double motion)
+{
+    ebpo_tool *tool = p->tool;
+    double least = INFINITY;
+    c->safe_until = 0; /* not known, until all points have been examined */
+    for (; tool->next_point < c->count; tool->next_point++) {
+        if (tool->next_point > 0 && *p->work > EBPO_TOOL_WORK)
+            return true;
+        if (!inspect_point(p, c, c->first + tool->next_point, motion))
+            return false;
+    }
+    tool->next_point = 0;
+    for (uint32_t i = c->first; i < c->first + c->count; i++)
+        least = fmin(least, tool->safe_until[i]);
+    c->safe_until = least;
     return true;
 }
 
-/* Examines the points of a cluster whose bounding ball may hit faces. Returns false if the piece
- * must be given up. */
-static bool inspect_points(const tool_piece *p, uint32_t number)
+/* Returns true if less than half of the points of a cluster must be examined again. */
+static bool few_expired(const tool_piece *p, const ebpo_tool_cluster *c, double motion)
 {
-    ebpo_tool *tool = p->tool;
-    ebpo_tool_cluster *c = &tool->cluster[number];
-    double margin = search_distance * p->skin;
-    double least = INFINITY;
-    c->safe_until = 0; /* not known, until all points have been examined */
-    for (uint32_t i = c->first; i < c->first + c->count; i++) {
-        double motion = max_point_motion(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
-        if (tool->safe_until[i] - c->travelled - motion <= 0) {
-            double at[3];
-            ebpo_extent e;
-            ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
-            box_of_segment(at, at, 0, &e);
-            tool->safe_until[i] = c->travelled + free_distance(p, &e, POINT_VISITS) - margin;
-        }
-        if (tool->safe_until[i] - c->travelled - motion <= 0 && !add_close_point(p, i))
-            return false;
-        least = fmin(least, tool->safe_until[i]);
-    }
-    c->safe_until = least;
-    return true;
+    double used = ebpo_tool_travelled(p->tool, c->lever) + motion;
+    uint32_t expired = 0;
+    for (uint32_t i = c->first; i < c->first + c->count; i++)
+        expired += p->tool->safe_until[i] - used <= 0;
+    return 2 * expired < c->count;
 }
 
 /* Examines a cluster of points. Returns false if the piece must be given up. */
@@ -154,18 +258,20 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
-    double motion = max_motion(p, c);
+    double motion = max_motion(p, c->lever), travelled = ebpo_tool_travelled(tool, c->lever);
     ++*p->work;
-    if (!p->box || c->safe_until - c->travelled - motion > 0)
+    if (tool->next_point == 0 && c->safe_until - travelled - motion > 0)
         return true;
+    if (tool->next_point > 0 || few_expired(p, c, motion))
+        return inspect_points(p, c, motion);
     double at[3], distance;
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
     box_of_segment(at, at, c->radius, &e);
-    distance = free_distance(p, &e, CLUSTER_VISITS) - search_distance * p->skin;
+    distance = free_distance(p, &e, CLUSTER_VISITS, &c->leaf) - search_distance * p->skin;
     if (distance - motion <= 0)
-        return inspect_points(p, number);
-    c->safe_until = c->travelled + distance;
+        return inspect_points(p, c, motion);
+    c->safe_until = travelled + distance;
     for (uint32_t i = c->first; i < c->first + c->count; i++)
         tool->safe_until[i] = fmax(tool->safe_until[i], c->safe_until);
     return true;
@@ -178,7 +284,8 @@ static void add_contact(const tool_piece *p, const ebpo_close_point *close, uint
     ebpo_tool_contact c = { .space = near->distance - p->skin,
                             .gap = near->distance,
                             .point = tool->number[close->point],
-                            .face = p->box->face[face] };
+                            .face = p->box->face[face],
+                            .instance = p->box->instance[face] };
     double lever[3];
     ebpo_rigid_lever((const double(*)[3])tool->end_matrix, tool->point[close->point], lever);
     ebpo_vec3_copy(near->away, c.normal);
@@ -241,13 +348,12 @@ static void begin_check(ebpo_tool *tool)
     ebpo_rigid_matrix(&tool->end, tool->end_matrix);
 }
 
-/* Moves the tool to the end of the piece, and adds the motion to `travelled` of each cluster. */
+/* Moves the tool to the end of the piece, and adds the motion to the length of its path. */
 static void end_piece(const tool_piece *p)
 {
     ebpo_tool *tool = p->tool;
-    for (uint64_t i = 0; i < tool->cluster_count; i++)
-        tool->cluster[i].travelled +=
-            tool->fraction * max_motion(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
+    tool->moved += tool->fraction * p->length * (1 + 0x1p-40) + 0x1p-8 * p->t->band;
+    tool->turned += tool->fraction * p->angle * (1 + 0x1p-40);
     tool->contacts = tool->next;
     tool->proxy = tool->end;
     tool->stage = EBPO_TOOL_IDLE;
@@ -297,7 +403,8 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     ebpo_rigid_move(&tool->proxy, tool->motion, 1, tool->arm, &end);
     ebpo_rigid_matrix(&end, tool->to_matrix);
     tool->stage = EBPO_TOOL_SEARCHES;
-    tool->next_index = tool->close_count = tool->pool_count = 0;
+    tool->next_point = 0;
+    tool->next_index = tool->close_count = tool->pool_count = tool->piece_work = 0;
     tool->fraction = 1;
     return true;
 }
@@ -311,19 +418,50 @@ static uint32_t give_up_piece(tool_piece *p)
     return EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
+/* If the next cluster is the first one of a group that is safe in this piece, moves on to the next
+ * group, and returns true. */
+static bool skip_group(const tool_piece *p)
+{
+    ebpo_tool *tool = p->tool;
+    const ebpo_tool_group *g = &tool->group[tool->next_index / EBPO_TOOL_GROUP];
+    if (tool->next_index % EBPO_TOOL_GROUP != 0 ||
+        g->safe_until - ebpo_tool_travelled(tool, g->lever) - max_motion(p, g->lever) <= 0)
+        return false;
+    ++*p->work;
+    tool->next_index += EBPO_TOOL_GROUP;
+    return true;
+}
+
+/* Sets `safe_until` of the group whose last cluster has been examined. */
+static void end_group(const tool_piece *p)
+{
+    ebpo_tool *tool = p->tool;
+    uint64_t end = tool->next_index;
+    ebpo_tool_group *g = &tool->group[end / EBPO_TOOL_GROUP - 1];
+    double least = INFINITY;
+    for (uint64_t i = end - EBPO_TOOL_GROUP; i < end; i++)
+        least = fmin(least, tool->cluster[i].safe_until -
+                                ebpo_tool_travelled(tool, tool->cluster[i].lever));
+    g->safe_until = ebpo_tool_travelled(tool, g->lever) + least;
+}
+
 /* Continues the piece, within the work of a haptic step. Returns bits of ebpo_haptic_flag.
  * *arrived: the tool has moved to the end of the piece. */
-static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arrived)
+static uint32_t continue_piece(ebpo_haptic *t, uint64_t *work, bool *arrived)
 {
     tool_piece p = make_piece(t, work);
     ebpo_tool *tool = t->tool;
-    *arrived = false;
-    for (; tool->stage == EBPO_TOOL_SEARCHES && tool->next_index < tool->cluster_count;
-         tool->next_index++) {
+    while (p.box && tool->stage == EBPO_TOOL_SEARCHES && tool->next_index < tool->cluster_count) {
         if (*work > EBPO_TOOL_WORK)
             return EBPO_HAPTIC_PATH_UNFINISHED;
+        if (skip_group(&p))
+            continue;
         if (!inspect_cluster(&p, (uint32_t)tool->next_index))
             return give_up_piece(&p);
+        if (tool->next_point > 0)
+            return EBPO_HAPTIC_PATH_UNFINISHED;
+        if (++tool->next_index % EBPO_TOOL_GROUP == 0)
+            end_group(&p);
     }
     if (tool->stage == EBPO_TOOL_SEARCHES)
         begin_check(tool);
@@ -337,9 +475,24 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
     tool->jams = tool->fraction == 0 && tool->next.count <= tool->contacts.count;
     end_piece(&p);
     *arrived = true;
-    if (t->max_piece < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
-        t->max_piece *= 2;
     return tool->fraction < 1 ? 0 : tool->flags;
+}
+
+/* Does the same as continue_piece, and sets t->max_piece so that a piece takes about a quarter of
+ * the work of a haptic step. A shorter piece examines fewer points, and the points' kept faces
+ * serve several pieces. */
+static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arrived)
+{
+    ebpo_tool *tool = t->tool;
+    uint64_t before = *work;
+    *arrived = false;
+    uint32_t flags = continue_piece(t, work, arrived);
+    tool->piece_work += *work - before;
+    if (*arrived && tool->piece_work > EBPO_TOOL_WORK / 3)
+        t->max_piece = fmax(0.5 * ebpo_screw_length(tool->motion), 4 * t->options.skin);
+    else if (*arrived && tool->piece_work < EBPO_TOOL_WORK / 6 && t->max_piece < t->diagonal)
+        t->max_piece *= 2;
+    return flags;
 }
 
 /* --- the step --- */
@@ -457,6 +610,7 @@ static void report_contact(const ebpo_haptic *t, ebpo_haptic_tool_result *out)
         return;
     out->point = nearest->point;
     out->face = nearest->face;
+    out->instance = nearest->instance;
     ebpo_vec3_copy(nearest->normal, out->normal);
 }
 

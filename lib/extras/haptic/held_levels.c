@@ -142,12 +142,14 @@ void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], i
     *hi = upper + levels->slack + EBPO_LENGTH_SLACK * upper;
 }
 
-bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], int32_t *winding)
+bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], double margin,
+                              int32_t *winding)
 {
     const ebpo_held_node *n = &levels->node[0];
+    double away = distance_to_cell(n, p);
     *winding = 0;
-    if (distance_to_cell(n, p) > 0)
-        return true;
+    if (away > 0)
+        return away > 2 * margin;
     while (n->children != EBPO_NO_CHILDREN) {
         uint32_t octant = 0;
         const ebpo_held_node *low = &levels->node[n->children]; /* first child; its high corner is
@@ -156,6 +158,9 @@ bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3],
             octant |= (uint32_t)(p[i] >= low->high[i]) << i;
         n = low + octant;
     }
+    for (int i = 0; i < 3; i++)
+        if (p[i] - margin < n->low[i] || p[i] + margin > n->high[i])
+            return false;
     *winding = n->winding;
     return !n->has_faces;
 }

@@ -34,8 +34,9 @@ void ebpo_held_levels_free(ebpo_held_levels *levels);
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi);
 
-/* Returns true and sets *winding if p is in a cell without faces, or outside the root cell, where
- * the winding number is 0. */
-bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], int32_t *winding);
+/* Returns true and sets *winding if all points within `margin` (0 or more) of p are in one cell
+ * without faces, or outside the root cell, where the winding number is 0. */
+bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], double margin,
+                              int32_t *winding);
 
 #endif

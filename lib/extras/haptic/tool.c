@@ -306,8 +306,12 @@ static void add_cluster(ebpo_tool *t, const numbered_point *p, uint64_t first, u
     for (uint64_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             c->middle[k] += p[first + i].p[k] / (double)count;
-    for (uint64_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count; i++) {
         c->radius = fmax(c->radius, point_distance(p[first + i].p, c->middle));
+        c->lever = fmax(c->lever, point_distance(p[first + i].p, (const double[3]){ 0 }));
+    }
+    ebpo_tool_group *g = &t->group[(t->cluster_count - 1) / EBPO_TOOL_GROUP];
+    g->lever = fmax(g->lever, c->lever);
 }
 
 /* Splits points [first, first + count) at the middle of their longest side until each part is a
@@ -340,6 +344,7 @@ static void fill_tool(ebpo_tool *t, const double (*points)[3], numbered_point *p
         ebpo_vec3_copy(p[i].p, t->point[i]);
         t->number[i] = p[i].number;
         t->close_points[i] = (ebpo_close_point){ 0 };
+        t->kept[i] = (ebpo_kept_faces){ 0 };
     }
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
         t->pool[i] = 0; /* writes to all pages, so that no haptic step waits for the operating
@@ -351,8 +356,9 @@ static void fill_tool(ebpo_tool *t, const double (*points)[3], numbered_point *p
 uint64_t ebpo_tool_bytes(const ebpo_tool *t)
 {
     return sizeof *t + EBPO_TOOL_POOL * sizeof *t->pool +
-           t->count * (sizeof *t->point + sizeof *t->number + sizeof *t->safe_until +
-                       sizeof *t->close_points + sizeof *t->cluster);
+           t->count *
+               (sizeof *t->point + sizeof *t->number + sizeof *t->safe_until + sizeof *t->kept +
+                sizeof *t->close_points + sizeof *t->cluster + sizeof *t->group);
 }
 
 ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t count, ebpo_tool **out,
@@ -365,12 +371,14 @@ ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t count, ebpo_tool *
         t->point = ebpo_alloc(count, sizeof *t->point);
         t->number = ebpo_alloc(count, sizeof *t->number);
         t->safe_until = ebpo_alloc(count, sizeof *t->safe_until);
+        t->kept = ebpo_alloc(count, sizeof *t->kept);
         t->close_points = ebpo_alloc(count, sizeof *t->close_points);
         t->cluster = ebpo_alloc(count, sizeof *t->cluster);
+        t->group = ebpo_alloc_zero(count, sizeof *t->group);
         t->pool = ebpo_alloc(EBPO_TOOL_POOL, sizeof *t->pool);
     }
-    bool allocated = t && p && t->point && t->number && t->safe_until && t->close_points &&
-                     t->cluster && t->pool;
+    bool allocated = t && p && t->point && t->number && t->safe_until && t->kept &&
+                     t->close_points && t->cluster && t->group && t->pool;
     if (allocated)
         fill_tool(t, points, p);
     free(p);
@@ -384,8 +392,10 @@ void ebpo_tool_free(ebpo_tool *t)
     free(t->point);
     free(t->number);
     free(t->safe_until);
+    free(t->kept);
     free(t->close_points);
     free(t->cluster);
+    free(t->group);
     free(t->pool);
     free(t);
 }
@@ -398,8 +408,9 @@ void ebpo_tool_put(ebpo_tool *t, const ebpo_rigid *at)
     t->path_count = 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         t->force[k] = 0;
+    t->moved = t->turned = 0;
     for (uint64_t i = 0; i < t->cluster_count; i++)
-        t->cluster[i].travelled = t->cluster[i].safe_until = 0;
+        t->cluster[i].safe_until = t->group[i / EBPO_TOOL_GROUP].safe_until = 0;
     for (uint64_t i = 0; i < t->count; i++)
         t->safe_until[i] = 0;
 }

@@ -81,6 +81,7 @@ typedef struct ebpo_tool_contact {
                            * must move away by -space */
     double gap;           /* distance of the point from the face */
     uint64_t point, face; /* indices for the caller */
+    uint32_t instance;    /* index of the face's instance */
     double normal[3];     /* unit vector from the face to the point */
 } ebpo_tool_contact;
 
@@ -104,20 +105,37 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
 enum {
     EBPO_TOOL_POINTS = 10000, /* number of points of a tool */
     EBPO_TOOL_CLUSTER = 8,    /* number of points of a cluster */
+    EBPO_TOOL_GROUP = 16,     /* number of clusters of a group */
     EBPO_TOOL_PIECES = 6,     /* number of pieces of the path in a haptic step */
     EBPO_TOOL_POOL = 1 << 16, /* number of faces around all points in total */
     EBPO_TOOL_NEAR = 64,      /* number of faces around a point */
-    EBPO_TOOL_WORK = 4000     /* work of a haptic step: visited nodes, plus six for each face */
+    EBPO_TOOL_KEPT = 8,       /* number of faces that are kept for a point */
+    EBPO_TOOL_WORK = 6500     /* work of a haptic step: visited nodes, plus six for each face */
 };
 
 /* A set of points that are near each other. */
 typedef struct ebpo_tool_cluster {
     uint32_t first, count;    /* indices of its points: first .. first + count - 1 */
     double middle[3], radius; /* a ball around the points, in the tool's coordinates */
-    double travelled;         /* upper bound of the length of each point's path, over all pieces */
-    double safe_until; /* no point of the cluster can hit a face before `travelled` is greater than
-                          this value */
+    double lever;             /* greatest distance of a point from the tool's centre */
+    double safe_until; /* no point of the cluster can hit a face before ebpo_tool_travelled is
+                          greater than this value */
+    uint64_t leaf;     /* leaf of a face box near the cluster; any value is valid */
 } ebpo_tool_cluster;
+
+/* Clusters that are near each other: cluster number GROUP n to GROUP (n + 1) - 1 for group n. */
+typedef struct ebpo_tool_group {
+    double lever;
+    double safe_until; /* as for a cluster, for all clusters of the group */
+} ebpo_tool_group;
+
+/* The faces around a point, which are kept from one piece to the next. */
+typedef struct ebpo_kept_faces {
+    uint64_t serial; /* ebpo_face_box.serial of the box that has the faces; 0: none are kept */
+    double middle[3],
+        wide; /* all faces that intersect the cube middle - wide to middle + wide are kept */
+    uint32_t count, face[EBPO_TOOL_KEPT]; /* indices in ebpo_face_box.corner */
+} ebpo_kept_faces;
 
 /* A point that may hit faces in the current piece: the faces pool[first] to pool[first + count -
  * 1]. */
@@ -133,12 +151,16 @@ typedef enum ebpo_tool_stage {
 
 typedef struct ebpo_tool {
     uint64_t count, cluster_count;
-    double (*point)[3]; /* in the tool's coordinates, cluster after cluster */
-    uint32_t *number;   /* [count] index of each point in the caller's array */
-    double *safe_until; /* [count] as ebpo_tool_cluster.safe_until, for one point */
-    double radius, arm; /* radius: greatest distance of a point from the centre; arm: root of the
-                           mean square of the distances of all points */
+    double (*point)[3];    /* in the tool's coordinates, cluster after cluster */
+    uint32_t *number;      /* [count] index of each point in the caller's array */
+    double *safe_until;    /* [count] as ebpo_tool_cluster.safe_until, for one point */
+    ebpo_kept_faces *kept; /* [count] */
+    double radius, arm;    /* radius: greatest distance of a point from the centre; arm: root of the
+                              mean square of the distances of all points */
     ebpo_tool_cluster *cluster;
+    ebpo_tool_group *group;
+    double moved, turned; /* upper bounds of the length of the centre's path and of the angle of all
+                           * rotations, over all pieces */
 
     ebpo_rigid proxy, device;
     ebpo_rigid path[EBPO_TOOL_PIECES + 1]; /* positions of the proxy in the last haptic step */
@@ -157,6 +179,8 @@ typedef struct ebpo_tool {
     double to_matrix[3][3];   /* rotation at the end of the whole piece */
     double end_matrix[3][3];  /* rotation of `end` */
     uint32_t flags; /* bits of ebpo_haptic_flag that the step returns when the piece is complete */
+    uint32_t next_point; /* number in its cluster of the point that is examined next */
+    uint64_t piece_work; /* work of the piece so far */
     uint64_t next_index; /* index of the cluster or of the close point that is examined next */
     ebpo_close_point *close_points; /* [close_count] */
     uint64_t close_count;
@@ -172,6 +196,13 @@ uint64_t ebpo_tool_bytes(const ebpo_tool *tool);
 /* Places the tool at another position without following a path, and discards all known distances.
  */
 void ebpo_tool_put(ebpo_tool *tool, const ebpo_rigid *at);
+
+/* Returns an upper bound of the length of the path, over all pieces, of a point whose distance from
+ * the tool's centre is at most `lever`. */
+static inline double ebpo_tool_travelled(const ebpo_tool *tool, double lever)
+{
+    return tool->moved + lever * tool->turned;
+}
 
 /* Computes the position in the world of the tool's point p. matrix: the rotation of r. */
 static inline void ebpo_tool_at(const ebpo_rigid *r, const double matrix[3][3], const double p[3],

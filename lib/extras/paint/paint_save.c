@@ -182,8 +182,9 @@ static void remember_version(ebpo_paint_file *f, char *path, int fd)
     f->version = ebpo_file_version_of(fd);
 }
 
-/* Saves the paint. keeps_lock: the lock of the paint's file is kept. */
-static ebpo_status save_locked(const ebpo_paint *p, const char *path, bool keeps_lock,
+/* Saves the paint. checkpoint: keeps the lock of the paint's file, and does not wait for the disk.
+ */
+static ebpo_status save_locked(const ebpo_paint *p, const char *path, bool checkpoint,
                                ebpo_error *error)
 {
     enum { LINKS = 4 };
@@ -198,6 +199,7 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, bool keeps
     bool to_own_file = target && f->path && strcmp(f->path, target) == 0, first = !f->path;
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&publish, path, error);
+    publish.unsynced = checkpoint;
     if (status == EBPO_OK && (to_own_file || first) &&
         (fd = fcntl(publish.fd, F_DUPFD_CLOEXEC, 3)) < 0)
         status = ebpo_fail_errno(error, path, "could not be written");
@@ -215,7 +217,7 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, bool keeps
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
     /* released after a failure, too: other programs may then change the file */
-    if (to_own_file && !keeps_lock)
+    if (to_own_file && !checkpoint)
         ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
         remember_version(f, target, fd);

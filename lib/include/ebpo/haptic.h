@@ -2,7 +2,7 @@
  * Computes haptic forces for a device that explores a model, at a steady rate with a deadline for
  * each step.
  *
- *   Making    ebpo_haptic_new, ebpo_haptic_free
+ *   Making    ebpo_haptic_new, ebpo_haptic_new_posed (several models), ebpo_haptic_free
  *
  *   A step    ebpo_haptic_step_ball, ebpo_haptic_ball_path: a ball
  *             ebpo_haptic_step_probe: a probe, which is a point without collisions
@@ -39,7 +39,7 @@
 #ifndef EBPO_HAPTIC_H
 #define EBPO_HAPTIC_H
 
-#include <ebpo/query.h>
+#include <ebpo/pose.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -143,6 +143,34 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
                                                    const double position[3], ebpo_haptic **out,
                                                    ebpo_error *error);
 
+/* A model at a pose. */
+typedef struct ebpo_haptic_instance {
+    ebpo_model *model;
+    ebpo_pose pose;
+} ebpo_haptic_instance;
+
+/*
+ * Makes a haptic object for instances of models, which it touches together: its faces are the posed
+ * faces (pose.h) of all instances, and its lengths are in the unit of the world. All guarantees of
+ * haptic steps hold for these faces. Instances may intersect and share faces. A position is inside
+ * if it is inside one of the instances; a probe's distance is that from the nearest face of all
+ * instances. Default lengths use the box around all instances instead of the root cell, and the
+ * least default `search_radius` of all instances.
+ *
+ * instances   [count] are copied; count is 1 to 2^32 - 1. Instances may share a model. The models
+ *             must outlive the object. A step of a probe takes longer for each instance
+ *
+ * Errors are those of ebpo_haptic_new. EBPO_E_ARGUMENT: also for a pose that its model cannot have
+ * (ebpo_pose_check).
+ *
+ * Threads: any; the function starts another thread.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new_posed(const ebpo_haptic_instance *instances,
+                                                         uint64_t count,
+                                                         const ebpo_haptic_options *options,
+                                                         const double position[3],
+                                                         ebpo_haptic **out, ebpo_error *error);
+
 /*
  * Frees the object and ends its thread, after the current load.
  *
@@ -227,6 +255,9 @@ typedef struct ebpo_haptic_ball_result {
 
     /* Number of faces tested in this step. */
     uint32_t work;
+
+    /* Index of the instance that has `face`; 0 without a face. */
+    uint64_t instance;
 } ebpo_haptic_ball_result;
 
 /*
@@ -303,6 +334,9 @@ typedef struct ebpo_haptic_probe_result {
 
     /* Number of faces tested in this step. */
     uint64_t work;
+
+    /* As in ebpo_haptic_ball_result. */
+    uint64_t instance;
 } ebpo_haptic_probe_result;
 
 /*
@@ -357,7 +391,9 @@ typedef struct ebpo_haptic_tool_result {
 
     /* ebpo_haptic_flag bits */
     uint32_t flags;
-    uint32_t reserved;
+
+    /* Index of the instance that has `face`; 0 without a face. */
+    uint32_t instance;
 } ebpo_haptic_tool_result;
 
 /*

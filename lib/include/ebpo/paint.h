@@ -147,7 +147,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_save(const ebpo_paint *paint, cons
 /*
  * Saves the paint to the file to which it belongs (see ebpo_paint_save), and keeps the lock of
  * ebpo_paint_open_to_change, also after a failure. So a program can save often while it works, and
- * no other program can change the file meanwhile.
+ * no other program can change the file meanwhile. The function does not wait for the disk: if the
+ * program is killed, the file is complete, but after a power failure it may be damaged, unless the
+ * program has called fsync for the file.
  *
  * EBPO_E_ARGUMENT: the paint belongs to no file. Other errors are those of ebpo_paint_save.
  *

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/scene.h>
+
 #include "cli/command.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/haptic_device.h"
@@ -42,9 +44,13 @@ static bool is_mouse(const char *device) { return device && strcmp(device, "spac
 
 typedef struct job {
     const values *v;
-    const char *name; /* FILE, the operand */
-    ebpo_file *file;
-    ebpo_model *model;
+    const char *name;                /* FILE, the operand */
+    ebpo_file *file;                 /* NULL: the operand is a scene */
+    ebpo_model *model;               /* NULL: a scene */
+    ebpo_scene *scene;               /* NULL: a model */
+    ebpo_haptic_instance *instances; /* [instance_count] of the scene */
+    uint64_t instance_count;
+    double low[3], size[3]; /* box of the model or scene */
     ebpo_haptic *haptic;
     double *points; /* points of the tool, 3 numbers each */
     uint64_t point_count;
@@ -266,6 +272,57 @@ static double tool_radius(const job *j)
     return radius;
 }
 
+static ebpo_status no_memory(ebpo_error *error, const char *what)
+{
+    *error = (ebpo_error){ .status = EBPO_E_MEMORY };
+    snprintf(error->message, sizeof error->message, "not enough memory for %s", what);
+    return EBPO_E_MEMORY;
+}
+
+static bool is_scene(const char *name) { return words_end_with(name, ".json"); }
+
+/* Sets the poses and models of all instances, at the first time of the scene. */
+static ebpo_status get_instances(job *j, double time, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < j->instance_count && status == EBPO_OK; i++) {
+        ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+        (void)ebpo_scene_get_instance(j->scene, i, &instance);
+        status = ebpo_scene_model(j->scene, instance.model, &j->instances[i].model, error);
+        if (status == EBPO_OK)
+            status = ebpo_scene_pose(j->scene, i, time, &j->instances[i].pose, error);
+    }
+    return status;
+}
+
+static ebpo_status open_scene(job *j, uint64_t memory, ebpo_error *error)
+{
+    ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    load.memory = memory;
+    load.max_expansion = (uint64_t)j->v->remote.max_expansion;
+    ebpo_status status = ebpo_scene_open(j->name, NULL, &j->scene, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_load(j->scene, &load, error);
+    if (status != EBPO_OK)
+        return status;
+    (void)ebpo_scene_get_counts(j->scene, &counts);
+    if (counts.instances == 0) {
+        *error = (ebpo_error){ .status = EBPO_E_ARGUMENT };
+        snprintf(error->message, sizeof error->message, "%.200s: the scene has no instances",
+                 j->name);
+        return EBPO_E_ARGUMENT;
+    }
+    j->instance_count = counts.instances;
+    j->instances = calloc(counts.instances, sizeof *j->instances);
+    if (!j->instances)
+        return no_memory(error, "the instances");
+    status = ebpo_scene_box(j->scene, counts.begin, counts.begin, j->low, j->size, error);
+    for (int k = 0; k < 3; k++)
+        j->size[k] -= j->low[k];
+    return status == EBPO_OK ? get_instances(j, counts.begin, error) : status;
+}
+
 static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
 {
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
@@ -275,6 +332,11 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
         model_memory_default("haptic", j->file, j->name, &opening);
     if (status == EBPO_OK)
         status = ebpo_model_new(j->file, &opening, &j->model, error);
+    if (status == EBPO_OK) {
+        const ebpo_info *info = ebpo_file_info(j->file);
+        memcpy(j->low, info->box_origin, sizeof j->low);
+        memcpy(j->size, info->box_size, sizeof j->size);
+    }
     if (status == EBPO_OK && !j->v->path && !j->v->device)
         status = haptic_builtin_open(&j->device, j->model, ebpo_file_info(j->file), j->v->rate,
                                      tool_radius(j), error);
@@ -286,7 +348,7 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
 static bool open_mouse(job *j)
 {
     return !is_mouse(j->v->device) ||
-           haptic_spacenav_open(&j->device, ebpo_file_info(j->file), j->v->rate, tool_radius(j));
+           haptic_spacenav_open(&j->device, j->low, j->size, j->v->rate, tool_radius(j));
 }
 
 static ebpo_status make_haptic(job *j, const double start[3], ebpo_error *error)
@@ -304,20 +366,13 @@ static ebpo_status make_haptic(job *j, const double start[3], ebpo_error *error)
     haptic_options.kind = j->kind;
     haptic_options.points = (const double(*)[3])j->points;
     haptic_options.point_count = j->point_count;
+    if (j->scene)
+        return ebpo_haptic_new_posed(j->instances, j->instance_count, &haptic_options, start,
+                                     &j->haptic, error);
     return ebpo_haptic_new(j->model, &haptic_options, start, &j->haptic, error);
 }
 
-static double model_diagonal(const ebpo_info *info)
-{
-    return hypot(hypot(info->box_size[0], info->box_size[1]), info->box_size[2]);
-}
-
-static ebpo_status no_memory(ebpo_error *error, const char *what)
-{
-    *error = (ebpo_error){ .status = EBPO_E_MEMORY };
-    snprintf(error->message, sizeof error->message, "not enough memory for %s", what);
-    return EBPO_E_MEMORY;
-}
+static double diagonal_of(const job *j) { return hypot(hypot(j->size[0], j->size[1]), j->size[2]); }
 
 /* Plays steps that do nothing for a tenth of the time, with a viewer at most for a second, to
  * measure the delays that the machine itself causes. Call before the device starts. */
@@ -340,7 +395,7 @@ static double full_force(const job *j)
     const values *v = j->v;
     double depth = v->pen_radius > 0 ? v->pen_radius : v->radius;
     if (depth == 0)
-        depth = 0.01 * model_diagonal(ebpo_file_info(j->file));
+        depth = 0.01 * diagonal_of(j);
     return v->full_force > 0 ? v->full_force : v->stiffness * depth;
 }
 
@@ -369,7 +424,7 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
     pen.points = (const double(*)[3])j->points;
     pen.point_count = v->spread > 0 ? 0 : j->point_count; /* a spray paints around the contact */
     pen.skin = v->skin;
-    pen.diagonal = model_diagonal(ebpo_file_info(j->file));
+    pen.diagonal = diagonal_of(j);
     return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
 }
 
@@ -445,15 +500,16 @@ static ebpo_status play_live(job *j, haptic_play *all, ebpo_error *error)
     return played ? EBPO_OK : no_memory(error, "the times of steps");
 }
 
-static ebpo_status play_device(job *j, ebpo_error *error)
+static ebpo_status play_device(job *j, const haptic_pose *first, ebpo_error *error)
 {
     const values *v = j->v;
     haptic_play all = { .rate = v->rate,
                         .seconds = v->seconds,
                         .haptic = j->haptic,
                         .device = &j->device,
+                        .first = *first,
                         .kind = j->kind,
-                        .range = model_diagonal(ebpo_file_info(j->file)) / 20,
+                        .range = diagonal_of(j) / 20,
                         .points = j->points };
     if (v->record) {
         j->record = calloc(haptic_play_steps(&all), sizeof *j->record);
@@ -465,16 +521,23 @@ static ebpo_status play_device(job *j, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     ebpo_haptic_get_stats(j->haptic, &j->stats);
-    ebpo_model_get_stats(j->model, &j->memory);
+    if (j->scene) {
+        ebpo_scene_stats scene = EBPO_SCENE_STATS_INIT;
+        (void)ebpo_scene_get_stats(j->scene, &scene);
+        j->memory.memory_peak = scene.memory;
+        j->memory.loads = scene.loads;
+    } else {
+        ebpo_model_get_stats(j->model, &j->memory);
+    }
     j->stopped.status = ebpo_haptic_check(j->haptic, &j->stopped);
     return EBPO_OK;
 }
 
-/* Writes the recorded positions in the format that --path reads. Each number has enough digits to
+/* Writes the recorded poses in the format that --path reads. Each number has enough digits to
  * restore all its bits. */
 static ebpo_status write_record(const job *j, ebpo_error *error)
 {
-    enum { LINE = 7 * (NUMBER_CAPACITY + 1) }; /* maximum length of a line: 7 numbers */
+    enum { LINE = 8 * (NUMBER_CAPACITY + 1) }; /* maximum length of a line: 8 numbers */
     char *text = malloc(j->times.step_count * LINE + 1), *at = text;
     if (!text)
         return no_memory(error, "the text of the record");
@@ -482,8 +545,13 @@ static ebpo_status write_record(const job *j, ebpo_error *error)
         const haptic_pose *p = &j->record[i];
         for (int k = 0; k < 7; k++) {
             at = number_write(at, k < 3 ? p->position[k] : p->rotation[k - 3]);
-            *at++ = k < 6 ? ' ' : '\n';
+            *at++ = ' ';
         }
+        if (p->lifted || p->pressure > 0)
+            at = number_write(at, p->lifted ? 0 : p->pressure);
+        else
+            at--; /* the force sets the pressure */
+        *at++ = '\n';
     }
     ebpo_status status = ebpo_write_file(j->v->record, text, (size_t)(at - text), error);
     free(text);
@@ -496,7 +564,7 @@ static int run_job(job *j, uint64_t memory)
     haptic_pose start;
     ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
     if (status == EBPO_OK)
-        status = open_model(j, memory, &error);
+        status = is_scene(j->name) ? open_scene(j, memory, &error) : open_model(j, memory, &error);
     if (status == EBPO_OK && !open_mouse(j))
         return EXIT_FAILED;
     if (status == EBPO_OK)
@@ -510,7 +578,7 @@ static int run_job(job *j, uint64_t memory)
     if (status == EBPO_OK)
         status = make_haptic(j, start.position, &error);
     if (status == EBPO_OK)
-        status = play_device(j, &error);
+        status = play_device(j, &start, &error);
     if (status == EBPO_OK && j->v->record)
         status = write_record(j, &error);
     if (status != EBPO_OK)
@@ -559,12 +627,14 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
-    if (words_end_with(model, ".json"))
+    if (is_scene(model) && (v->paint || v->view))
         return command_usage("haptic",
-                             "%s: ebpo haptic cannot touch a scene: the proxy follows the faces "
-                             "of one model, and paint belongs to one model; give the .ebpo.h5 "
-                             "file of an instance",
+                             "%s: --paint and --view need one model, not a scene: paint belongs "
+                             "to one model, and the viewer shows one; give the .ebpo.h5 file of "
+                             "an instance",
                              model);
+    if (is_scene(model) && !v->path && !v->device)
+        return command_usage("haptic", "%s: a scene needs --path or --device", model);
     if (v->path && v->seconds != 10)
         return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
                                        "its last position");
@@ -617,8 +687,8 @@ static int run_haptic(void *given, const char **operand)
     int code = check_values(v, operand[0], &memory);
     if (code != 0 || overwrites_input(v, operand[0]))
         return EXIT_USAGE;
-    bool prepared = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
-                    (!v->path || haptic_path_open(&j.device, v->path)) &&
+    bool prepared = (is_scene(j.name) || command_requires_hdf5("haptic", operand[0])) &&
+                    read_tool(&j) && (!v->path || haptic_path_open(&j.device, v->path)) &&
                     (!haptic_udp_named(v->device) || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
     haptic_view_end(j.view);
@@ -626,6 +696,8 @@ static int run_haptic(void *given, const char **operand)
     ebpo_haptic_free(j.haptic);
     ebpo_model_free(j.model);
     ebpo_close(j.file);
+    ebpo_scene_free(j.scene);
+    free(j.instances);
     if (j.device.end)
         j.device.end(j.device.self);
     free(j.points);

@@ -2,18 +2,31 @@
 #ifndef EBPO_TOOLS_HAPTIC_BRUSH_H
 #define EBPO_TOOLS_HAPTIC_BRUSH_H
 
+#include <ebpo/query.h>
+
 #include "cli/commands/haptic_live.h"
 
 /* Maximum number of points with which a brush paints at once. */
 enum { HAPTIC_BRUSH_MAX = 64 };
 
+typedef struct haptic_brush haptic_brush;
+
 /* Computes q * v / q: the vector v, rotated by the unit quaternion q (x, y, z, w). */
 void haptic_rotate(const double q[4], const double v[3], double out[3]);
 
-/* Computes the positions of the pressed points of a tool in contact, whose proxy is on the surface:
- * those that are at most depth and `near` above the plane of the contact. If there are more than
- * HAPTIC_BRUSH_MAX, takes every nth one. points: [count][3]. Returns the number of positions. */
-int haptic_brush_pressed(const double (*points)[3], uint64_t count, const haptic_sample *sample,
-                         double near, double out[HAPTIC_BRUSH_MAX][3]);
+/* Makes a brush of points [count][3], which are copied; count is at least 1. Returns NULL without
+ * memory. */
+haptic_brush *haptic_brush_new(const double (*points)[3], uint64_t count);
+void haptic_brush_free(haptic_brush *brush);
+
+/* Computes the positions, on the proxy, of the pressed points of a brush in contact. A point is
+ * pressed if the motion from proxy to device would bring it to the surface, through it, or nearer
+ * to it than `near`. The surface is here the plane through the nearest point of the model,
+ * perpendicular to the line from there to the brush's point. If more than HAPTIC_BRUSH_MAX points
+ * are pressed, takes about as many, spread over the pressed ones. Sets *count to the number of
+ * positions. Fails as ebpo_distance does. */
+ebpo_status haptic_brush_press(haptic_brush *brush, ebpo_context *context,
+                               const haptic_sample *sample, double near,
+                               double out[HAPTIC_BRUSH_MAX][3], int *count, ebpo_error *error);
 
 #endif

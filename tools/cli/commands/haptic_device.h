@@ -46,13 +46,14 @@ typedef struct haptic_device {
     uint64_t step_count;
 } haptic_device;
 
-/* haptic_path.c: reads a line 'x y z' or 'x y z qx qy qz qw' of `length` bytes, which ends with a
- * zero byte. Returns the number of numbers, 3 or 7; 0: an empty line or a comment; -1: other
- * text, such as numbers that are not finite. */
+/* haptic_path.c: reads a line 'x y z', 'x y z qx qy qz qw' or 'x y z qx qy qz qw pressure' of
+ * `length` bytes, which ends with a zero byte. Pressure 0: the pen is lifted. Returns the number of
+ * numbers, 3, 7 or 8; 0: an empty line or a comment; -1: other text, such as numbers that are not
+ * finite. */
 int haptic_pose_read(const char *line, size_t length, haptic_pose *out);
 
-/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
- * false after an error, reported on stderr. Call `end` in any case. */
+/* haptic_path.c: opens a file of such lines; '-': standard input. Returns false after an error,
+ * reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
 /* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT',
@@ -62,9 +63,10 @@ bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
 /* haptic_spacenav.c: opens a 3D mouse, whose daemon spacenavd runs. The tool begins in front of the
- * model, `clearance` away. rate, clearance: as in haptic_builtin_open. Returns false after an
- * error, reported on stderr. */
-bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate, double clearance);
+ * box of the model or scene (low corner, size), `clearance` away. rate, clearance: as in
+ * haptic_builtin_open. Returns false after an error, reported on stderr. */
+bool haptic_spacenav_open(haptic_device *out, const double low[3], const double size[3],
+                          double rate, double clearance);
 
 /* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
  * out of it. rate: steps per second. clearance: radius of the tool. The path keeps this additional

@@ -12,7 +12,8 @@ typedef struct haptic_sample {
     double device[3];   /* position of the device */
     double proxy[3];    /* position of the proxy */
     double rotation[4]; /* of the proxy */
-    double normal[3];   /* of a tool in contact: away from the face */
+    double device_rotation[4];
+    double normal[3]; /* of a tool in contact: away from the face */
     double force[3];
     double touch[3]; /* in contact: the point of contact; otherwise the position of the proxy */
     double depth;    /* as in ebpo_haptic_ball_result */

@@ -1,9 +1,12 @@
 /* Two paints are in memory. The pen paints into `drawn`. `saved` belongs to the file. A thread
  * copies new strokes from `drawn` to `saved` under a lock, and then saves `saved` without the lock,
- * so that a slow disk does not delay the pen. Strokes that were copied before are equal in both,
- * except that the last stroke may be longer in `drawn`. */
+ * so that saving does not delay the pen. Strokes that were copied before are equal in both, except
+ * that the last stroke may be longer in `drawn`. A save does not wait for the disk: a second thread
+ * syncs the file, so that a slow disk does not delay the next save. */
 #include "cli/commands/haptic_paint.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <math.h>
 #include <pthread.h>
@@ -23,7 +26,7 @@
 /* Size of a point with the radius of the stroke. */
 enum { FULL_SIZE = 1 << 15 };
 
-/* A killed process loses the paint of at most SAVE_NS, plus the time of a save. */
+/* A killed process loses the paint of at most SAVE_NS, plus the time of a save without the disk. */
 enum { SAVE_NS = 500000000, POLL_NS = 20000000 };
 
 /* Maximum number of steps that are painted while the lock is held. */
@@ -74,6 +77,7 @@ struct haptic_paint {
     ebpo_paint_point *prints; /* [print_count], at most PRINT_POINTS: the brush's last stroke */
     uint64_t print_count;
     uint64_t prints_time; /* time of that stroke */
+    haptic_brush *brush;  /* NULL: not a brush */
     double arm;           /* of a brush: distance of its farthest point from its origin */
     ebpo_error error;     /* first error of painting */
     pthread_mutex_t turn; /* held while a thread waits for the lock */
@@ -96,7 +100,8 @@ struct haptic_paint {
     uint64_t strokes_before, points_before; /* numbers of strokes and points in the opened file */
     ebpo_error save_error;                  /* of the last save */
     haptic_painted result;
-    pthread_t saver;
+    pthread_t saver, syncer;
+    atomic_bool unsynced; /* the file was saved, and not synced since then */
     atomic_bool ended;
 };
 
@@ -167,6 +172,7 @@ static ebpo_status save_paint(haptic_paint *p)
         status = ebpo_paint_checkpoint(p->saved, &error);
     if (status == EBPO_OK) {
         p->saved_changes = p->copied_changes;
+        atomic_store(&p->unsynced, true);
         p->result.saves++;
         p->result.save_seconds_max =
             fmax(p->result.save_seconds_max, 1e-9 * (double)(tool_clock() - begin));
@@ -194,6 +200,50 @@ static void *save_often(void *user)
             due = tool_clock() + SAVE_NS;
             (void)save_paint(p);
         }
+    }
+    return NULL;
+}
+
+/* Syncs a file or a folder. Returns false, with errno, on failure. */
+static bool sync_path(const char *path)
+{
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    bool synced =
+        fd >= 0 && (fsync(fd) == 0 || errno == EINVAL); /* a folder that cannot be synced */
+    int saved = errno;
+    if (fd >= 0)
+        close(fd);
+    errno = saved;
+    return synced;
+}
+
+/* Syncs the paint file and its folder if the file was saved since the last call. */
+static ebpo_status sync_paint(haptic_paint *p, ebpo_error *error)
+{
+    char folder[PATH_MAX] = ".";
+    const char *slash = strrchr(p->pen.path, '/');
+    if (!atomic_exchange(&p->unsynced, false))
+        return EBPO_OK;
+    if (slash)
+        snprintf(folder, sizeof folder, "%.*s", (int)(slash - p->pen.path) + 1, p->pen.path);
+    if (sync_path(p->pen.path) && sync_path(folder))
+        return EBPO_OK;
+    *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
+    snprintf(error->message, sizeof error->message, "%.200s: could not be synced to the disk: %s",
+             p->pen.path, strerror(errno));
+    return EBPO_E_IO;
+}
+
+static void *sync_often(void *user)
+{
+    haptic_paint *p = user;
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (bool failed = false; !atomic_load(&p->ended);) {
+        tool_wait_until(tool_clock() + POLL_NS);
+        if (sync_paint(p, &error) == EBPO_OK || failed)
+            continue;
+        failed = true;
+        fprintf(stderr, "ebpo haptic: %s; the device continues\n", error.message);
     }
     return NULL;
 }
@@ -377,21 +427,19 @@ static ebpo_status take_print(haptic_paint *p, const haptic_sample *sample, doub
                               ebpo_error *error)
 {
     double place[HAPTIC_BRUSH_MAX][3], least = p->pen.pen.size_least;
+    int count;
     /* the proxy keeps the skin from the surface */
     double near = fmax(0x1p-12 * p->pen.diagonal, 2 * p->pen.skin);
-    int count = haptic_brush_pressed(p->pen.points, p->pen.point_count, sample, near, place);
-    for (int i = 0; i < count; i++) {
+    ebpo_status status =
+        haptic_brush_press(p->brush, p->context, sample, near, place, &count, error);
+    for (int i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_paint_point *q = &p->prints[p->print_count];
-        ebpo_status status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
-        if (status != EBPO_OK)
-            return status;
-        double off = hypot(hypot(q->place[0] - place[i][0], q->place[1] - place[i][1]),
-                           q->place[2] - place[i][2]);
+        status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
         q->size = (uint16_t)(FULL_SIZE * (least + pressure * (1 - least)));
         q->pressure = (uint16_t)(pressure * UINT16_MAX);
-        p->print_count += off <= sample->depth + near; /* the surface is there */
+        p->print_count += status == EBPO_OK;
     }
-    return EBPO_OK;
+    return status;
 }
 
 /* Makes `prints` the last stroke, in place of a shorter one. The caller has the lock. */
@@ -773,6 +821,7 @@ static ebpo_status open_paints(haptic_paint *p, const ebpo_file *file, ebpo_erro
         status = choose_layer(p, error);
     if (status == EBPO_OK)
         status = ebpo_paint_checkpoint(p->saved, error);
+    atomic_store(&p->unsynced, status == EBPO_OK);
     return status == EBPO_OK ? ebpo_paint_open(p->pen.path, &p->drawn, error) : status;
 }
 
@@ -786,6 +835,7 @@ static void free_paint(haptic_paint *p)
     pthread_mutex_destroy(&p->turn);
     free(p->contact);
     free(p->prints);
+    haptic_brush_free(p->brush);
     free(p);
 }
 
@@ -806,9 +856,11 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
             fmax(p->arm, hypot(hypot(pen->points[i][0], pen->points[i][1]), pen->points[i][2]));
     p->error = p->save_error = (ebpo_error)EBPO_ERROR_INIT;
     p->print_time = -INFINITY;
-    if (pen->point_count > 0)
+    if (pen->point_count > 0) {
         p->prints = calloc(PRINT_POINTS, sizeof *p->prints);
-    ebpo_status status = pen->point_count > 0 && !p->prints
+        p->brush = haptic_brush_new(pen->points, pen->point_count);
+    }
+    ebpo_status status = pen->point_count > 0 && (!p->prints || !p->brush)
                              ? fail_memory(error)
                              : ebpo_context_new(model, &p->context, error);
     if (status == EBPO_OK)
@@ -819,7 +871,11 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     }
     p->copied = p->finished = p->strokes_before = info_of(p->drawn).stroke_count;
     p->points_before = info_of(p->drawn).point_count;
-    if (command_thread(&p->saver, save_often, p) != 0) {
+    bool saves = command_thread(&p->saver, save_often, p) == 0;
+    if (!saves || command_thread(&p->syncer, sync_often, p) != 0) {
+        atomic_store(&p->ended, true);
+        if (saves)
+            pthread_join(p->saver, NULL);
         free_paint(p);
         return fail_memory(error);
     }
@@ -858,10 +914,13 @@ ebpo_status haptic_paint_close(haptic_paint *p, haptic_painted *out, ebpo_error 
         return EBPO_OK;
     atomic_store(&p->ended, true);
     pthread_join(p->saver, NULL);
+    pthread_join(p->syncer, NULL);
     lock_paint(p);
     lift_pen(p);
     unlock_paint(p);
     ebpo_status status = save_paint(p);
+    if (status == EBPO_OK)
+        status = sync_paint(p, &p->save_error);
     const ebpo_error *last = status != EBPO_OK ? &p->save_error : &p->error;
     if (last->status != EBPO_OK)
         *error = *last;

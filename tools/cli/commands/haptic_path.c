@@ -20,16 +20,19 @@ static const char *skip_blanks(const char *at)
     return at;
 }
 
-/* Reads the numbers of a line, up to '#'. Returns the count of the numbers; -1: other text, or more
- * than seven numbers. */
-static int read_numbers(const char *line, size_t length, double out[7])
+/* Greatest count of numbers of a line: a position, a quaternion, and a pressure. */
+enum { NUMBERS = 8 };
+
+/* Reads the numbers of a line, up to '#'. Returns the count of the numbers; -1: other text, or too
+ * many numbers. */
+static int read_numbers(const char *line, size_t length, double out[NUMBERS])
 {
     const char *at = skip_blanks(line), *end = line + length;
     int count = 0;
     while (*at && *at != '#') {
         const char *after;
         double x = number_read(at, end, &after);
-        if (after == at || count == 7 || !isfinite(x) || fabs(x) > 0x1p200)
+        if (after == at || count == NUMBERS || !isfinite(x) || fabs(x) > 0x1p200)
             return -1;
         out[count++] = x;
         at = skip_blanks(after);
@@ -37,25 +40,28 @@ static int read_numbers(const char *line, size_t length, double out[7])
     return count;
 }
 
-/* Divides a quaternion by its length. Returns false if the length is nearly 0. */
+/* Divides a quaternion by its length. A unit quaternion stays as it is, to the last bit, so that a
+ * replay repeats the recorded run. Returns false if the length is nearly 0. */
 static bool make_unit(double q[4])
 {
     double length = hypot(hypot(q[0], q[1]), hypot(q[2], q[3]));
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 4 && fabs(length - 1) > 0x1p-50; k++)
         q[k] /= length;
     return length >= 0x1p-200;
 }
 
 int haptic_pose_read(const char *line, size_t length, haptic_pose *out)
 {
-    double v[7];
+    double v[NUMBERS];
     int count = strlen(line) == length ? read_numbers(line, length, v) : -1;
-    if (count != 3 && count != 7)
+    if (count != 3 && count != 7 && count != 8)
         return count == 0 ? 0 : -1;
-    out->lifted = false;
-    out->pressure = 0;
+    out->pressure = count == 8 ? v[7] : 0;
+    out->lifted = count == 8 && v[7] == 0;
+    if (!(out->pressure >= 0 && out->pressure <= 1))
+        return -1;
     memcpy(out->position, v, sizeof out->position);
-    memcpy(out->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 },
+    memcpy(out->rotation, count > 3 ? v + 3 : (const double[4]){ 0, 0, 0, 1 },
            sizeof out->rotation);
     return make_unit(out->rotation) ? count : -1;
 }
@@ -90,7 +96,7 @@ static bool read_lines(path *p, FILE *in, const char *name)
             fprintf(
                 stderr,
                 "ebpo haptic: %s, line %llu: expected three numbers, or seven numbers, of which "
-                "the last four are a quaternion\n",
+                "the last four are a quaternion; then optionally a pressure from 0 to 1\n",
                 name, (unsigned long long)n);
     }
     free(line);

@@ -167,6 +167,7 @@ static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
     memcpy(sample.device, pose->position, sizeof sample.device);
     memcpy(sample.proxy, a->proxy.position, sizeof sample.proxy);
     memcpy(sample.rotation, a->proxy.rotation, sizeof sample.rotation);
+    memcpy(sample.device_rotation, pose->rotation, sizeof sample.device_rotation);
     memcpy(sample.normal, a->normal, sizeof sample.normal);
     memcpy(sample.force, a->force, sizeof sample.force);
     memcpy(sample.touch, a->touch, sizeof sample.touch);
@@ -183,6 +184,8 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
         return true;
     if (!p->device->read(p->device->self, i, &pose))
         return false;
+    if (i == 0) /* a replay of the recording begins there, too */
+        pose = p->first;
     if (p->record)
         p->record[i] = pose;
     switch (p->kind) {

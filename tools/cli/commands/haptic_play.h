@@ -31,6 +31,7 @@ typedef struct haptic_play {
     const haptic_device *device; /* source of positions */
     ebpo_haptic_kind kind;
     double range;         /* for probes: the distance that has the last colour of the scale */
+    haptic_pose first;    /* the first position, at which the haptic object was made */
     haptic_pose *record;  /* [maximum number of steps], set to the device's positions; or NULL */
     const double *points; /* points of the tool, or NULL */
     haptic_live *live;    /* takes the steps; or NULL */

@@ -134,14 +134,15 @@ static void end_mouse(void *self)
     free(m);
 }
 
-bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate, double clearance)
+bool haptic_spacenav_open(haptic_device *out, const double low[3], const double size[3],
+                          double rate, double clearance)
 {
     mouse *m = calloc(1, sizeof *m);
     *out = (haptic_device){ begin_mouse, read_pose, NULL, end_mouse, m, 0 };
     if (!m)
         return command_no_memory("haptic") == EXIT_OK;
-    memcpy(m->origin, info->box_origin, sizeof m->origin);
-    memcpy(m->size, info->box_size, sizeof m->size);
+    memcpy(m->origin, low, sizeof m->origin);
+    memcpy(m->size, size, sizeof m->size);
     m->diagonal = hypot(hypot(m->size[0], m->size[1]), m->size[2]);
     m->clearance = clearance;
     m->step_seconds = 1 / rate;

@@ -95,9 +95,9 @@ static char *make_news(haptic_view *view, uint64_t *taken, haptic_paint_cursor *
     FILE *f = open_memstream(&text, &size);
     if (!f)
         return NULL;
+    write_step(view, taken, f); /* the page learns of a contact before its first paint */
     if (view->options.paint)
         haptic_paint_write_news(view->options.paint, cursor, f);
-    write_step(view, taken, f);
     if (fclose(f) == 0)
         return text;
     free(text);
@@ -168,7 +168,7 @@ static int take_pose(haptic_view *view, const char *text, size_t length)
     if ((!hovers && strncmp(text, words[0], 6) != 0) ||
         haptic_pose_read(text + 6, length - 6, &pose) < 3)
         return HTTP_BAD_REQUEST;
-    pose.lifted = hovers;
+    pose.lifted |= hovers;
     pthread_mutex_lock(&view->pose_lock);
     view->pose = pose;
     view->has_pose = true;

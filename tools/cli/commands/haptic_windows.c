@@ -20,9 +20,10 @@ void haptic_view_open_device(haptic_device *out, haptic_view *view) { (void)out,
 
 void haptic_view_end(haptic_view *view) { (void)view; }
 
-bool haptic_spacenav_open(haptic_device *out, const ebpo_info *info, double rate, double clearance)
+bool haptic_spacenav_open(haptic_device *out, const double low[3], const double size[3],
+                          double rate, double clearance)
 {
-    (void)out, (void)info, (void)rate, (void)clearance;
+    (void)out, (void)low, (void)size, (void)rate, (void)clearance;
     fputs("ebpo haptic: --device spacenav is not provided on Windows\n", stderr);
     return false;
 }

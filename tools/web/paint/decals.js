@@ -103,25 +103,34 @@ export class Decals {
   /**
    * Sets the layers to draw, lowest first: [{ opacity (0 to 1), strokes: [{ erases, colour, radius, points: [{ centre, normal, faces, share }] }] }], in scene
    * coordinates. `share`: of the stroke's radius. `faces`: nine numbers each; if present, only these faces are coloured instead of everything inside the ball.
-   * `solid`: true when backs of faces are never visible.
+   * `solid`: true when backs of faces are never visible. Strokes that are the same objects as before, in the same order, are not uploaded again.
    */
   set(layers, solid = true) {
     this.reachPaints.side = this.reachErases.side = solid ? FRONT : DOUBLE;
-    this.layers.forEach((layer) => layer.runs.forEach((run) => run.meshes.forEach((mesh) => mesh.geometry.dispose())));
-    this.layers = layers.map(({ opacity, strokes }) => ({ opacity, runs: this.#runs(strokes) })).filter((layer) => layer.runs.length);
+    const before = new Map(this.layers.flatMap((layer) => layer.runs).map((run) => [run.strokes[0], run]));
+    this.layers = layers.map(({ opacity, strokes }) => ({ opacity, runs: this.#runs(strokes, before) })).filter((layer) => layer.runs.length);
+    before.forEach((run) => run.meshes.forEach((mesh) => mesh.geometry.dispose()));
   }
 
-  // Groups strokes: consecutive opaque strokes are drawn together. A translucent stroke is drawn separately, because its overlapping balls must cover only once.
-  #runs(strokes) {
+  // Groups strokes: consecutive opaque strokes are drawn together. A translucent stroke is drawn separately, because its overlapping balls must cover only once. So is the
+  // last stroke, because a pen adds points to it. Takes equal runs from `before`, by their first strokes.
+  #runs(strokes, before) {
     const runs = [];
-    for (const stroke of strokes) {
+    strokes.forEach((stroke, i) => {
       const alpha = stroke.erases ? 255 : stroke.colour[3], last = runs.at(-1);
-      if (last && last.erases === stroke.erases && alpha === 255 && last.alpha === 255)
+      if (last && last.erases === stroke.erases && alpha === 255 && last.alpha === 255 && i < strokes.length - 1)
         last.strokes.push(stroke);
       else
         runs.push({ erases: stroke.erases, alpha, strokes: [stroke] });
-    }
-    return runs.filter((run) => run.alpha > 0).map((run) => ({ ...run, strokes: undefined, meshes: [this.#balls(run), this.#reach(run)].filter(Boolean) }));
+    });
+    return runs.filter((run) => run.alpha > 0).map((run) => {
+      const same = before.get(run.strokes[0]);
+      if (same?.strokes.length === run.strokes.length && same.strokes.every((stroke, i) => stroke === run.strokes[i])) {
+        before.delete(run.strokes[0]);
+        return same;
+      }
+      return { ...run, meshes: [this.#balls(run), this.#reach(run)].filter(Boolean) };
+    });
   }
 
   // Returns a mesh of the faces of points that have `faces`, or undefined when there are none.

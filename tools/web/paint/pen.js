@@ -21,7 +21,7 @@ const HTML = `
   <div class="buttons"><button id="layerAdd" class="small">Add a layer</button><button id="paintOpen" class="small">Open …</button><button id="paintSave" class="small">Save</button></div>
   <input type="file" id="paintFile" accept=".h5" hidden>`;
 const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's diagonal
-const FULL_SIZE = 32768, AT_ONCE = 200;
+const FULL_SIZE = 32768, AT_ONCE = 200, CHUNK = 1000; // CHUNK: points of a stroke that are put into the picture together
 
 export function addPen({ scene, worker, query }, pipeline) {
   const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // documents by a model's digest; { normal, faces } by a point of a document
@@ -43,14 +43,28 @@ export function addPen({ scene, worker, query }, pipeline) {
 
   // --- the picture ---
 
-  const decal = (s) => ({ erases: s.erases, colour: s.colour, radius: s.radius * state.scene.scale,
-    points: s.points.map((p) => ({ centre: toScene(p.place), normal: reaches.get(p)?.normal ?? p.normal, faces: reaches.get(p)?.faces, share: p.size / FULL_SIZE })) });
+  const decal = (s, points) => ({ erases: s.erases, colour: s.colour, radius: s.radius * state.scene.scale,
+    points: points.map((p) => ({ centre: toScene(p.place), normal: reaches.get(p)?.normal ?? p.normal, faces: reaches.get(p)?.faces, share: p.size / FULL_SIZE })) });
+
+  // Returns decals of a stroke: the same objects as before for points that have not changed. Overlapping points of a translucent stroke cover only once, so it is one decal.
+  const made = new WeakMap(); // { what, last, decal } by the first point of a decal
+  function decalsOf(s) {
+    const size = s.erases || s.colour[3] === 255 ? CHUNK : s.points.length, all = [];
+    for (let i = 0; i < s.points.length; i += size) {
+      const points = s.points.slice(i, i + size), known = points.reduce((sum, p) => sum + reaches.has(p), 0), last = points.at(-1), before = made.get(points[0]);
+      const what = [points.length, known, s.erases, s.radius, state.scene.scale, ...s.colour].join();
+      const now = before?.what === what && before.last === last ? before : { what, last, decal: decal(s, points) };
+      made.set(points[0], now);
+      all.push(now.decal);
+    }
+    return all;
+  }
   const inPicture = (faces) => faces && Float32Array.from({ length: faces.length }, (_, i) => (faces[i] - state.scene.center[i % 3]) * state.scene.scale);
   // Real faces are drawn at their exact positions, envelopes within one cell of them.
   decals.near = () => (state.stats?.meshTriangles === state.stats?.triangles ? 0 : 2 * (Number($('detail').value) || state.auto || 0));
   function draw() {
     const { layers, strokes } = doc.state, all = stroke ? [...strokes, stroke] : strokes;
-    decals.set(layers.map((l, i) => ({ opacity: l.opacity / 255, strokes: l.visible ? all.filter((s) => s.layer === i && s.points.length).map(decal) : [] })), state.info?.solid !== false);
+    decals.set(layers.map((l, i) => ({ opacity: l.opacity / 255, strokes: l.visible ? all.filter((s) => s.layer === i).flatMap(decalsOf) : [] })), state.info?.solid !== false);
     scene.redraw();
   }
 
@@ -199,6 +213,16 @@ export function addPen({ scene, worker, query }, pipeline) {
     await findReach(fresh, () => opening === state.opening);
     if (opening === state.opening)
       draw();
+  }
+
+  // Draws points of all kinds without size, and the probe, so that the shaders are compiled before the device paints.
+  function warmUp() {
+    const points = [{ centre: [0, 0, 0], share: 0 }, { centre: [0, 0, 0], share: 0, faces: new Float32Array(9) }];
+    decals.set([{ opacity: 1, strokes: [255, 128].map((alpha) => ({ erases: false, colour: [0, 0, 0, alpha], radius: 0, points })) }]);
+    scene.showProbe([0, 0, 0], [0, 0, 0]);
+    scene.draw();
+    scene.showProbe();
+    draw();
   }
 
   // Lets the device do what the buttons of the pen otherwise do on this page.
@@ -353,5 +377,5 @@ export function addPen({ scene, worker, query }, pipeline) {
     fromAddress();
     window.ebpoViewer.paint = { get file() { return doc.file; }, get pending() { return pending; }, openBytes, write: () => writePaint(doc.file) };
   }
-  return { begin, drawing, live: { begin: beginLive, receive } };
+  return { begin, drawing, live: { begin: beginLive, receive, warmUp } };
 }
