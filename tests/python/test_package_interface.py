@@ -18,6 +18,7 @@ import subprocess
 import sys
 import threading
 import types
+import urllib.request
 import zlib
 
 from package_support import Case, model, np, points, run
@@ -81,6 +82,8 @@ class Arrays(Case):
         self.assertEqual(m.inside(P.reshape(2, 25, 60, 3)[:, ::2]).shape, (2, 13, 60))
         self.assertEqual(m.inside(np.zeros((4, 0, 3))).shape, (4, 0))
         self.assertEqual(m.distance_bounds(image, level=2).lo.shape, (50, 60))
+        np.testing.assert_array_equal(m.winding_bounds(image).reshape(3000, 2), m.winding_bounds(P))
+        self.assertEqual((m.winding_bounds(P[0]).shape, m.winding_bounds(P[:0]).shape), ((2,), (0, 2)))
         origins = 3 * image
         hits, plain = m.ray(origins, -image), m.ray(3 * P, -P)
         self.same([part.ravel() for part in hits], plain)
@@ -122,6 +125,9 @@ class Arrays(Case):
         np.testing.assert_array_equal(every.ray, np.flatnonzero(left)[alone.ray])
         self.assertTrue((np.diff(every.begin)[gone] == 0).all() and len(every.begin) == len(P) + 1)
         self.assertFalse(m.ray_any(P, [np.nan, 0, 1], nan="propagate").any())
+        bounds = m.winding_bounds(bad, nan="propagate")
+        np.testing.assert_array_equal(bounds[left], m.winding_bounds(P[left]))
+        self.assertTrue(np.isnan(bounds[gone]).all())
         one = m.distance([np.nan, 0, 0], nan="propagate")
         self.assertTrue(np.isnan(one.distance) and one.point.shape == (3,) and one.face == -1)
         many = ebpo.Catalogue.of(["scan.ebpo.h5"])
@@ -132,6 +138,23 @@ class Arrays(Case):
             m.inside(bad, nan="propagate")
         with self.assertRaisesRegex(ValueError, "propagate"):
             m.inside(P, nan="ignore")
+
+    def test_masked(self):
+        m, mask = model("scan"), np.zeros(P.shape, bool)
+        mask[4, 1] = True
+        masked, image = np.ma.masked_array(P, mask), np.ma.masked_array(P, mask).reshape(50, 60, 3)
+        self.same(m.distance(np.ma.masked_array(P)), m.distance(P))
+        for given in (masked, image):
+            with self.assertRaisesRegex(ebpo.ArgumentError, "number 4 "):
+                m.distance(given)
+            with self.assertRaisesRegex(ebpo.ArgumentError, "ray 4 "):
+                m.ray(given, [0, 0, 1])
+            near = m.distance(given, nan="propagate")
+            self.assertEqual(np.flatnonzero(near.face.ravel() < 0).tolist(), [4])
+        with self.assertRaisesRegex(ebpo.ArgumentError, "masked"):
+            ebpo.convert((P[:3], np.ma.masked_array([[0, 1, 2]], [[0, 0, 1]])), "masked.ebpo.h5")
+        with self.assertRaisesRegex(ebpo.FormatError, "vertex 1 has y = nan"):
+            ebpo.convert((masked[3:6].astype(np.float32), [[0, 1, 2]]), "masked.ebpo.h5")
 
     def test_bounds_and_volume(self):
         for options in ({}, {"memory": "2M"}):
