@@ -264,6 +264,36 @@ class Notebooks(Case):
         self.assertNotIn("<b>", bare._repr_html_())
         self.assertNotIn("<img", bare._repr_html_())
 
+    def test_viewer(self):
+        pathlib.Path("a viewer").mkdir()
+        pathlib.Path("a viewer/index.html").write_text("the viewer")
+        m = model("scan")
+        with m.show(height=300, viewer="a viewer") as shown:
+            found = re.fullmatch(r"<iframe src='(http://127\.0\.0\.1:\d+/)' style='[^'<>]* height: 300px;[^'<>]*'></iframe>",
+                                 shown._repr_html_())
+            self.assertEqual(found[1], shown.address)
+            with urllib.request.urlopen(shown.address) as page:  # redirects to the address with the file
+                self.assertIn("file=models/0/scan.ebpo.h5", page.url)
+                self.assertEqual(page.read(), b"the viewer")
+            with urllib.request.urlopen(shown.address + "models/0/scan.ebpo.h5") as file:
+                self.assertEqual(file.read(), pathlib.Path("scan.ebpo.h5").read_bytes())
+            process = shown._process
+            child = os.fork()
+            if not child:  # a forked process does not end the server of the old one
+                shown.close()
+                os._exit(0)
+            os.waitpid(child, 0)
+            self.assertIsNone(process.poll())
+        self.assertIsNotNone(process.poll())
+        shown.close()
+        with self.assertRaisesRegex(ebpo.UnsupportedError, "nowhere: the viewer is not in this folder"):
+            m.show(viewer="nowhere")
+        with self.assertRaisesRegex(ValueError, "local path"):
+            ebpo.open(pathlib.Path("scan.ebpo.h5").read_bytes()).show()
+        for height in (0, -1, 1 << 70):
+            with self.assertRaises(ebpo.ArgumentError):
+                m.show(height=height, viewer="a viewer")
+
 
 class Bars(Case):
     def test_classes_of_bars(self):
