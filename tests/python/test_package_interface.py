@@ -228,14 +228,17 @@ class Signatures(Case):
         self.assertGreater(count, 150)
 
     def test_mypy(self):
+        folder = pathlib.Path(ebpo.__file__).parents[1]
+        environment = dict(os.environ)
+        if folder.name != "site-packages":  # mypy finds an installed package by itself
+            environment["MYPYPATH"] = str(folder)
         mypy = [os.environ["EBPO_MYPY"]] if os.environ.get("EBPO_MYPY") else [sys.executable, "-m", "mypy"]
         if subprocess.run([*mypy, "--version"], capture_output=True).returncode:
             self.skipTest("mypy is not installed; EBPO_MYPY may name its program")
         options = ["--python-executable", sys.executable, "--cache-dir", "mypy-cache"]
 
         def check(*words):
-            return subprocess.run([*mypy, *options, *words], capture_output=True, text=True,
-                                  env=dict(os.environ, MYPYPATH=str(pathlib.Path(ebpo.__file__).parents[1])))
+            return subprocess.run([*mypy, *options, *words], capture_output=True, text=True, env=environment)
 
         pathlib.Path("uses.py").write_text(USES)
         done = check("--strict", "--follow-imports", "silent", "uses.py")
