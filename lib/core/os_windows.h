@@ -2,11 +2,11 @@
  * another meaning. Builds for Windows include this file before every source file, so that all other
  * files are written for POSIX. Macros here rename functions of the C library that POSIX extends. A
  * macro also renames structures and members with the same name. The headers in core/windows have
- * the names of POSIX headers and are empty.
+ * the names of POSIX headers. They are empty, except poll.h and sys/socket.h.
  *
  * Paths are UTF-8 with '/' or '\' between names, and may be long; the functions convert paths to
- * UTF-16. Errors are values of errno. Functions that are not provided on Windows (fork, sockets of
- * haptics) fail with ENOSYS. */
+ * UTF-16. Errors are values of errno. Functions that are not provided on Windows (fork) fail with
+ * ENOSYS. */
 #ifndef EBPO_CORE_OS_WINDOWS_H
 #define EBPO_CORE_OS_WINDOWS_H
 
@@ -66,6 +66,7 @@ typedef int gid_t;
 #define F_GETFD         2
 #define F_SETFD         3
 #define F_GETFL         4
+#define F_SETFL         5
 #define FD_CLOEXEC      1
 
 #undef stat
@@ -261,44 +262,6 @@ struct rusage {
 };
 #define RUSAGE_SELF 0
 int getrusage(int who, struct rusage *out);
-
-struct pollfd {
-    int fd;
-    short events, revents;
-};
-#define POLLIN 1
-int poll(struct pollfd *of, unsigned long count, int milliseconds);
-
-/* Sockets are declared but not provided: `socket` fails with ENOSYS. */
-typedef int socklen_t;
-struct sockaddr {
-    unsigned short sa_family;
-    char sa_data[14];
-};
-struct in_addr {
-    uint32_t s_addr;
-};
-struct sockaddr_in {
-    unsigned short sin_family, sin_port;
-    struct in_addr sin_addr;
-    char sin_zero[8];
-};
-#define AF_INET         2
-#define SOCK_DGRAM      2
-#define INET_ADDRSTRLEN 16
-#define MSG_DONTWAIT    1
-#define MSG_TRUNC       2
-static inline unsigned short htons(unsigned short x) { return (unsigned short)(x << 8 | x >> 8); }
-static inline unsigned short ntohs(unsigned short x) { return htons(x); }
-int socket(int domain, int type, int protocol);
-int bind(int fd, const struct sockaddr *at, socklen_t bytes);
-int getsockname(int fd, struct sockaddr *out, socklen_t *bytes);
-ssize_t recvfrom(int fd, void *data, size_t bytes, int flags, struct sockaddr *from,
-                 socklen_t *size);
-ssize_t sendto(int fd, const void *data, size_t bytes, int flags, const struct sockaddr *to,
-               socklen_t size);
-int inet_pton(int family, const char *text, void *out);
-const char *inet_ntop(int family, const void *address, char *out, socklen_t bytes);
 
 typedef struct {
     const char *dli_fname;

@@ -696,8 +696,16 @@ int fsync(int fd)
     return result;
 }
 
+/* F_SETFL sets only O_NONBLOCK, and only for sockets. */
 int fcntl(int fd, int what, ...)
 {
+    if (what == F_SETFL && ebpo_windows_socket_state(fd) >= 0) {
+        va_list arguments;
+        va_start(arguments, what);
+        int flags = va_arg(arguments, int);
+        va_end(arguments);
+        return ebpo_windows_socket_waits(fd, !(flags & O_NONBLOCK));
+    }
     /* F_DUPFD_CLOEXEC has an argument: the new descriptor must not be less than it. All callers
      * give 3. The argument is ignored, because the descriptors 0 to 2 are always in use. */
     if (what == F_DUPFD_CLOEXEC) {

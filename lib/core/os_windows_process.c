@@ -3,6 +3,8 @@
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
+#include <poll.h>
+
 #include "core/os.h"
 #include "core/os_windows_parts.h"
 
@@ -104,6 +106,9 @@ static bool is_ready(int fd)
 {
     DWORD bytes = 0;
     HANDLE file = (HANDLE)_get_osfhandle(fd);
+    int state = ebpo_windows_socket_state(fd);
+    if (state >= 0)
+        return state;
     if (GetFileType(file) == FILE_TYPE_PIPE)
         return !PeekNamedPipe(file, NULL, 0, NULL, &bytes, NULL) || bytes > 0;
     return GetFileType(file) != FILE_TYPE_CHAR || WaitForSingleObject(file, 0) == WAIT_OBJECT_0;
@@ -122,64 +127,6 @@ int poll(struct pollfd *of, unsigned long count, int milliseconds)
             return ready;
         Sleep(STEP_MS);
     }
-}
-
-/* --- sockets, which are not provided --- */
-
-int socket(int domain, int type, int protocol)
-{
-    (void)domain, (void)type, (void)protocol;
-    return not_provided();
-}
-
-int bind(int fd, const struct sockaddr *at, socklen_t bytes)
-{
-    (void)fd, (void)at, (void)bytes;
-    return not_provided();
-}
-
-int getsockname(int fd, struct sockaddr *out, socklen_t *bytes)
-{
-    (void)fd, (void)out, (void)bytes;
-    return not_provided();
-}
-
-ssize_t recvfrom(int fd, void *data, size_t bytes, int flags, struct sockaddr *from,
-                 socklen_t *size)
-{
-    (void)fd, (void)data, (void)bytes, (void)flags, (void)from, (void)size;
-    return not_provided();
-}
-
-ssize_t sendto(int fd, const void *data, size_t bytes, int flags, const struct sockaddr *to,
-               socklen_t size)
-{
-    (void)fd, (void)data, (void)bytes, (void)flags, (void)to, (void)size;
-    return not_provided();
-}
-
-int inet_pton(int family, const char *text, void *out)
-{
-    unsigned part[4];
-    int end = 0;
-    (void)family;
-    if (sscanf(text, "%3u.%3u.%3u.%3u%n", &part[0], &part[1], &part[2], &part[3], &end) != 4 ||
-        text[end])
-        return 0;
-    for (int i = 0; i < 4; i++) {
-        if (part[i] > 255)
-            return 0;
-        ((uint8_t *)out)[i] = (uint8_t)part[i];
-    }
-    return 1;
-}
-
-const char *inet_ntop(int family, const void *address, char *out, socklen_t bytes)
-{
-    const uint8_t *part = address;
-    (void)family;
-    snprintf(out, (size_t)bytes, "%d.%d.%d.%d", part[0], part[1], part[2], part[3]);
-    return out;
 }
 
 /* --- libraries --- */

@@ -5,16 +5,18 @@
 
 tools/packaging/windows.sh builds the command in FOLDER; the test is skipped where mingw-w64 or wine is missing. Both
 commands must write equal bytes of files and equal text, and end with equal exit codes: conversions, vectors, queries,
-exports, names that are not ASCII, and long paths.
+exports, names that are not ASCII, and long paths. Then tests the servers of the command for Windows.
 """
 import os
 import pathlib
 import random
 import re
+import shlex
 import shutil
 import struct
 import subprocess
 import sys
+import urllib.request
 import zipfile
 
 EBPO, GENERATE, SOURCE, FOLDER = map(pathlib.Path, sys.argv[1:5])
@@ -43,6 +45,11 @@ def run(program, arguments, data=None):
     return done.returncode, done.stdout, done.stderr
 
 
+def report(problem):
+    problems.append(problem)
+    print(problem, flush=True)
+
+
 def compare(what, arguments, data=None, outputs=()):
     """Run both commands with the same arguments, in which OUT names the folder of the results. Ignore times."""
     global count
@@ -60,8 +67,7 @@ def compare(what, arguments, data=None, outputs=()):
     for part, linux, windows in zip(("exit code", "output", "messages", *outputs), *results):
         if linux != windows:
             shown = [repr(value[:300]) if isinstance(value, bytes) else value for value in (linux, windows)]
-            problems.append(f"{what}: {part} differs: {shown[0]} and {shown[1]}")
-            print(problems[-1], flush=True)
+            report(f"{what}: {part} differs: {shown[0]} and {shown[1]}")
 
 
 def conversions():
@@ -125,12 +131,40 @@ def names(mesh):
         place.parent.mkdir(parents=True)
         code, text, errors = run(WINDOWS, ["convert", "-q", mesh, place])
         if code or not place.exists() or list(place.parent.iterdir()) != [place]:
-            problems.append(f"convert to {name[:40]}: {code} {text} {errors}")
-            print(problems[-1], flush=True)
+            report(f"convert to {name[:40]}: {code} {text} {errors}")
         else:
             compare(f"info of {name[:40]}", ["info", "--json", place])
     compare("a mesh that does not exist", ["convert", FOLDER / "none.ply", "OUT/a.ebpo.h5"])
     compare("a folder that does not exist", ["convert", "-q", mesh, "OUT/none/a.ebpo.h5"])
+
+
+def servers(model):
+    """Test the sockets: ranges that `ebpo serve` sends, and the haptic device udp:."""
+    viewer, program, data = FOLDER / "viewer", FOLDER / "ebpo-wine", model.read_bytes()
+    viewer.mkdir(exist_ok=True)
+    (viewer / "index.html").write_text("the viewer")
+    with subprocess.Popen([*WINDOWS, "serve", "--port", "0", "--viewer", viewer, model], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True, env=wine_environment()) as server:
+        address = server.stdout.readline().strip()
+        try:
+            for begin, end in ((0, len(data) - 1), (7, 7), (100, len(data) - 1)):
+                asked = urllib.request.Request(f"{address}models/0/{model.name}", headers={"Range": f"bytes={begin}-{end}"})
+                with urllib.request.urlopen(asked, timeout=60) as got:
+                    if got.read() != data[begin:end + 1]:
+                        report(f"serve: bytes {begin} to {end} differ")
+            with urllib.request.urlopen(address, timeout=60) as got:
+                if got.read() != b"the viewer":
+                    report("serve: the first page differs")
+        except (OSError, ValueError) as error:
+            server.kill()
+            report(f"serve: {address!r}, {error}, {server.stderr.read()}")
+        server.kill()
+    program.write_text(f'#!/bin/sh\nexec {shlex.join(map(str, WINDOWS))} "$@"\n')
+    program.chmod(0o755)
+    done = subprocess.run([sys.executable, SOURCE / "tests/integration/haptic_udp.py", program], capture_output=True,
+                          text=True, env=wine_environment(), timeout=600, check=False)
+    if done.returncode:
+        report(f"haptic_udp.py: {done.stdout}{done.stderr}")
 
 
 def main():
@@ -156,6 +190,7 @@ def main():
     vectors()
     queries(models)
     names(inputs["sphere"])
+    servers(models[0])
     print(f"{count} comparisons, {len(problems)} differ")
     return 1 if problems else 0
 

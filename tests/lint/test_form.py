@@ -23,8 +23,9 @@ MADE = re.compile(  # by programs
 COMMON = {"meson.build", "README.md"}
 APART = ("tests/fuzz/seeds/", "lib/include/")
 # Vectors of numbers and their operations, which stand for operators: a prefix would hide the formulas. os_windows.h
-# declares functions of POSIX.
-UNPREFIXED = {"lib/core/simd.h", "lib/core/os_windows.h"}
+# and the headers in lib/core/windows declare functions of POSIX.
+POSIX = {"lib/core/os_windows.h", "lib/core/windows/poll.h", "lib/core/windows/sys/socket.h"}
+UNPREFIXED = POSIX | {"lib/core/simd.h"}
 NO_CODE = re.compile(  # comments, texts, preprocessor lines, attributes
     r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*|__attribute__\(\(.*?\)\)|'
     r"\bEBPO_PRINTF\([^)]*\)", re.S | re.M)
@@ -91,7 +92,7 @@ def bare_functions(root, names):
             continue
         code = c_code(text_of(root / name))
         for found in re.finditer(r"^static\b[^;={}()]*?[ *](\w+)\(", code, re.M):
-            if found[1].isalpha() and name != "lib/core/os_windows.h":
+            if found[1].isalpha() and name not in POSIX:
                 yield (f"{name}:{code.count(chr(10), 0, found.start(1)) + 1}: the name of the function "
                        f"{found[1]} is a bare word; let it say what it does")
 

@@ -18,6 +18,7 @@ import subprocess
 import sys
 import threading
 import types
+import urllib.request
 import zlib
 
 from package_support import Case, model, np, points, run
@@ -81,6 +82,8 @@ class Arrays(Case):
         self.assertEqual(m.inside(P.reshape(2, 25, 60, 3)[:, ::2]).shape, (2, 13, 60))
         self.assertEqual(m.inside(np.zeros((4, 0, 3))).shape, (4, 0))
         self.assertEqual(m.distance_bounds(image, level=2).lo.shape, (50, 60))
+        np.testing.assert_array_equal(m.winding_bounds(image).reshape(3000, 2), m.winding_bounds(P))
+        self.assertEqual((m.winding_bounds(P[0]).shape, m.winding_bounds(P[:0]).shape), ((2,), (0, 2)))
         origins = 3 * image
         hits, plain = m.ray(origins, -image), m.ray(3 * P, -P)
         self.same([part.ravel() for part in hits], plain)
@@ -122,6 +125,9 @@ class Arrays(Case):
         np.testing.assert_array_equal(every.ray, np.flatnonzero(left)[alone.ray])
         self.assertTrue((np.diff(every.begin)[gone] == 0).all() and len(every.begin) == len(P) + 1)
         self.assertFalse(m.ray_any(P, [np.nan, 0, 1], nan="propagate").any())
+        bounds = m.winding_bounds(bad, nan="propagate")
+        np.testing.assert_array_equal(bounds[left], m.winding_bounds(P[left]))
+        self.assertTrue(np.isnan(bounds[gone]).all())
         one = m.distance([np.nan, 0, 0], nan="propagate")
         self.assertTrue(np.isnan(one.distance) and one.point.shape == (3,) and one.face == -1)
         many = ebpo.Catalogue.of(["scan.ebpo.h5"])
@@ -132,6 +138,23 @@ class Arrays(Case):
             m.inside(bad, nan="propagate")
         with self.assertRaisesRegex(ValueError, "propagate"):
             m.inside(P, nan="ignore")
+
+    def test_masked(self):
+        m, mask = model("scan"), np.zeros(P.shape, bool)
+        mask[4, 1] = True
+        masked, image = np.ma.masked_array(P, mask), np.ma.masked_array(P, mask).reshape(50, 60, 3)
+        self.same(m.distance(np.ma.masked_array(P)), m.distance(P))
+        for given in (masked, image):
+            with self.assertRaisesRegex(ebpo.ArgumentError, "number 4 "):
+                m.distance(given)
+            with self.assertRaisesRegex(ebpo.ArgumentError, "ray 4 "):
+                m.ray(given, [0, 0, 1])
+            near = m.distance(given, nan="propagate")
+            self.assertEqual(np.flatnonzero(near.face.ravel() < 0).tolist(), [4])
+        with self.assertRaisesRegex(ebpo.ArgumentError, "masked"):
+            ebpo.convert((P[:3], np.ma.masked_array([[0, 1, 2]], [[0, 0, 1]])), "masked.ebpo.h5")
+        with self.assertRaisesRegex(ebpo.FormatError, "vertex 1 has y = nan"):
+            ebpo.convert((masked[3:6].astype(np.float32), [[0, 1, 2]]), "masked.ebpo.h5")
 
     def test_bounds_and_volume(self):
         for options in ({}, {"memory": "2M"}):
@@ -205,14 +228,17 @@ class Signatures(Case):
         self.assertGreater(count, 150)
 
     def test_mypy(self):
+        folder = pathlib.Path(ebpo.__file__).parents[1]
+        environment = dict(os.environ)
+        if folder.name != "site-packages":  # mypy finds an installed package by itself
+            environment["MYPYPATH"] = str(folder)
         mypy = [os.environ["EBPO_MYPY"]] if os.environ.get("EBPO_MYPY") else [sys.executable, "-m", "mypy"]
         if subprocess.run([*mypy, "--version"], capture_output=True).returncode:
             self.skipTest("mypy is not installed; EBPO_MYPY may name its program")
         options = ["--python-executable", sys.executable, "--cache-dir", "mypy-cache"]
 
         def check(*words):
-            return subprocess.run([*mypy, *options, *words], capture_output=True, text=True,
-                                  env=dict(os.environ, MYPYPATH=str(pathlib.Path(ebpo.__file__).parents[1])))
+            return subprocess.run([*mypy, *options, *words], capture_output=True, text=True, env=environment)
 
         pathlib.Path("uses.py").write_text(USES)
         done = check("--strict", "--follow-imports", "silent", "uses.py")
@@ -240,6 +266,36 @@ class Notebooks(Case):
         bare = ebpo.convert("scan.ply", "<b>.ebpo.h5", parts="mesh")
         self.assertNotIn("<b>", bare._repr_html_())
         self.assertNotIn("<img", bare._repr_html_())
+
+    def test_viewer(self):
+        pathlib.Path("a viewer").mkdir()
+        pathlib.Path("a viewer/index.html").write_text("the viewer")
+        m = model("scan")
+        with m.show(height=300, viewer="a viewer") as shown:
+            found = re.fullmatch(r"<iframe src='(http://127\.0\.0\.1:\d+/)' style='[^'<>]* height: 300px;[^'<>]*'></iframe>",
+                                 shown._repr_html_())
+            self.assertEqual(found[1], shown.address)
+            with urllib.request.urlopen(shown.address) as page:  # redirects to the address with the file
+                self.assertIn("file=models/0/scan.ebpo.h5", page.url)
+                self.assertEqual(page.read(), b"the viewer")
+            with urllib.request.urlopen(shown.address + "models/0/scan.ebpo.h5") as file:
+                self.assertEqual(file.read(), pathlib.Path("scan.ebpo.h5").read_bytes())
+            process = shown._process
+            child = os.fork()
+            if not child:  # a forked process does not end the server of the old one
+                shown.close()
+                os._exit(0)
+            os.waitpid(child, 0)
+            self.assertIsNone(process.poll())
+        self.assertIsNotNone(process.poll())
+        shown.close()
+        with self.assertRaisesRegex(ebpo.UnsupportedError, "nowhere: the viewer is not in this folder"):
+            m.show(viewer="nowhere")
+        with self.assertRaisesRegex(ValueError, "local path"):
+            ebpo.open(pathlib.Path("scan.ebpo.h5").read_bytes()).show()
+        for height in (0, -1, 1 << 70):
+            with self.assertRaises(ebpo.ArgumentError):
+                m.show(height=height, viewer="a viewer")
 
 
 class Bars(Case):

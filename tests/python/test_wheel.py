@@ -14,6 +14,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import zipfile
 
@@ -81,6 +82,21 @@ def check_platform(path):
     assert not found or tuple(map(int, found.groups())) == newest, (path, newest)
 
 
+def check_sdist():
+    """Check the source distribution: what pip needs is in it, and an unpacked one makes an equal one."""
+    name = ebpo_wheel.build_sdist(".")
+    with tarfile.open(name) as archive:
+        names = {member.name.partition("/")[2]: member.mode for member in archive.getmembers()}
+        archive.extractall("sdist", filter="data") if hasattr(tarfile, "data_filter") else archive.extractall("sdist")
+    assert {"PKG-INFO", "pyproject.toml", "meson.build", "LICENSE", "docs/guide/python.md"} <= set(names), names
+    assert names["tools/packaging/windows.sh"] == 0o755 and not any(name.startswith("tests/") for name in names)
+    root = pathlib.Path("sdist", name.partition(".tar")[0])
+    hook = "import sys; sys.path.insert(0, 'tools/python/backend'); import ebpo_wheel; ebpo_wheel.build_sdist('..')"
+    assert (root / "pyproject.toml").read_text().count('"tools/python/backend"') == 1
+    run(sys.executable, "-B", "-c", hook, cwd=root)
+    assert pathlib.Path("sdist", name).read_bytes() == pathlib.Path(name).read_bytes()
+
+
 def main():
     pip = subprocess.run([sys.executable, "-m", "pip", "--version"], capture_output=True).returncode == 0
     if not pip or not all(map(shutil.which, ["readelf", "objdump", "strip"])):
@@ -95,6 +111,7 @@ def main():
         first = pathlib.Path("dist", wheel).read_bytes()
         ebpo_wheel.pack(build, "again")
         assert pathlib.Path("again", wheel).read_bytes() == first, "equal inputs give equal bytes"
+        check_sdist()
         run(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", "clean")
         python = pathlib.Path(name, "clean/bin/python")
         run(sys.executable, "-m", "pip", "--python", python, "install", "--no-index", "--no-deps", f"dist/{wheel}")

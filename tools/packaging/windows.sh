@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds the library and the command for Windows (x86-64), on Linux: windows.sh FOLDER
-# Writes FOLDER/ebpo-VERSION-windows-x86_64.zip: ebpo.exe, libebpo-0.dll, headers, import library, and licences.
+# Writes FOLDER/ebpo-VERSION-windows-x86_64.zip: ebpo.exe, libebpo-0.dll, headers, import library, licences,
+# and the viewer if it was built (docs/guide/viewer.md).
 # Needs Debian's mingw-w64, wine64, cmake, meson and dpkg-dev. The libraries that are linked are built from Debian's
 # source packages (tools/python/backend/static_libraries.sh), once for each FOLDER. The command has no URLs, captions
 # or Assimp. Equal inputs give equal bytes.
@@ -53,7 +54,8 @@ import zipfile
 folder, name, root = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
 installed = next((folder / "installed").rglob("ebpo.exe")).parents[1]
 entries = {f"{path.relative_to(installed)}": path for path in installed.rglob("*")
-           if path.suffix in (".exe", ".dll", ".h") or path.name.endswith(".dll.a")}
+           if path.suffix in (".exe", ".dll", ".h") or path.name.endswith(".dll.a") or
+           (path.is_file() and path.parent.name == "viewer")}
 entries["licences/ebpo.txt"] = root / "LICENSE"
 for package in ("mingw-w64-common", "gcc-mingw-w64-base"):  # parts of their libraries are in the programs
     entries[f"licences/{package}.txt"] = pathlib.Path(f"/usr/share/doc/{package}/copyright")

@@ -51,8 +51,8 @@ static void *take_often(void *user)
 
 haptic_live *haptic_live_begin(haptic_live_fn take, void *user)
 {
-    haptic_live *live = NULL;
-    if (posix_memalign((void **)&live, 64, sizeof *live) != 0)
+    haptic_live *live = aligned_alloc(64, sizeof *live);
+    if (!live)
         return NULL;
     memset(live, 0, sizeof *live); /* now, so that no step has a page fault for it */
     live->take = take;

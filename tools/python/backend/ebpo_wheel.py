@@ -3,19 +3,23 @@
     pip wheel tools/python --no-deps -w dist
     python3 tools/python/backend/ebpo_wheel.py BUILD_FOLDER DIST    # packs an existing build
 
-The wheel contains the package, the library, the command `ebpo`, HDF5's plugin for zstd, and all licences. HDF5,
-zstd, zlib, GMP, nettle and jansson are linked statically, with hidden symbols, so that other copies of them in the
-same process (h5py) are not affected. static_libraries.sh builds them, which takes minutes. EBPO_LIBRARIES names a
-folder that keeps them for later builds.
+The wheel contains the package, the library, the command `ebpo`, HDF5's plugin for zstd, the web viewer if it was built
+before (docs/guide/viewer.md), and all licences. HDF5, zstd, zlib, GMP, nettle and jansson are linked statically, with
+hidden symbols, so that other copies of them in the same process (h5py) are not affected. static_libraries.sh builds
+them, which takes minutes. EBPO_LIBRARIES names a folder that keeps them for later builds.
 
 pip installs meson, ninja and the compiler (ziglang), which links against glibc 2.28. The variable CC selects
 another compiler. The wheel contains no code for one version of Python, so one wheel serves all versions. Its tag states
 the required version of glibc. Equal inputs give equal bytes.
 
+A source distribution contains all files of the project except its tests.
+
 meson-python is not used, because it has no way to build the static libraries first.
 """
 import base64
+import gzip
 import hashlib
+import io
 import os
 import pathlib
 import platform
@@ -23,6 +27,7 @@ import re
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tempfile
 import zipfile
 
@@ -32,6 +37,7 @@ SETUP = ["--buildtype=release", "--prefix=/ebpo", "--prefer-static", "-Dtests=di
          "-Dassimp=disabled", "-Dqhull=disabled", "-Drender=disabled", "-Dcaptions=disabled", "-Dchart_js=none",
          "-Dpython_dir=none"]
 DATE = (1980, 1, 1, 0, 0, 0)
+OMITTED = ("tests/", "format-spec/vectors/")  # of source distributions
 COMPILER = """#!/bin/sh
 target={machine}-linux-gnu
 for word; do [ "$word" = -E ] && exec {zig} cc -target $target "$@"; done
@@ -100,13 +106,19 @@ def build(folder, libraries, setup_args):
 
 
 def installed(folder, target):
-    """Install the programs of a build below a folder. Yield the name in the wheel and the path of each file."""
+    """Install the programs of a build, and the viewer, below a folder.
+
+    Yield the name in the wheel and the path of each file.
+    """
     run("meson", "install", "-C", folder, "--no-rebuild", "--strip", "--quiet", "--tags", "runtime", "--destdir", target)
     prefix = next(target.rglob("bin/ebpo")).parents[1]
     for path in sorted([prefix / "bin/ebpo", *prefix.rglob("*.so*")]):
         if not path.is_symlink():
             soname = re.sub(r"(\.so\.\d+)[.\d]*$", r"\1", path.name)
             yield (path.parent / soname).relative_to(prefix).as_posix(), path
+    for path in sorted((prefix / "share/ebpo/viewer").glob("*")):
+        if path.suffix != ".gz":  # only for other servers
+            yield path.relative_to(prefix).as_posix(), path
 
 
 def glibc(file):
@@ -125,14 +137,16 @@ def tag(files):
     return "py3-none-manylinux_%d_%d_%s" % (*max(versions), machine())
 
 
-def licences(libraries):
-    """Yield (name, text) of the licences of all code in the wheel."""
+def licences(libraries, viewer):
+    """Yield (name, text) of the licences of all code in the wheel. viewer: the wheel contains the web viewer."""
     yield "licenses/ebpo.txt", (ROOT / "LICENSE").read_bytes()
     if libraries:
         for path in sorted((libraries / "licences").iterdir()):
             yield f"licenses/{path.name}", path.read_bytes()
         if not os.environ.get("CC"):  # parts of Zig's runtime are in the programs
             yield "licenses/zig.txt", (zig() / "LICENSE").read_bytes()
+    if viewer:
+        yield "licenses/three.txt", (ROOT / "tools/web/node_modules/three/LICENSE").read_bytes()
 
 
 METADATA = """Metadata-Version: 2.1
@@ -184,11 +198,12 @@ def pack(folder, dist, libraries=None):
     entries = [(f"ebpo/{path.name}", path.read_bytes(), False) for path in package_in(folder / "tools/python/ebpo")]
     with tempfile.TemporaryDirectory() as target:
         programs = list(installed(folder, pathlib.Path(target)))
-        tagged = tag([path for _, path in programs])
-        entries += [(f"ebpo/{place}", path.read_bytes(), True) for place, path in programs]
+        viewer = {path for place, path in programs if place.startswith("share/")}
+        tagged = tag([path for _, path in programs if path not in viewer])
+        entries += [(f"ebpo/{place}", path.read_bytes(), path not in viewer) for place, path in programs]
     entries.append((f"{name}.data/scripts/ebpo", COMMAND, True))
     head = f"Wheel-Version: 1.0\nGenerator: ebpo_wheel {version()}\nRoot-Is-Purelib: false\nTag: {tagged}\n"
-    for place, data in [*licences(libraries), ("METADATA", metadata()), ("WHEEL", head.encode())]:
+    for place, data in [*licences(libraries, viewer), ("METADATA", metadata()), ("WHEEL", head.encode())]:
         entries.append((f"{name}.dist-info/{place}", data, False))
     write(dist / f"{name}-{tagged}.whl", entries)
     return f"{name}-{tagged}.whl"
@@ -222,8 +237,29 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         return pack(folder / "build", wheel_directory, libraries)
 
 
+def source_files():
+    """Return the names of the project's files without its tests: those of git, or all in an unpacked distribution."""
+    if (ROOT / ".git").exists():
+        names = run("git", "-C", ROOT, "ls-files", "-z").split("\0")
+    else:
+        names = [path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*")]
+    names = [name for name in names if not name.startswith(OMITTED) and "__pycache__" not in name]
+    return sorted(name for name in names if (ROOT / name).is_file())
+
+
 def build_sdist(sdist_directory, config_settings=None):
-    raise SystemExit("ebpo_wheel.py: a source distribution is the whole project; make it with `meson dist`")
+    name = f"ebpo-{version()}"
+    contents = {place: (ROOT / place).read_bytes() for place in source_files()}
+    project = (ROOT / "tools/python/pyproject.toml").read_text()
+    contents["pyproject.toml"] = project.replace('"backend"', '"tools/python/backend"').encode()
+    contents["PKG-INFO"] = metadata()
+    with open(pathlib.Path(sdist_directory, f"{name}.tar.gz"), "wb") as file, \
+            gzip.GzipFile("", "wb", 9, file, mtime=0) as packed, tarfile.open(None, "w", packed) as archive:
+        for place, data in sorted(contents.items()):
+            info = tarfile.TarInfo(f"{name}/{place}")
+            info.size, info.mode = len(data), 0o755 if data.startswith(b"#!") else 0o644
+            archive.addfile(info, io.BytesIO(data))
+    return f"{name}.tar.gz"
 
 
 def main():

@@ -9,7 +9,8 @@ bools       True, False, 0 and 1. Another integer raises ArgumentError.
 reals       Every value that float() accepts, except texts. An integer that no double equals raises ArgumentError.
 texts       str as UTF-8, paths by os.fsencode, bytes. A NUL, or a character without an encoding in UTF-8,
             raises ArgumentError.
-arrays      Arrays of numbers. The rules for integers apply to each item.
+arrays      Arrays of numbers. The rules for integers apply to each item. Masked reals become NaN; masked integers
+            raise ArgumentError.
 
 ArgumentError is a ValueError.
 """
@@ -214,12 +215,14 @@ def doubles(values: Any, what: str) -> np.ndarray:
     if given.dtype.kind in "iu" and given.dtype.itemsize == 8 and given.size:
         for value in given[np.abs(out) >= 2.0**53].tolist():
             real(value, what)
-    return out
+    return np.where(np.ma.getmaskarray(values), np.nan, out) if np.ma.is_masked(values) else out
 
 
 def integers(values: Any, dtype: Any, what: str) -> np.ndarray:
     """Convert integers to a contiguous array of a type that holds each. Raises TypeError for floats and bools."""
     given, range_ = np.asarray(values), np.iinfo(dtype)
+    if np.ma.is_masked(values):
+        raise refused(what, "masked integers have no value")
     if given.dtype.kind == "O":
         flat = [within(index_of(value, what), int(range_.min), int(range_.max), what) for value in given.ravel()]
         given = np.array(flat, dtype).reshape(given.shape)

@@ -26,7 +26,7 @@ def arrays_of(mesh: Any) -> tuple[Any, Any]:
         if hasattr(mesh, "vertices") and hasattr(mesh, name):
             return np.asarray(mesh.vertices), np.asarray(getattr(mesh, name))
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
-        return np.asarray(mesh[0]), np.asarray(mesh[1])
+        return np.asanyarray(mesh[0]), np.asanyarray(mesh[1])  # of any class, such as masked arrays
     raise TypeError(f"{type(mesh).__name__} is neither a path, (vertices, faces) nor a mesh of trimesh, Open3D or PyVista")
 
 

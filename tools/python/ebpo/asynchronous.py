@@ -89,7 +89,8 @@ class AsyncModel:
                 lib.ebpo_async_end(handle, operation)
 
     async def _open(self, options: dict) -> None:
-        self._model = await self._repeat(lambda: Model(self._arriving, options))
+        source: Any = self._arriving
+        self._model = await self._repeat(lambda: Model(source, options))
         self.info = self._model.info
 
     async def run(self, function: Callable[[Model], Result]) -> Result:
@@ -124,8 +125,8 @@ class AsyncModel:
         rows = Rows(points, nan=nan)
         options = made(c.ebpo_distance_options, max_distance=max_distance, unsigned_distance=not signed)
         found = await self._batch("ebpo_distance_many", rows[0:rows.count], options, DISTANCE)
-        return Nearest(*(rows.result(found[name].copy(), np.nan) for name in Nearest._fields[:3]),
-                       rows.result(found["face"].view(np.int64).copy(), -1))
+        distance, point, normal = (rows.result(found[name].copy(), np.nan) for name in Nearest._fields[:3])
+        return Nearest(distance, point, normal, rows.result(found["face"].view(np.int64).copy(), -1))
 
     async def ray(self, origins: ArrayLike, directions: ArrayLike, *, t_max: ArrayLike = float("inf"),
                   sides: Sides = "both", nan: NanPolicy = "raise") -> Hits:

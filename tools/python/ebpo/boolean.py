@@ -4,7 +4,7 @@ from __future__ import annotations
 import ctypes
 import math
 import re
-from typing import TYPE_CHECKING, NamedTuple, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Sequence
 
 import numpy as np
 
@@ -43,8 +43,8 @@ class Parser:
     """Reads an expression into nodes; ~ binds first, then & and *, other operators from left to right."""
 
     def __init__(self, text: str, operands: int) -> None:
-        self.words, self.operands, self.nodes = re.findall(r"\S", text), operands, []
-        self.text = text
+        self.words, self.operands, self.text = re.findall(r"\S", text), operands, text
+        self.nodes: list[Any] = []
 
     def peek(self) -> str:
         return self.words[0] if self.words else ""

@@ -143,7 +143,7 @@ def read_mesh(mesh: AnyMesh, workspace: Handle, attributes: bool, common: dict[s
     faces = integers(faces, np.uint32, "faces")
     if faces.size and faces.max() >= len(vertices):
         raise ValueError("a face names a vertex that does not exist")
-    single = vertices.dtype == np.float32
+    single = vertices.dtype == np.float32 and not np.ma.is_masked(vertices)
     read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace, vertex_count=len(vertices), face_count=len(faces))
     xyz = of_malloc(vertices if single else doubles(vertices, "vertices"))
     setattr(read.c, "xyz32" if single else "xyz64", xyz)

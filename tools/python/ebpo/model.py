@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pyvista  # type: ignore[import-not-found, import-untyped, unused-ignore]
     import trimesh  # type: ignore[import-not-found, import-untyped, unused-ignore]
     from .adapters import TrimeshLike
+    from .notebook import Viewer
 
 # For each kind of query: the share of its time that partial loading costs
 # (docs/measured/queries.md).
@@ -285,6 +286,17 @@ class Model(PointQueries):
         """Return facts and a picture for notebooks."""
         from .notebook import html_of
         return html_of(self)
+
+    def show(self, *, height: int = 480, viewer: Path | None = None) -> Viewer:
+        """Return the web viewer of the model, which a notebook shows inline. The model is that of a local path.
+
+        height: height of the viewer in pixels.
+        viewer: the folder of the viewer. None: the folder where it is installed.
+
+        Raises UnsupportedError when the command `ebpo` or the viewer is missing.
+        """
+        from .notebook import Viewer
+        return Viewer(self._source, height, viewer)
 
     @property
     def stats(self) -> dict[str, Any]:

@@ -1,16 +1,24 @@
-"""Shows a model in a notebook: facts, and a picture of the envelopes of a coarse level."""
+"""Shows a model in a notebook: facts and a picture of the envelopes of a coarse level, or the web viewer."""
 from __future__ import annotations
 
 import base64
 import contextlib
 import html
+import os
+import pathlib
+import shutil
 import struct
+import subprocess
+import tempfile
+import weakref
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import Error
+from ._checked import path, within
+from .errors import Error, UnsupportedError
+from .signatures import Path
 
 if TYPE_CHECKING:
     from .model import Model
@@ -20,6 +28,69 @@ FACES = 40000  # greatest number of triangles of a picture
 NODES = 1500  # greatest number of nodes of a level that is drawn
 LIGHT = np.array([-0.35, -0.5, 0.79])
 COLOUR = np.array([122, 160, 196])
+
+
+class Viewer:
+    """The web viewer of a model, inline in notebooks. `Model.show` makes it.
+
+    A process of `ebpo serve` serves the file to browsers of this machine. It ends with this object or with Python.
+
+    address: the address of the viewer.
+    """
+
+    def __init__(self, source: Any, height: int, viewer: Path | None) -> None:
+        self.height = within(height, 1, 100_000, "height")
+        if not isinstance(source, (str, os.PathLike)) or "://" in os.fsdecode(source):
+            raise ValueError("show() needs a model that was opened from a local path")
+        folder = [] if viewer is None else [b"--viewer", path(viewer, "viewer")]
+        with tempfile.TemporaryFile() as messages:
+            self._process = subprocess.Popen([command(), b"serve", b"-q", b"--port", b"0", *folder, b"--", path(source)],
+                                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages)
+            assert self._process.stdout
+            self.address: str = self._process.stdout.readline().decode().strip()
+            self._end = weakref.finalize(self, stop, self._process)
+            if not self.address:
+                self._process.wait()
+                messages.seek(0)
+                raise UnsupportedError(messages.read().decode("utf-8", "replace").strip() or "ebpo serve ended",
+                                       "EBPO_E_UNSUPPORTED")
+
+    def close(self) -> None:
+        """End the server."""
+        self._end()
+
+    def __enter__(self) -> Viewer:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<ebpo viewer at {self.address}>"
+
+    def _repr_html_(self) -> str:
+        return f"<iframe src='{self.address}' style='width: 100%; height: {self.height}px; border: 0'></iframe>"
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """End a process. In a process that os.fork made, nothing ends, because the process is not its child."""
+    process.terminate()
+    process.wait()
+    if process.stdout:
+        process.stdout.close()
+
+
+def command() -> str:
+    """Return the path of the command `ebpo`: that of the wheel, of the build folder, of the prefix, or in PATH."""
+    here = pathlib.Path(__file__).resolve().parent
+    for file in (here / "bin/ebpo", here.parents[1] / "ebpo", here.parents[3] / "bin/ebpo"):
+        if file.is_file():
+            return str(file)
+    found = shutil.which("ebpo")
+    if not found:
+        raise UnsupportedError("the command ebpo, which serves the viewer, is not in PATH; install it",
+                               "EBPO_E_UNSUPPORTED")
+    return found
 
 
 def html_of(model: Model) -> str:

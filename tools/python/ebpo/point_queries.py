@@ -139,8 +139,8 @@ class PointQueries(RayQueries):
         """
         return self.locate(points, nan=nan, threads=threads, progress=progress).winding
 
-    def winding_bounds(self, points: ArrayLike, *, width: float = 1e-9) -> Doubles:
-        """Return bounds of the winding numbers of points: (n, 2), nan on faces.
+    def winding_bounds(self, points: ArrayLike, *, width: float = 1e-9, nan: NanPolicy = "raise") -> Doubles:
+        """Return bounds of the winding numbers of points: (..., 2), nan on faces.
 
         width: greatest difference of the bounds, as far as double precision allows it. Only surfaces
             have winding numbers that are not integers.
@@ -150,13 +150,17 @@ class PointQueries(RayQueries):
         >>> cube.winding_bounds([.5, .5, .5])
         array([1., 1.])
         """
-        rows = Rows(points)
+        rows = Rows(points, nan=nan)
         out = np.empty((rows.count, 2))
         for begin in range(0, max(1, rows.count), 65536):
             block = rows[begin:begin + 65536]
-            with self._context() as context:
-                call("ebpo_winding", context, block.ctypes.data, len(block), width, out[begin:].ctypes.data)
-        return out[0] if rows.single else out
+            try:
+                with self._context() as context:
+                    call("ebpo_winding", context, block.ctypes.data, len(block), width, out[begin:].ctypes.data)
+            except ArgumentError:
+                rows.check(begin, begin + len(block))
+                raise
+        return rows.result(out, np.nan)
 
     # ---- distance ----
 

@@ -68,7 +68,7 @@ class Rows:
         if holds_codes(values):
             raise TypeError(f"{what}: expected real numbers, got {CODES}")
         if len(self.shape) != 1:
-            values = np.asarray(values).reshape(-1, 3)
+            values = np.asanyarray(values).reshape(-1, 3)
         self.values, self.what, self.count = values, what, int(values.shape[0])
         self.valid: Any = None
         if nan == "propagate":
@@ -79,7 +79,7 @@ class Rows:
 
     def select(self, valid: np.ndarray) -> None:
         """Restrict the rows to those where `valid` is True."""
-        self.values = np.asarray(self.values)[valid]
+        self.values = np.asanyarray(self.values)[valid]
         self.count, self.valid = len(self.values), valid
 
     def result(self, values: np.ndarray, missing: Any) -> Any:

@@ -1,1 +1,2 @@
-/* Stands for the POSIX header of this name: core/os_windows.h declares its content. */
+/* Stands for the POSIX header of this name: sys/socket.h declares its content. */
+#include <sys/socket.h>
