@@ -106,6 +106,51 @@ START_TEST(test_errors_hold)
 }
 END_TEST
 
+/* Makes long random triangles that overlap. Their corners are in a unit cube. */
+static ebpo_patch_mesh overlapping(uint64_t count, uint64_t *state)
+{
+    ebpo_patch_mesh mesh = { .vertex_count = 3 * count, .triangle_count = count };
+    mesh.vertex = calloc(3 * count, sizeof *mesh.vertex);
+    mesh.triangle = malloc(3 * count * sizeof *mesh.triangle);
+    for (uint32_t v = 0; v < 3 * count; v++) {
+        mesh.triangle[v] = v;
+        for (int k = 0; k < 3; k++)
+            mesh.vertex[v].at[k] = ebpo_test_random_unit(state);
+    }
+    return mesh;
+}
+
+/* The bound is an upper bound, and is close to the greatest distance of a point. */
+START_TEST(test_bound_of_overlapping_triangles)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t state = 5;
+    ebpo_patch_mesh a = overlapping(300, &state), b = overlapping(300, &state);
+    double bound, most = 0;
+    must(ebpo_bound_distance(&a, &b, 1e-6, 0, &bound, &error), "bound", &error);
+    for (uint64_t i = 0; i < 4000; i++) {
+        double p[3], least = INFINITY, u = ebpo_test_random_unit(&state),
+                     v = (1 - u) * ebpo_test_random_unit(&state);
+        const ebpo_patch_vertex *t = a.vertex + 3 * (i % a.triangle_count);
+        for (int k = 0; k < 3; k++)
+            p[k] = t[0].at[k] + u * (t[1].at[k] - t[0].at[k]) + v * (t[2].at[k] - t[0].at[k]);
+        for (uint64_t n = 0; n < b.triangle_count; n++) {
+            ebpo_distance_bounds d;
+            double corner[3][3];
+            for (int k = 0; k < 3; k++)
+                memcpy(corner[k], b.vertex[3 * n + (uint64_t)k].at, sizeof corner[k]);
+            ebpo_triangle_distance_bounds(p, (const double(*)[3])corner, &d);
+            least = fmin(least, d.lo);
+        }
+        most = fmax(most, least);
+    }
+    ck_assert_double_le(most, bound);
+    ck_assert_double_le(bound, 1.05 * most);
+    ebpo_patch_mesh_free(&a);
+    ebpo_patch_mesh_free(&b);
+}
+END_TEST
+
 static int by_edge(const void *a, const void *b)
 {
     const uint32_t *x = a, *y = b;
@@ -508,6 +553,7 @@ TEST_SUITE(surface)
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_test(tests, test_errors_hold);
+    tcase_add_test(tests, test_bound_of_overlapping_triangles);
     tcase_add_test(tests, test_joined_levels_are_closed);
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_few_faces_have_none);
