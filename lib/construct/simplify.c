@@ -10,6 +10,7 @@
  * a circular list, and a collapse joins two lists. */
 #include "core/strict_fp.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -409,6 +410,12 @@ static void collapse_edges(simplifier *s, uint64_t target)
 ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error)
 {
     uint64_t vertices = mesh->vertex_count, triangles = mesh->triangle_count;
+    if (triangles > UINT32_MAX / 3)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a node has %" PRIu64
+                         " faces and no nodes below; a simplified surface can "
+                         "be made of at most %" PRIu32 ", so convert without the part surface",
+                         triangles, UINT32_MAX / 3);
     simplifier s = { .mesh = mesh, .alive = triangles };
     s.sum = ebpo_alloc_zero(vertices, sizeof *s.sum);
     s.next = ebpo_alloc(triangles, 3 * sizeof *s.next);

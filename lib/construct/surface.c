@@ -660,8 +660,9 @@ static ebpo_status bound_error(const surface_builder *b, patch_node *node,
         status = ebpo_bound_distance(&node->mesh, from, fine, back, &there, error);
     for (int k = 0; k < 3; k++)
         greatest = fmax(greatest, fabs(b->box.origin[k]) + b->box.size[k]);
-    /* the last two terms are more than the rounding errors of positions and distances */
-    node->error = before + fmax(there, back) + ldexp(greatest, -b->exponent) * 0x1p-44 + 0x1p-40;
+    /* a reader rounds each coordinate of a vertex by at most 2^-52 of `greatest`; the last term is
+     * more than the rounding errors of scaled positions and of their distances */
+    node->error = before + fmax(there, back) + ldexp(greatest, -b->exponent) * 0x1p-50 + 0x1p-40;
     return status;
 }
 

@@ -5,11 +5,15 @@
  * upper bounds of the distance of the points of T from the second surface. The first bound is the
  * greatest distance of the corners of T from one triangle of the second surface. The second bound
  * is the distance of the centre of T from the second surface, plus the greatest distance of a
- * corner of T from the centre. T is cut until one of these bounds is close enough to the greatest
- * distance of a point that was found so far. If possible, T is cut by the sides of the prism over a
- * near triangle of the second surface; otherwise it is halved. Halving alone would make very many
- * parts if both surfaces divide a plane into slivers. The second surface is stored in a complete
- * binary tree of boxes. */
+ * corner of T from the centre. The triangle with the greatest bound is cut, again and again, until
+ * this bound is close enough to the greatest distance of a point that was found so far. If
+ * possible, a triangle is cut by the sides of the prism over a near triangle of the second surface;
+ * otherwise it is halved. Halving alone would make very many parts if both surfaces divide a plane
+ * into slivers. The second surface is stored in a complete binary tree of boxes.
+ *
+ * If many triangles are long and overlap, a search visits most boxes, and there are very many
+ * parts. So the number of visited boxes and the number of parts are limited, in proportion to the
+ * number of triangles. At the limit, the greatest bound is the result. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,11 +24,23 @@
 #include "core/alloc.h"
 #include "geometry/vec3.h"
 
-/* LEAF_TRIANGLES: number of triangles of a leaf of the box tree. DEEPEST: maximum number of times
- * that a triangle is cut. PRISM_DEEPEST: after this number of cuts, triangles are only halved,
- * because each cut by a prism moves points by a rounding error. SAMPLED: at the beginning, the
- * distance of one vertex of every SAMPLED-th triangle is computed. */
-enum { LEAF_TRIANGLES = 4, DEEPEST = 64, PRISM_DEEPEST = 20, SAMPLED = 8 };
+/* LEAF_TRIANGLES: number of triangles of a leaf of the box tree. DEEPEST: maximum depth of this
+ * tree. MOST_CUTS: maximum number of times that a triangle is cut. PRISM_CUTS: after this number of
+ * cuts, triangles are only halved, because each cut by a prism moves points by a rounding error.
+ * SAMPLED: at the beginning, the distance of one vertex of every SAMPLED-th triangle is computed.
+ * MOST_VISITS: maximum number of boxes that a search visits. STEPS: number of boxes, for each
+ * triangle, that are visited until no more triangles are cut; most models need less than 200.
+ * MORE_PARTS: greatest number of stored parts minus the number of triangles. */
+enum {
+    LEAF_TRIANGLES = 4,
+    DEEPEST = 64,
+    MOST_CUTS = 64,
+    PRISM_CUTS = 20,
+    SAMPLED = 8,
+    MOST_VISITS = 4096,
+    STEPS = 2048,
+    MORE_PARTS = 1 << 19
+};
 /* allowed ratio of the bound and the greatest distance of a point that was found */
 static const double CLOSE_ENOUGH = 1.05;
 
@@ -39,12 +55,14 @@ typedef struct search {
      * from `leaves` on are leaves; node 0 is not used */
     bounds *node;
     uint64_t leaves; /* number of leaves, a power of two */
+    uint64_t steps;  /* number of boxes that were visited so far */
 } search;
 
 /* A near triangle of the second surface, and the squared distance of a point from it. */
 typedef struct hit {
     double square;
     uint64_t triangle;
+    bool nearest; /* false: another triangle may be nearer */
 } hit;
 
 static void get_corner(const ebpo_patch_mesh *mesh, uint64_t triangle, int k, double out[3])
@@ -145,11 +163,13 @@ static double box_square(const bounds *b, const double p[3])
     return sum;
 }
 
-/* Returns the triangle nearest to p, or a triangle whose squared distance is at most `good`.
- * `guess`: a triangle that is probably near. */
-static hit find_nearest(const search *s, const double p[3], uint64_t guess, double good)
+/* Returns the triangle nearest to p, or a triangle whose squared distance is at most `good`, or a
+ * triangle that is near if MOST_VISITS boxes were visited. `guess`: a triangle that is probably
+ * near. */
+static hit find_nearest(search *s, const double p[3], uint64_t guess, double good)
 {
-    hit best = { square_to(s, guess, p), guess };
+    hit best = { square_to(s, guess, p), guess, false };
+    uint64_t last = s->steps + MOST_VISITS;
     struct {
         uint64_t node;
         double square;
@@ -157,7 +177,8 @@ static hit find_nearest(const search *s, const double p[3], uint64_t guess, doub
     int depth = 0;
     stack[depth].node = 1;
     stack[depth++].square = box_square(&s->node[1], p);
-    while (depth && best.square > good) {
+    while (depth && best.square > good && s->steps < last) {
+        s->steps++;
         uint64_t i = stack[--depth].node;
         if (!(stack[depth].square < best.square))
             continue;
@@ -175,9 +196,10 @@ static hit find_nearest(const search *s, const double p[3], uint64_t guess, doub
         for (uint64_t t = first; t < first + LEAF_TRIANGLES && t < s->mesh->triangle_count; t++) {
             double square = square_to(s, t, p);
             if (square < best.square)
-                best = (hit){ square, t };
+                best = (hit){ square, t, false };
         }
     }
+    best.nearest = depth == 0;
     return best;
 }
 
@@ -189,13 +211,24 @@ static double corners_square(const search *s, uint64_t triangle, double p[3][3])
                      square_to(s, triangle, p[2]));
 }
 
+/* A part of a triangle of the first surface. */
+typedef struct part {
+    double at[3][3];
+    double over;   /* upper bound of the distance of its points from the second surface */
+    uint64_t near; /* a triangle of the second surface near the centre of the part */
+    int cuts;      /* number of cuts that made the part */
+} part;
+
 typedef struct bounding {
     search to;          /* the second surface */
     double point_most;  /* greatest distance of a point that was found so far */
     double fine, known; /* as for ebpo_bound_distance */
-    double bound;       /* upper bound of the distance over the triangles so far */
+    double bound;       /* upper bound of the distance over all triangles so far, except `heap` */
     /* a triangle of the second surface that was near the triangle processed last */
     uint64_t guess;
+    part *heap; /* parts to cut; the greatest upper bound first */
+    uint64_t count, capacity;
+    bool short_of_memory;
 } bounding;
 
 /* Returns the bound that is sufficient: the greatest of `known` and of the values that are close
@@ -240,33 +273,92 @@ static void cut_polygon(const polygon *p, const double n[3], const double on[3],
     }
 }
 
-static void bound_triangle(bounding *b, double p[3][3], int depth);
+static void push_part(bounding *b, const part *p)
+{
+    if (!ebpo_grow(&b->heap, &b->capacity, b->count + 1, sizeof *b->heap)) {
+        b->short_of_memory = true;
+        return;
+    }
+    uint64_t i = b->count++;
+    for (; i > 0 && p->over > b->heap[(i - 1) / 2].over; i = (i - 1) / 2)
+        b->heap[i] = b->heap[(i - 1) / 2];
+    b->heap[i] = *p;
+}
 
-/* Cuts a polygon into triangles, and bounds the distance over these triangles. `depth`: number of
- * cuts before. */
-static void bound_polygon(bounding *b, const polygon *p, int depth)
+static part pop_part(bounding *b)
+{
+    part top = b->heap[0], last = b->heap[--b->count];
+    uint64_t i = 0;
+    for (uint64_t child = 1; child < b->count; child = 2 * i + 1) {
+        if (child + 1 < b->count && b->heap[child + 1].over > b->heap[child].over)
+            child++;
+        if (!(b->heap[child].over > last.over))
+            break;
+        b->heap[i] = b->heap[child];
+        i = child;
+    }
+    b->heap[i] = last;
+    return top;
+}
+
+static void get_centre(const double p[3][3], double centre[3])
+{
+    for (int k = 0; k < 3; k++)
+        centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
+}
+
+/* Bounds the distance over a triangle, and stores the triangle as a part to cut if the bound is not
+ * sufficient. `most`: an upper bound that is known. `cuts`: number of cuts that made the triangle.
+ */
+static void bound_triangle(bounding *b, double p[3][3], double most, int cuts)
+{
+    part made = { .cuts = cuts };
+    double centre[3], radius = 0;
+    get_centre((const double(*)[3])p, centre);
+    for (int i = 0; i < 3; i++) {
+        double v[3];
+        ebpo_vec3_subtract(p[i], centre, v);
+        radius = fmax(radius, ebpo_vec3_length(v));
+    }
+    double enough = enough_of(b), good = fmax(enough - radius, enough / 2);
+    hit near = find_nearest(&b->to, centre, b->guess, good * good);
+    b->guess = made.near = near.triangle;
+    if (near.nearest)
+        b->point_most = fmax(b->point_most, sqrt(near.square));
+    made.over = fmin(sqrt(corners_square(&b->to, near.triangle, p)), sqrt(near.square) + radius);
+    made.over = fmin(made.over, most);
+    if (made.over <= enough_of(b)) {
+        b->bound = fmax(b->bound, made.over);
+        return;
+    }
+    memcpy(made.at, p, sizeof made.at);
+    push_part(b, &made);
+}
+
+/* Cuts a polygon of a part into triangles, and bounds the distance over these triangles. */
+static void bound_polygon(bounding *b, const polygon *p, const part *of)
 {
     for (int i = 2; i < p->count; i++) {
         double t[3][3];
         memcpy(t[0], p->at[0], sizeof t[0]);
         memcpy(t[1], p->at[i - 1], sizeof t[1]);
         memcpy(t[2], p->at[i], sizeof t[2]);
-        bound_triangle(b, t, depth + 1);
+        bound_triangle(b, t, of->over, of->cuts + 1);
     }
 }
 
-/* Cuts triangle p by the sides of the prism over triangle `near`. These are the three planes that
- * contain the edges of `near` and are perpendicular to it. The part of p inside the prism is
- * bounded by the distances of its corners from `near`. The parts outside the prism are divided into
- * triangles, which are bounded by bound_triangle. Returns false and changes nothing if the centre
- * of p is outside the prism, because the part inside may then be empty. Returns false also if a
- * corner of the part inside is too far from `near`. */
-static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], uint64_t near,
-                           int depth)
+/* Cuts a part by the sides of the prism over the triangle p->near. These are the three planes that
+ * contain the edges of this triangle and are perpendicular to it. The part of p inside the prism is
+ * bounded by the distances of its corners from the triangle. The parts outside the prism are
+ * divided into triangles, which are bounded by bound_triangle. Returns false and changes nothing if
+ * the centre of p is outside the prism, because the part inside may then be empty. Returns false
+ * also if a corner of the part inside is too far from the triangle. */
+static bool cut_by_prism(bounding *b, const part *p)
 {
-    double t[3][3], edge[3][3], n[3], outward[3][3];
+    double t[3][3], edge[3][3], n[3], outward[3][3], centre[3];
+    get_centre((const double(*)[3])p->at, centre);
     for (int k = 0; k < 3; k++)
-        get_corner(b->to.mesh, near, k, t[k]);
+        get_corner(b->to.mesh, p->near, k, t[k]);
     for (int k = 0; k < 3; k++)
         ebpo_vec3_subtract(t[(k + 1) % 3], t[k], edge[k]);
     ebpo_vec3_cross(edge[0], edge[1], n);
@@ -278,7 +370,7 @@ static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], 
             return false;
     }
     polygon within = { .count = 3 }, outside[3] = { 0 };
-    memcpy(within.at, p, 3 * sizeof *p);
+    memcpy(within.at, p->at, sizeof p->at);
     for (int k = 0; k < 3; k++) {
         polygon inside = { 0 };
         cut_polygon(&within, outward[k], t[k], &outside[k], &inside);
@@ -286,51 +378,23 @@ static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], 
     }
     double over = 0;
     for (int i = 0; i < within.count; i++)
-        over = fmax(over, sqrt(square_to(&b->to, near, within.at[i])));
+        over = fmax(over, sqrt(square_to(&b->to, p->near, within.at[i])));
     if (over > enough_of(b))
         return false;
     b->bound = fmax(b->bound, over);
     for (int k = 0; k < 3; k++)
-        bound_polygon(b, &outside[k], depth);
+        bound_polygon(b, &outside[k], p);
     return true;
 }
 
-/* Bounds the distance over triangle p: cuts the triangle until the bound is at most enough_of(b).
- * `depth`: number of cuts so far. */
-static void bound_triangle(bounding *b, double p[3][3], int depth)
+/* Cuts a part into two by a plane through its longest edge's middle and the opposite corner. */
+static void halve_part(bounding *b, const part *p)
 {
-    double centre[3], radius = 0;
-    for (int k = 0; k < 3; k++)
-        centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
-    for (int i = 0; i < 3; i++) {
-        double v[3];
-        ebpo_vec3_subtract(p[i], centre, v);
-        radius = fmax(radius, ebpo_vec3_length(v));
-    }
-    double enough = enough_of(b), good = fmax(enough - radius, 0);
-    hit near = find_nearest(&b->to, centre, b->guess, enough * enough);
-    if (near.square <= enough * enough && depth < PRISM_DEEPEST &&
-        bound_by_prism(b, p, centre, near.triangle, depth)) {
-        b->guess = near.triangle;
-        return;
-    }
-    if (near.square > good * good)
-        near = find_nearest(&b->to, centre, near.triangle, good * good);
-    b->guess = near.triangle;
-    if (near.square > good * good)
-        b->point_most = fmax(b->point_most, sqrt(near.square));
-    double over = fmin(sqrt(corners_square(&b->to, near.triangle, p)), sqrt(near.square) + radius);
-    if (over <= enough_of(b) || depth == DEEPEST) {
-        b->bound = fmax(b->bound, over);
-        return;
-    }
-    if (depth < PRISM_DEEPEST && bound_by_prism(b, p, centre, near.triangle, depth))
-        return;
     int longest = 0;
     double length = -1, half[3][3];
     for (int i = 0; i < 3; i++) {
         double v[3];
-        ebpo_vec3_subtract(p[(i + 1) % 3], p[i], v);
+        ebpo_vec3_subtract(p->at[(i + 1) % 3], p->at[i], v);
         if (ebpo_vec3_dot(v, v) > length) {
             length = ebpo_vec3_dot(v, v);
             longest = i;
@@ -338,10 +402,29 @@ static void bound_triangle(bounding *b, double p[3][3], int depth)
     }
     int next = (longest + 1) % 3;
     for (int side = 0; side < 2; side++) {
-        memcpy(half, p, sizeof half);
+        memcpy(half, p->at, sizeof half);
         for (int k = 0; k < 3; k++)
-            half[side ? longest : next][k] = (p[longest][k] + p[next][k]) / 2;
-        bound_triangle(b, half, depth + 1);
+            half[side ? longest : next][k] = (p->at[longest][k] + p->at[next][k]) / 2;
+        bound_triangle(b, half, p->over, p->cuts + 1);
+    }
+}
+
+/* Cuts parts until all bounds are sufficient, or until `steps` boxes were visited or `parts` parts
+ * are stored. Then the heap is empty. */
+static void cut_parts(bounding *b, uint64_t steps, uint64_t parts)
+{
+    while (b->count && !b->short_of_memory) {
+        part p = pop_part(b);
+        if (p.over <= enough_of(b) || b->to.steps >= steps || b->count >= parts) {
+            b->bound = fmax(b->bound, p.over); /* the other parts have no greater bound */
+            b->count = 0;
+        } else if (p.cuts == MOST_CUTS) {
+            b->bound = fmax(b->bound, p.over);
+        } else {
+            b->guess = p.near;
+            if (p.cuts >= PRISM_CUTS || !cut_by_prism(b, &p))
+                halve_part(b, &p);
+        }
     }
 }
 
@@ -369,7 +452,7 @@ static void bound_from_neighbours(bounding *b, const ebpo_patch_mesh *a, uint64_
         }
     }
     if (!close)
-        bound_triangle(b, p, 0);
+        bound_triangle(b, p, INFINITY, 0);
     for (int k = 0; k < 3; k++)
         near[corners[k]] = b->guess;
 }
@@ -378,8 +461,9 @@ ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh 
                                 double known, double *out, ebpo_error *error)
 {
     bounding all = { .fine = fine, .known = known };
-    uint64_t *near = ebpo_alloc(a->vertex_count, sizeof *near);
+    uint64_t triangles = a->triangle_count + b->triangle_count, *near;
     *out = 0;
+    near = ebpo_alloc(a->vertex_count, sizeof *near);
     if (!near || !make_search(&all.to, b)) {
         free(near);
         return ebpo_fail_memory(error, b->triangle_count * sizeof *all.to.node);
@@ -392,12 +476,15 @@ ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh 
         uint32_t v = a->triangle[3 * t];
         hit h = find_nearest(&all.to, a->vertex[v].at, all.guess, 0);
         near[v] = all.guess = h.triangle;
-        all.point_most = fmax(all.point_most, sqrt(h.square));
+        if (h.nearest)
+            all.point_most = fmax(all.point_most, sqrt(h.square));
     }
     for (uint64_t t = 0; t < a->triangle_count; t++)
         bound_from_neighbours(&all, a, t, near);
+    cut_parts(&all, STEPS * triangles, a->triangle_count + MORE_PARTS);
     *out = fmax(all.bound, all.point_most);
     free(near);
+    free(all.heap);
     free(all.to.node);
-    return EBPO_OK;
+    return all.short_of_memory ? ebpo_fail_memory(error, all.capacity * sizeof *all.heap) : EBPO_OK;
 }

@@ -209,9 +209,18 @@ static ebpo_status encode_arrays(gltf_writer *w, ebpo_error *error)
 {
     const ebpo_gltf_surface *s = w->surface;
     w->quantized = s->step[0] > 0;
-    if (w->quantized)
+    ebpo_status status = EBPO_OK;
+    if (w->quantized) {
         choose_grid(w);
-    ebpo_status status = encode_vertices(w, POSITIONS, w->quantized ? 8 : 12, error);
+        double finest = fmin(w->step[0], fmin(w->step[1], w->step[2]));
+        if (finest < (double)FLT_MIN) /* readers would round the scale of the node to 0 */
+            status = ebpo_fail(error, EBPO_E_LIMIT,
+                               "the grid of the vertices has steps of %g, which are too small for "
+                               "float32; scale the model",
+                               finest);
+    }
+    if (status == EBPO_OK)
+        status = encode_vertices(w, POSITIONS, w->quantized ? 8 : 12, error);
     if (status == EBPO_OK)
         status = encode_vertices(w, NORMALS, 4, error);
     if (status == EBPO_OK && s->colours)

@@ -33,7 +33,7 @@ typedef struct ebpo_gltf_written {
 
 /* Writes a GLB file; the caller checks the stream for errors. The steps of the grid are doubled
  * until all positions fit into 16 bits. `path`: for messages. Returns EBPO_E_LIMIT (a coordinate
- * beyond float32, a file of 4 GiB) or EBPO_E_MEMORY. */
+ * or a step of the grid beyond float32, a file of 4 GiB) or EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_gltf_surface_write(FILE *file, const char *path,
                                                   const ebpo_gltf_surface *surface,
                                                   ebpo_gltf_written *out, ebpo_error *error);

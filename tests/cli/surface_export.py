@@ -1,7 +1,7 @@
 """Checks exports of simplified surfaces. Decodes KHR_mesh_quantization and EXT_meshopt_compression by the
 specification, and shares no code with the writers.
 
-    surface_export.py torus FACES OUT.ply [SHIFT]    writes a coloured torus with waves
+    surface_export.py torus FACES OUT.ply [SHIFT [SCALE]]    writes a coloured torus with waves
     surface_export.py glb OUT.glb MODEL ERROR        the surface is within ERROR of the model, and the model of it
     surface_export.py tiles FOLDER MODEL             3D Tiles: errors, bounds, faces, references
 
@@ -22,7 +22,7 @@ SLACK = 1 + 1e-6
 
 # --- a model ---
 
-def torus(faces, path, shift):
+def torus(faces, path, shift, scale):
     around = round(math.sqrt(faces))
     rings = faces // (2 * around)
     points = []
@@ -43,7 +43,7 @@ def torus(faces, path, shift):
     with open(path, "wb") as f:
         f.write(head.encode())
         for number, p in enumerate(points):
-            f.write(struct.pack("<3f3B", *p, 200, number * 255 // len(points), 30))
+            f.write(struct.pack("<3f3B", *(scale * x for x in p), 200, number * 255 // len(points), 30))
         for t in triangles:
             f.write(struct.pack("<B3i", 3, *t))
 
@@ -307,7 +307,7 @@ def check_tiles(folder, model):
 
 
 if sys.argv[1] == "torus":
-    torus(int(sys.argv[2]), sys.argv[3], float((sys.argv + ["0"])[4]))
+    torus(int(sys.argv[2]), sys.argv[3], *(float(x) for x in (sys.argv[4:] + ["0", "1"][len(sys.argv) - 4:])))
 elif sys.argv[1] == "glb":
     print(f"fine: {check_glb(sys.argv[2], sys.argv[3], float(sys.argv[4]))} triangles")
 else:

@@ -109,6 +109,51 @@ START_TEST(test_errors_hold)
 }
 END_TEST
 
+/* Makes long random triangles that overlap. Their corners are in a unit cube. */
+static ebpo_patch_mesh overlapping(uint64_t count, uint64_t *state)
+{
+    ebpo_patch_mesh mesh = { .vertex_count = 3 * count, .triangle_count = count };
+    mesh.vertex = calloc(3 * count, sizeof *mesh.vertex);
+    mesh.triangle = malloc(3 * count * sizeof *mesh.triangle);
+    for (uint32_t v = 0; v < 3 * count; v++) {
+        mesh.triangle[v] = v;
+        for (int k = 0; k < 3; k++)
+            mesh.vertex[v].at[k] = ebpo_test_random_unit(state);
+    }
+    return mesh;
+}
+
+/* The bound is an upper bound, and is close to the greatest distance of a point. */
+START_TEST(test_bound_of_overlapping_triangles)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t state = 5;
+    ebpo_patch_mesh a = overlapping(300, &state), b = overlapping(300, &state);
+    double bound, most = 0;
+    must(ebpo_bound_distance(&a, &b, 1e-6, 0, &bound, &error), "bound", &error);
+    for (uint64_t i = 0; i < 4000; i++) {
+        double p[3], least = INFINITY, u = ebpo_test_random_unit(&state),
+                     v = (1 - u) * ebpo_test_random_unit(&state);
+        const ebpo_patch_vertex *t = a.vertex + 3 * (i % a.triangle_count);
+        for (int k = 0; k < 3; k++)
+            p[k] = t[0].at[k] + u * (t[1].at[k] - t[0].at[k]) + v * (t[2].at[k] - t[0].at[k]);
+        for (uint64_t n = 0; n < b.triangle_count; n++) {
+            ebpo_distance_bounds d;
+            double corner[3][3];
+            for (int k = 0; k < 3; k++)
+                memcpy(corner[k], b.vertex[3 * n + (uint64_t)k].at, sizeof corner[k]);
+            ebpo_triangle_distance_bounds(p, (const double(*)[3])corner, &d);
+            least = fmin(least, d.lo);
+        }
+        most = fmax(most, least);
+    }
+    ck_assert_double_le(most, bound);
+    ck_assert_double_le(bound, 1.05 * most);
+    ebpo_patch_mesh_free(&a);
+    ebpo_patch_mesh_free(&b);
+}
+END_TEST
+
 static int by_edge(const void *a, const void *b)
 {
     const uint32_t *x = a, *y = b;
@@ -222,6 +267,35 @@ START_TEST(test_few_faces_have_none)
     ck_assert_uint_eq(tree.surface.patch_count, 0);
     ck_assert_uint_eq(tree.info.parts & EBPO_PART_SURFACE, 0);
     ebpo_tree_free(&tree);
+}
+END_TEST
+
+/* A model far from the origin has patches. Their errors include the rounding errors of coordinates,
+ * and not much more. */
+START_TEST(test_far_from_the_origin)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_patch patch;
+    ebpo_mesh mesh = waves(120, 60);
+    for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
+        mesh.xyz64[i] = 1e15 + 1000 * mesh.xyz64[i];
+    build(&tree, mesh, 1);
+    ck_assert_uint_gt(tree.surface.patch_count, 1);
+    must(ebpo_surface_decode(&tree.surface, &tree.info, 1, &patch, &error), "decode", &error);
+    ck_assert_double_gt(patch.error, 0.125); /* the rounding error of the coordinates */
+    ck_assert_double_le(patch.error, 20);
+    ebpo_patch_free(&patch);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+/* More triangles than 32-bit corners can number are refused before memory is used. */
+START_TEST(test_too_many_triangles)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_patch_mesh mesh = { .vertex_count = 3, .triangle_count = UINT32_MAX / 3 + 1 };
+    ck_assert_int_eq(ebpo_simplify(&mesh, 100, &error), EBPO_E_LIMIT);
 }
 END_TEST
 
@@ -504,6 +578,31 @@ START_TEST(test_long_faces_need_little_memory)
 }
 END_TEST
 
+/* If patches do not have the faces of their nodes, errors are not tested: otherwise each patch
+ * could name all faces, and the time would be that of all pairs of patches and faces. */
+START_TEST(test_patches_that_name_all_faces)
+{
+    ebpo_tree tree;
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    build(&tree, waves(120, 60), 1);
+    for (uint64_t i = 1; i < tree.surface.patch_count; i++) {
+        uint64_t *row = tree.surface.patch + EBPO_PATCH_COLUMNS * i;
+        row[EBPO_PATCH_FIRST_FACE] = 0;
+        row[EBPO_PATCH_FACES] = tree.info.face_count;
+        row[EBPO_PATCH_ERROR] = 1;
+    }
+    must(ebpo_tree_write(&tree, scratch("all.ebpo.h5"), NULL, &error), "write", &error);
+    must(ebpo_open(scratch("all.ebpo.h5"), &file, &error), "open", &error);
+    must(ebpo_verify(file, &options, &report, &error), "verify", &error);
+    ck_assert_uint_eq(report.violations, tree.surface.patch_count - 1);
+    ebpo_close(file);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 TEST_SUITE(surface)
 {
     Suite *suite = suite_create("surface");
@@ -511,9 +610,12 @@ TEST_SUITE(surface)
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_test(tests, test_errors_hold);
+    tcase_add_test(tests, test_bound_of_overlapping_triangles);
     tcase_add_test(tests, test_joined_levels_are_closed);
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_few_faces_have_none);
+    tcase_add_test(tests, test_far_from_the_origin);
+    tcase_add_test(tests, test_too_many_triangles);
     tcase_add_test(tests, test_hostile_codes);
     tcase_add_test(tests, test_views_are_closed);
     tcase_add_test(tests, test_faces_of_extreme_sizes);
@@ -521,6 +623,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_views_within_bytes);
     tcase_add_test(tests, test_boxes_keep_patches);
     tcase_add_test(tests, test_long_faces_need_little_memory);
+    tcase_add_test(tests, test_patches_that_name_all_faces);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,5 +1,5 @@
 // Tests exported 3D Tiles with packages of npm: tiles.mjs valid|drawn EBPO GENERATE SOURCE_ROOT [PICTURES]
-//   valid   3d-tiles-validator finds nothing in the tileset, and gltf-validator no error in its tiles
+//   valid   gltf-validator finds no error in the tiles, and 3d-tiles-validator no error or warning in the tileset
 //   drawn   3d-tiles-renderer draws in Chromium what three.js draws of the whole mesh; PICTURES: folder for the pictures
 // Exits with 77 (skipped) when a package cannot be installed, or Chromium or tools/web/node_modules is missing.
 import assert from 'node:assert/strict';
@@ -12,7 +12,7 @@ import { extname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 const [what, ebpo, generate, root, pictures] = process.argv.slice(2), viewer = join(root, 'tools/web');
-const PACKAGES = { valid: ['3d-tiles-validator@0.6.1', 'gltf-validator@2.0.0-dev.3.10'], drawn: ['3d-tiles-renderer@0.5.3', 'three@0.187.0'] };
+const GLTF_VALIDATOR = 'gltf-validator@2.0.0-dev.3.10', TILES_VALIDATOR = '3d-tiles-validator@0.6.1', RENDERER = ['3d-tiles-renderer@0.5.3', 'three@0.187.0'];
 const INSTALL_MS = 300_000;
 const work = mkdtempSync(join(tmpdir(), 'ebpo-tiles-'));
 process.on('exit', () => rmSync(work, { recursive: true, force: true }));
@@ -23,12 +23,12 @@ function skip(why) {
   process.exit(77);
 }
 
-function install() {
+function install(...packages) {
   try {
-    execFileSync('npm', ['install', '--prefix', work, '--no-audit', '--no-fund', '--legacy-peer-deps', '--fetch-retries=1', '--fetch-timeout=60000', ...PACKAGES[what]],
+    execFileSync('npm', ['install', '--prefix', work, '--no-audit', '--no-fund', '--legacy-peer-deps', '--fetch-retries=1', '--fetch-timeout=60000', ...packages],
       { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'], timeout: INSTALL_MS });
   } catch (error) {
-    skip(`npm cannot install ${PACKAGES[what].join(' ')}: ${/npm error (?!code)[^\n]*/.exec(error.stderr ?? '')?.[0] ?? error.message}`);
+    skip(`npm cannot install ${packages.join(' ')}: ${/npm error (?!code)[^\n]*/.exec(error.stderr ?? '')?.[0] ?? error.message}`);
   }
 }
 
@@ -43,18 +43,18 @@ function exportTiles() {
 // --- validators ---
 
 async function validate() {
-  const require = createRequire(join(work, 'package.json'));
-  const { Validators } = require('3d-tiles-validator'), gltf = require('gltf-validator');
-  const result = await Validators.validateTilesetFile(join(work, 'tiles/tileset.json'));
-  console.log(result.serialize ? result.serialize() : JSON.stringify(result));
-  assert.equal(result.numErrors, 0);
-  assert.equal(result.numWarnings, 0);
+  const require = createRequire(join(work, 'package.json')), gltf = require('gltf-validator');
   const files = [...readdirSync(join(work, 'tiles')).filter((name) => name.endsWith('.glb')).map((name) => join(work, 'tiles', name)), join(work, 'surface.glb')];
   for (const file of files) {
     const { issues } = await gltf.validateBytes(new Uint8Array(readFileSync(file)));
     assert.equal(issues.numErrors, 0, `${file}: ${JSON.stringify(issues.messages)}`);
   }
   console.log(`OK: ${files.length} glb files, 0 errors`);
+  install(TILES_VALIDATOR);
+  const { Validators } = require('3d-tiles-validator'), result = await Validators.validateTilesetFile(join(work, 'tiles/tileset.json'));
+  console.log(result.serialize ? result.serialize() : JSON.stringify(result));
+  assert.equal(result.numErrors, 0);
+  assert.equal(result.numWarnings, 0);
 }
 
 // --- drawing ---
@@ -177,7 +177,7 @@ async function drawn() {
   const chromium = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
   if (!chromium || !existsSync(join(viewer, 'node_modules/playwright-core')) || !existsSync(join(viewer, 'node_modules/esbuild')))
     skip('chromium or tools/web/node_modules is missing; run tools/install-deps.sh --tests');
-  install();
+  install(...RENDERER);
   exportTiles();
   await makePage();
   const { chromium: playwright } = await import(pathToFileURL(join(viewer, 'node_modules/playwright-core/index.mjs')));
@@ -223,7 +223,7 @@ async function drawn() {
 }
 
 if (what === 'valid') {
-  install();
+  install(GLTF_VALIDATOR);
   exportTiles();
   await validate();
 } else {

@@ -492,6 +492,8 @@ const char *facts_no_surface(const ebpo_info *info)
     enum { LEAST_FACES = 2048 }; /* format-spec/surface.md */
     return info->pruned                      ? "subsets get none"
            : !(info->parts & EBPO_PART_MESH) ? "files without their mesh get none"
-           : info->face_count < LEAST_FACES  ? "models with fewer than 2,048 faces get none"
-                                             : "its faces are too small compared with the model";
+           : info->face_count < LEAST_FACES
+               ? "models with fewer than 2,048 faces get none"
+               : "its error cannot be bounded well: the faces are tiny for the model, or the model "
+                 "is tiny for its distance from the origin or for doubles";
 }

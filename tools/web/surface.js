@@ -6,7 +6,7 @@ import { LEAF } from './tree.js';
 export const KEY = 'surface';      // key of the tile
 const CELL_PIXELS = 16;            // normal detail
 const ERROR = 2;                   // allowed error in pixels at normal detail; most of a patch is much closer to the model
-const TRIANGLES = 300_000;         // most triangles at this detail
+const TRIANGLES = 150_000;          // most triangles at this detail; twice as many at half of the pixels, which fast machines draw
 const EVERYTHING = 2_000_000;      // most triangles at all
 const WHOLE_FACES = 1 << 18;       // small files with at most so many faces are drawn with all faces
 const KEPT = 0.6;                  // a replaced patch returns when its error is smaller than this share of the allowed error
@@ -41,10 +41,15 @@ export class Surface {
     return pixels / Math.max(near, 0.05 * 2 * Math.hypot(...h));
   }
 
-  // Returns true when the model's faces are large enough in the picture to be drawn instead of a patch.
-  #showsFaces({ level, faces }, scale, share) {
+  // Returns true when the model's faces are large enough in the picture to be drawn instead of a patch. Few faces in a cell can be small faces in its corner.
+  // Therefore the faces of the parent must be large, too.
+  #showsFaces(patch, parent, scale, share) {
+    return this.mesh && [patch, parent ?? patch].every((p) => this.#hasLargeFaces(p, scale, share));
+  }
+
+  #hasLargeFaces({ level, faces }, scale, share) {
     const cell = Math.max(...this.info.box_size) / 2 ** level * this.scene.scale * scale;
-    return this.mesh && cell * cell >= FACE_PIXELS * share * share * faces;
+    return cell * cell >= FACE_PIXELS * share * share * faces;
   }
 
   /**
@@ -56,17 +61,17 @@ export class Surface {
     const share = want.pixels / CELL_PIXELS, allowed = coarser * share * ERROR, most = Math.min(want.triangles, EVERYTHING, TRIANGLES / share);
     const heap = new Heap(), chosen = [], opened = new Set();
     let triangles = 0;
-    const offer = (patch) => {
+    const offer = (patch, parent) => {
       const scale = this.#pixelsAt(patches[patch], view), px = patches[patch].error * this.scene.scale * scale;
-      heap.push({ patch, scale, px: whole ? Infinity : px });
+      heap.push({ patch, parent, scale, px: whole ? Infinity : px });
       triangles += patches[patch].triangles;
     };
     offer(0);
     while (heap.items.length) {
-      const { patch, scale, px } = heap.pop(), p = patches[patch], leaf = p.end === p.child;
+      const { patch, parent, scale, px } = heap.pop(), p = patches[patch], leaf = p.end === p.child;
       const more = (leaf ? p.faces : patches.slice(p.child, p.end).reduce((sum, c) => sum + c.triangles, 0)) - p.triangles;
       const allow = this.opened.has(patch) ? KEPT * allowed : allowed;
-      if (!whole && (px <= allow || triangles + more > most || (leaf && !this.#showsFaces(p, scale, share)))) {
+      if (!whole && (px <= allow || triangles + more > most || (leaf && !this.#showsFaces(p, parent, scale, share)))) {
         chosen.push({ patch, faces: false, px });
         continue;
       }
@@ -77,7 +82,7 @@ export class Surface {
       } else {
         triangles -= p.triangles;
         for (let child = p.child; child < p.end; child++)
-          offer(child);
+          offer(child, p);
       }
     }
     if (coarser === 1)

@@ -179,7 +179,7 @@ static ebpo_status convert_report_file(const convert_reported *t, const mesh_inp
                                        const progress_line *line, const stage_facts *stages,
                                        double seconds, ebpo_error *error)
 {
-    if (t->quiet && !t->json)
+    if (t->quiet && !t->json && !t->wants_surface)
         return EBPO_OK;
     ebpo_file *file = NULL;
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
@@ -188,7 +188,7 @@ static ebpo_status convert_report_file(const convert_reported *t, const mesh_inp
         status = ebpo_file_locate(file, &stored, error);
     if (status == EBPO_OK && t->json) {
         print_json(t, p, ebpo_file_info(file), &stored, line, stages, seconds);
-    } else if (status == EBPO_OK) {
+    } else if (status == EBPO_OK && !t->quiet) {
         const ebpo_info *info = ebpo_file_info(file);
         ebpo_solid_volume solid = facts_solid(info, p->shells_counted ? &p->shells : NULL);
         if (t->timings)

@@ -49,6 +49,15 @@ test('small models are drawn by their faces; the first picture comes in stages',
   assert.ok(seen.every(({ triangles: n }, i) => i === 0 || n >= seen[i - 1].triangles));
 });
 
+test('few faces in the corner of a cell are not taken for large faces', () => {
+  const info = { parts: new Set(['mesh']), box_size: [1, 1, 1], face_count: 1e6 }, leaf = { level: 1, error: 0.5, child: 3, end: 3 };
+  const patches = (faces) => [{ level: 0, at: [0, 0, 0], error: 1, triangles: 10, faces: faces + 20, child: 1, end: 3 },
+    { ...leaf, at: [0, 0, 0], triangles: 5, faces: 20 }, { ...leaf, at: [1, 0, 0], triangles: 50, faces }];
+  const replaced = (faces) => new Surface(info, { scale: 1 }, patches(faces), false).choose(view, want).chosen.map((c) => c.faces);
+  assert.deepEqual(replaced(1e6), [false, false]);
+  assert.deepEqual(replaced(2000), [true, true]);
+});
+
 test('a mesh has unit coordinates of the scene, colours and closed edges', async () => {
   for (const faces of [false, true]) {
     const { file, scene, surface } = await load('70_surface_with_subtrees'), wanted = surface.patches.map((_, patch) => ({ patch, faces: faces && patch % 2 === 0 })).slice(1);
