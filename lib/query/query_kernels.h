@@ -241,8 +241,12 @@ typedef struct ebpo_inside_kernels {
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
+enum { EBPO_RAY_PACKET = 8 };
 typedef struct ebpo_ray_kernels {
     void (*walk)(ebpo_ray_search *search);
+    /* Walks for up to EBPO_RAY_PACKET rays through the same accel, which all want the first hit.
+     * Coherent rays (similar origins and directions) are walked together. */
+    void (*walk_many)(ebpo_ray_search *const *search, unsigned count);
 } ebpo_ray_kernels;
 
 EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)

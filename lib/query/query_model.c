@@ -243,15 +243,14 @@ static ebpo_status load_subtree(void *user, uint64_t key, uint64_t quota, void *
                                                 ebpo_subtree_needs(key & 1), &space, error);
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
-    if (status == EBPO_OK &&
-        mark_accel(m, subtree, space_for_marks(m, subtree, quota), error) != EBPO_OK) {
-        ebpo_accel_free(subtree);
-        subtree = NULL;
-        status = EBPO_E_LIMIT;
-    }
+    if (status == EBPO_OK)
+        status = mark_accel(m, subtree, space_for_marks(m, subtree, quota), error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
+    } else {
+        ebpo_accel_free(subtree);
+        subtree = NULL;
     }
     *item = subtree;
     *bytes = status == EBPO_OK ? subtree->bytes : space.needed;

@@ -107,16 +107,32 @@ typedef struct projected {
     f8 x[3], y[3], z[3];
 } projected;
 
-/* Reads the corners' coordinates on one axis, relative to the origin, in the subtree's frame. */
-EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis, bool wide,
-                         f8 corner[3])
+/* Corners of eight faces, [axis][corner]. */
+typedef struct ray_corners {
+    f8 axis[3][3];
+} ray_corners;
+
+/* Transforms coordinates of corners on one axis to the subtree's frame, relative to the origin. */
+EBPO_EIGHT void ray_relative(const ebpo_ray_search *r, int axis, const f8 from[3], f8 to[3])
 {
+    for (int i = 0; i < 3; i++)
+        to[i] =
+            f8_mul(f8_sub(f8_sub(from[i], f8_all(r->from_high[axis])), f8_all(r->from_low[axis])),
+                   f8_all((float)r->s->scale));
+}
+
+/* Reads the corners' coordinates on one axis, relative to the origin, in the subtree's frame.
+ * `relative`: these coordinates, if the caller has computed them, or NULL. */
+EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis,
+                         const ray_corners *relative, bool wide, f8 corner[3])
+{
+    if (relative) {
+        memcpy(corner, relative->axis[axis], sizeof relative->axis[axis]);
+        return;
+    }
     if (!wide) {
         ebpo_face_block_floats(b, axis, corner);
-        for (int i = 0; i < 3; i++)
-            corner[i] = f8_mul(f8_sub(f8_sub(corner[i], f8_all(r->from_high[axis])),
-                                      f8_all(r->from_low[axis])),
-                               f8_all((float)r->s->scale));
+        ray_relative(r, axis, corner, corner);
         return;
     }
     double x[3][EBPO_BLOCK];
@@ -129,12 +145,13 @@ EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int
     }
 }
 
-EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, bool wide)
+EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b,
+                              const ray_corners *relative, bool wide)
 {
     projected out;
-    ray_axis(r, b, r->axis[2], wide, out.z);
-    ray_axis(r, b, r->axis[0], wide, out.x);
-    ray_axis(r, b, r->axis[1], wide, out.y);
+    ray_axis(r, b, r->axis[2], relative, wide, out.z);
+    ray_axis(r, b, r->axis[0], relative, wide, out.x);
+    ray_axis(r, b, r->axis[1], relative, wide, out.y);
     for (int i = 0; i < 3; i++) {
         out.x[i] = f8_sub(out.x[i], f8_mul(out.z[i], f8_all(r->shear[0])));
         out.y[i] = f8_sub(out.y[i], f8_mul(out.z[i], f8_all(r->shear[1])));
@@ -183,10 +200,11 @@ typedef struct ray_lanes {
 
 /* Tests eight faces. Comparisons are written so that a lane with a NaN stays alive and is not
  * certain. */
-EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
+EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, const ray_corners *relative,
+                          ray_lanes *out, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(r->s, block);
-    projected a = ray_view(r, &faces, wide);
+    projected a = ray_view(r, &faces, relative, wide);
     f8 zero = f8_all(0), least_z = f8_min3(a.z[0], a.z[1], a.z[2]),
        max_z = f8_max3(a.z[0], a.z[1], a.z[2]);
     f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(max_z)), f8_all(r->blur));
@@ -233,11 +251,12 @@ static void drop_beyond(ebpo_ray_search *r)
 }
 
 /* Visits a block: adds its possible hits to the candidates, and lowers the limit to certain hits.
- */
-EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
+ * `relative`: see ray_axis. */
+EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, const ray_corners *relative,
+                          bool wide)
 {
     ray_lanes found;
-    ray_faces(r, block, &found, wide);
+    ray_faces(r, block, relative, &found, wide);
     if (!found.alive)
         return;
     if (r->wants == EBPO_WANTS_ANY && found.sure) {
@@ -309,16 +328,14 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
     return b->child[__builtin_ctz(lanes)];
 }
 
-/* Walks through the accel. `sorted`: visits nearer children first, which is faster if the limit
- * decreases during the walk. */
-EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, bool wide, bool sorted)
+/* Walks through a child of the hierarchy (as in ebpo_bound). `sorted`: visits nearer children
+ * first, which is faster if the limit decreases during the walk. */
+EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, bool wide, bool sorted)
 {
     const ebpo_accel *s = r->s;
     ebpo_visit stack[EBPO_VISITS_MAX];
     uint32_t top = 1;
-    ray_set_boxes(r);
-    ray_set_faces(r);
-    stack[0] = ebpo_visit_make(0, s->root_bound);
+    stack[0] = ebpo_visit_make(0, begin);
     while (top && !r->done) {
         ebpo_visit v = stack[--top];
         uint32_t child = (uint32_t)v;
@@ -338,23 +355,275 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, bool wide, bool sorted)
                 child = ray_next(s, stack, &top, b, lanes, wide);
         }
         if (child & EBPO_IS_BLOCK)
-            ray_block(r, child & ~EBPO_IS_BLOCK, wide);
+            ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
     }
+}
+
+static void ray_walk_from(ebpo_ray_search *r, uint32_t begin)
+{
+    bool sorted = r->wants == EBPO_WANTS_FIRST;
+    if (r->s->wide && sorted)
+        ray_walk_in(r, begin, true, true);
+    else if (r->s->wide)
+        ray_walk_in(r, begin, true, false);
+    else if (sorted)
+        ray_walk_in(r, begin, false, true);
+    else
+        ray_walk_in(r, begin, false, false);
+}
+
+/* Walks through the accel with a search whose fields for boxes and faces are set. */
+static void ray_walk_alone(ebpo_ray_search *r)
+{
+    ray_walk_from(r, r->s->root_bound);
     if (r->wants == EBPO_WANTS_FIRST)
         drop_beyond(r);
 }
 
 static void ray_walk(ebpo_ray_search *r)
 {
-    bool sorted = r->wants == EBPO_WANTS_FIRST;
-    if (r->s->wide && sorted)
-        ray_walk_in(r, true, true);
-    else if (r->s->wide)
-        ray_walk_in(r, true, false);
-    else if (sorted)
-        ray_walk_in(r, false, true);
-    else
-        ray_walk_in(r, false, false);
+    ray_set_boxes(r);
+    ray_set_faces(r);
+    ray_walk_alone(r);
 }
 
-const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk };
+/* --- packets: several rays walked together --- */
+
+/* A packet visits the boxes that its *bundle* may intersect. On each axis, the bundle has one
+ * origin and one inverse direction for the nearer sides of boxes, and others for the farther sides.
+ * They are chosen among those of the packet's rays, so that the bundle enters a box before each of
+ * its rays, and leaves it after each: for a positive direction, the nearer sides get the greatest
+ * origin and the least inverse, the farther sides the least origin and the greatest inverse. (An
+ * inverse that is wrong for a side behind the origin does not matter: the bundle then enters at a
+ * negative t, or misses, as all rays do.) The proof for one ray (docs/develop/bounds.md, "A ray
+ * against boxes") holds for the bundle, too. It compares the rounding errors with the shift of the
+ * origin, at least 8u|o| + E. The shift of the ray whose origin was chosen is as large as this; any
+ * other ray's origin is at a distance of at least its own shift from the chosen origin, and if the
+ * two origins differ in size, at a greater distance.
+ *
+ * Then each child that the bundle may intersect is tested for each ray. If one ray is left, this
+ * ray walks on alone. Arrays of [4] are those of ebpo_ray_search, for the bundle; arrays of eight
+ * floats have a ray in each lane. */
+typedef struct ray_packet {
+    ebpo_ray_search *const *ray; /* [count] */
+    unsigned count;
+    const uint8_t (*side_at)[3];
+    float near_from[4], far_from[4], near_inverse[4], far_inverse[4], near_step[4], far_step[4];
+    float bound; /* the greatest bound of all rays */
+    float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
+} ray_packet;
+
+/* Greatest width of a bundle in an accel, in the frame. Wider packets have no advantage. */
+static const double packet_width = 0.25;
+
+static inline float least_of(float a, float b) { return a < b ? a : b; }
+static inline float greatest_of(float a, float b) { return a > b ? a : b; }
+
+/* Sets the bundle on one axis. */
+static void packet_set_axis(ray_packet *p, int k)
+{
+    bool down = p->inverse[k][0] < 0;
+    float least_near = p->from_near[k][0], most_near = least_near, least_far = p->from_far[k][0],
+          most_far = least_far, least = p->inverse[k][0], most = least;
+    for (unsigned i = 1; i < p->count; i++) {
+        least_near = least_of(least_near, p->from_near[k][i]);
+        most_near = greatest_of(most_near, p->from_near[k][i]);
+        least_far = least_of(least_far, p->from_far[k][i]);
+        most_far = greatest_of(most_far, p->from_far[k][i]);
+        least = least_of(least, p->inverse[k][i]);
+        most = greatest_of(most, p->inverse[k][i]);
+    }
+    p->near_from[k] = down ? least_near : most_near;
+    p->far_from[k] = down ? most_far : least_far;
+    p->near_inverse[k] = p->near_step[k + 1] = down ? most : least;
+    p->far_inverse[k] = p->far_step[k + 1] = down ? least : most;
+}
+
+/* Returns true if rays are similar enough to walk together: all directions have the same signs,
+ * and the bundle is narrow, all the way to the far end of the accel. */
+static bool packet_is_coherent(ebpo_ray_search *const *ray, unsigned count)
+{
+    const ebpo_ray_search *first = ray[0];
+    double longest = 0, way = first->s->largest_coordinate, width = 0;
+    for (int k = 0; k < 3; k++) {
+        double d = fabs(first->direction[k]), o = fabs(first->origin[k]);
+        longest = d > longest ? d : longest;
+        way = o > way ? o : way;
+    }
+    for (unsigned i = 1; i < count; i++) {
+        if (ray[i]->side_at != first->side_at)
+            return false;
+        for (int k = 0; k < 3; k++) {
+            double w = fabs(ray[i]->origin[k] - first->origin[k]) * longest +
+                       fabs(ray[i]->direction[k] - first->direction[k]) * way;
+            width = w > width ? w : width;
+        }
+    }
+    return count > 1 && width < packet_width * longest;
+}
+
+/* Sets the greatest bound of all rays. */
+EBPO_EIGHT void packet_set_bound(ray_packet *p)
+{
+    p->bound = -f8_least(f8_sub(f8_all(0), f8_load(p->bounds)));
+}
+
+/* Unused lanes have a bound of -1, so they miss all boxes. */
+static void packet_set(ray_packet *p, ebpo_ray_search *const *ray, unsigned count)
+{
+    p->ray = ray;
+    p->count = count;
+    p->side_at = ray[0]->side_at;
+    for (unsigned i = 0; i < 8; i++) {
+        const ebpo_ray_search *r = ray[i < count ? i : 0];
+        for (int k = 0; k < 3; k++) {
+            p->from_near[k][i] = r->near_from[k];
+            p->from_far[k][i] = r->far_from[k];
+            p->inverse[k][i] = r->inverse[k];
+        }
+        p->bounds[i] = i < count ? r->bound : -1;
+    }
+    packet_set_bound(p);
+    for (int k = 0; k < 3; k++)
+        packet_set_axis(p, k);
+    /* numbers that are read, but not used */
+    p->near_from[3] = p->far_from[3] = p->near_inverse[3] = p->far_inverse[3] = 0;
+    p->near_step[0] = p->far_step[0] = 0;
+}
+
+/* Returns a bit for each child whose box the bundle may intersect (ray_children). */
+EBPO_EIGHT unsigned packet_children(const ray_packet *p, const ebpo_bound *b, f8 *enter)
+{
+    f8 origin = f8_load_twice(b->origin), step = f8_load_twice(b->origin + 2),
+       near_step = f8_mul(step, f8_load_twice(p->near_step)),
+       far_step = f8_mul(step, f8_load_twice(p->far_step)),
+       near = f8_mul(f8_sub(origin, f8_load_twice(p->near_from)), f8_load_twice(p->near_inverse)),
+       far = f8_mul(f8_sub(origin, f8_load_twice(p->far_from)), f8_load_twice(p->far_inverse));
+    const uint8_t(*at)[3] = p->side_at;
+    f8 from =
+        f8_max(f8_max(side_at(b, at[0][0], f8_spread1(near_step), f8_spread0(near)),
+                      side_at(b, at[0][1], f8_spread2(near_step), f8_spread1(near))),
+               f8_max(side_at(b, at[0][2], f8_spread3(near_step), f8_spread2(near)), f8_all(0)));
+    f8 to = f8_min(f8_min(side_at(b, at[1][0], f8_spread1(far_step), f8_spread0(far)),
+                          side_at(b, at[1][1], f8_spread2(far_step), f8_spread1(far))),
+                   f8_min(side_at(b, at[1][2], f8_spread3(far_step), f8_spread2(far)),
+                          f8_all(p->bound)));
+    *enter = from;
+    return f8_bits(f8_at_most(from, to)) & ((1u << b->count) - 1);
+}
+
+/* Returns a bit for each ray that may intersect the box of this child before the ray's bound. */
+EBPO_EIGHT unsigned packet_rays(const ray_packet *p, const ebpo_bound *b, unsigned lane)
+{
+    const uint8_t *sides = (const uint8_t *)b + lane;
+    f8 from = f8_all(0), to = f8_load(p->bounds);
+    for (int k = 0; k < 3; k++) {
+        f8 near = f8_all(b->origin[k] + b->step[k] * (float)sides[p->side_at[0][k]]),
+           far = f8_all(b->origin[k] + b->step[k] * (float)sides[p->side_at[1][k]]),
+           inverse = f8_load(p->inverse[k]);
+        from = f8_max(f8_mul(f8_sub(near, f8_load(p->from_near[k])), inverse), from);
+        to = f8_min(f8_mul(f8_sub(far, f8_load(p->from_far[k])), inverse), to);
+    }
+    return f8_bits(f8_at_most(from, to));
+}
+
+/* Visits a block with the rays that may intersect its box. */
+EBPO_EIGHT void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block, unsigned rays,
+                             bool wide)
+{
+    ray_corners read, relative;
+    if (!wide) {
+        ebpo_face_block faces = ebpo_face_block_open(s, block);
+        for (int k = 0; k < 3; k++)
+            ebpo_face_block_floats(&faces, k, read.axis[k]);
+    }
+    for (; rays; rays &= rays - 1) {
+        unsigned i = (unsigned)__builtin_ctz(rays);
+        for (int k = 0; k < 3 && !wide; k++)
+            ray_relative(p->ray[i], k, read.axis[k], relative.axis[k]);
+        ray_block(p->ray[i], block, wide ? NULL : &relative, wide);
+        p->bounds[i] = p->ray[i]->bound;
+    }
+    packet_set_bound(p);
+}
+
+/* Walks with one ray through a child that no other ray enters. */
+EBPO_EIGHT void packet_single(ray_packet *p, uint32_t child, unsigned ray)
+{
+    ray_walk_from(p->ray[ray], child);
+    p->bounds[ray] = p->ray[ray]->bound;
+    packet_set_bound(p);
+}
+
+/* Pushes the children `lanes` of a node, farthest first. In place of the child, a visit has the
+ * node's index times 8 plus the lane, because a visit needs the child's box. (There are fewer nodes
+ * than blocks, at most EBPO_BLOCKS_MAX.) */
+EBPO_EIGHT uint32_t packet_push(const ebpo_accel *s, ebpo_visit *stack, uint32_t top, uint32_t node,
+                                unsigned lanes, f8 enter, bool wide)
+{
+    uint32_t base = top;
+    float key[8];
+    f8_store(key, enter);
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        ebpo_visit v = ebpo_visit_make(key[lane], node * 8 + lane);
+        uint32_t at = top++;
+        ray_fetch(s, s->bound[node].child[lane], wide);
+        for (; at > base && stack[at - 1] < v; at--)
+            stack[at] = stack[at - 1];
+        stack[at] = v;
+    }
+    return top;
+}
+
+/* Walks through the accel with all rays. */
+EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, bool wide)
+{
+    ebpo_visit stack[EBPO_VISITS_MAX];
+    f8 enter;
+    unsigned lanes = packet_children(p, &s->bound[s->root_bound], &enter);
+    uint32_t top = packet_push(s, stack, 0, s->root_bound, lanes, enter, wide);
+    while (top) {
+        ebpo_visit v = stack[--top];
+        uint32_t node = (uint32_t)v / 8;
+        unsigned lane = (uint32_t)v % 8;
+        if (ebpo_visit_key(v) > p->bound)
+            continue;
+        unsigned rays = packet_rays(p, &s->bound[node], lane);
+        uint32_t child = s->bound[node].child[lane];
+        if (!rays)
+            continue;
+        if (!(rays & (rays - 1))) {
+            packet_single(p, child, (unsigned)__builtin_ctz(rays));
+        } else if (child & EBPO_IS_BLOCK) {
+            packet_block(p, s, child & ~EBPO_IS_BLOCK, rays, wide);
+        } else {
+            lanes = packet_children(p, &s->bound[child], &enter);
+            top = packet_push(s, stack, top, child, lanes, enter, wide);
+        }
+    }
+    for (unsigned i = 0; i < p->count; i++)
+        drop_beyond(p->ray[i]);
+}
+
+static void ray_walk_many(ebpo_ray_search *const *ray, unsigned count)
+{
+    ray_packet p;
+    for (unsigned i = 0; i < count; i++) {
+        ray_set_boxes(ray[i]);
+        ray_set_faces(ray[i]);
+    }
+    const ebpo_accel *s = ray[0]->s;
+    if (s->root_bound & EBPO_IS_BLOCK || !packet_is_coherent(ray, count)) {
+        for (unsigned i = 0; i < count; i++)
+            ray_walk_alone(ray[i]);
+        return;
+    }
+    packet_set(&p, ray, count);
+    if (s->wide)
+        packet_walk(&p, s, true);
+    else
+        packet_walk(&p, s, false);
+}
+
+const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };

@@ -235,27 +235,25 @@ static void judge_waiting(ebpo_ray_search *r)
     r->count = 0;
 }
 
-/* Searches an accel: calls r->decide for every face that may be a wanted hit. */
-static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels,
-                             const ebpo_accel *s)
+/* Prepares the search of an accel. Returns false if the ray misses all faces. The caller calls a
+ * kernel and then judge_waiting, which call r->decide for every face that may be a wanted hit. */
+static bool ray_search_begin(ebpo_ray_search *r, const ebpo_accel *s)
 {
     r->s = s;
     r->judge = judge_waiting;
     r->count = 0;
     r->done = r->any_hit = false;
     if (s->bound_count == 0)
-        return;
+        return false;
     double greatest = to_frame(r);
     if (!(greatest <= near_enough * s->largest_coordinate) &&
         greatest < 0x1p46 * s->largest_coordinate && !move_origin(r, &greatest))
-        return;
+        return false;
     set_error(r, greatest);
     r->surely = frame_t(r, r->ray->t_max, -1);
     r->bound = BEYOND;
     lower_bound(r);
-    kernels->walk(r);
-    if (r->count)
-        judge_waiting(r);
+    return true;
 }
 
 /* Returns true if the ray hits m->triangle from a side that counts (casting.sides); sets
@@ -407,17 +405,27 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     r->limit = c->limit;
 }
 
+/* Prepares the search of the faces of a subtree or of the whole model. Returns false if the ray
+ * misses all faces. */
+static bool cast_begin(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
+{
+    r->ray = &c->ray;
+    r->wants = c->wants;
+    r->facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
+    r->limit = c->limit;
+    r->decide = decide_face;
+    r->user = c;
+    return ray_search_begin(r, s);
+}
+
 /* Searches the faces of a subtree or of the whole model. */
 static void cast_subtree(casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
-    r.ray = &c->ray;
-    r.wants = c->wants;
-    r.facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
-    r.limit = c->limit;
-    r.decide = decide_face;
-    r.user = c;
-    ray_search_accel(&r, c->context->model->kernels.ray, s);
+    if (!cast_begin(c, &r, s))
+        return;
+    c->context->model->kernels.ray->walk(&r);
+    judge_waiting(&r);
     if (r.any_hit) {
         c->count = 1;
         c->done = true;
@@ -502,8 +510,18 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
     return status;
 }
 
-/* Finds the hits of a valid ray. In a subset, fails if a pruned node may have another wanted hit.
+/* Ends the search of a valid ray. In a subset, fails if a pruned node may have another wanted hit.
  */
+static ebpo_status ray_end(casting *c, ebpo_status status, ebpo_error *error)
+{
+    if (status == EBPO_OK && !c->done && !c->waits && c->context->model->info->pruned)
+        status = ebpo_check_pruned(c->context, ray_matters, c, error);
+    if (status == EBPO_OK && c->no_memory)
+        status = ebpo_fail_memory(error, c->count * sizeof(ebpo_ray_found));
+    return status;
+}
+
+/* Finds the hits of a valid ray. */
 static ebpo_status ray_walk(casting *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -513,11 +531,7 @@ static ebpo_status ray_walk(casting *c, ebpo_error *error)
         ebpo_box box = ebpo_model_box(c->context->model);
         status = cast_node(c, &box, ebpo_model_root(c->context->model), error);
     }
-    if (status == EBPO_OK && !c->done && !c->waits && c->context->model->info->pruned)
-        status = ebpo_check_pruned(c->context, ray_matters, c, error);
-    if (status == EBPO_OK && c->no_memory)
-        status = ebpo_fail_memory(error, c->count * sizeof(ebpo_ray_found));
-    return status;
+    return ray_end(c, status, error);
 }
 
 /* --- one ray --- */
@@ -607,22 +621,32 @@ typedef struct batch {
 
 /* --- a ray of many --- */
 
+static void cast_begin_of(batch *b, uint64_t i, unsigned worker, casting *c)
+{
+    const ebpo_ray *r = &b->rays[i];
+    casting_begin(c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
+                  b->options.sides);
+}
+
+static void store_first(batch *b, uint64_t i, const casting *c)
+{
+    b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+}
+
 /* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
  * the ray must go on in the next round; then it has no result. */
 static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *rounds, bool *waits,
                             ebpo_error *error)
 {
     casting c;
-    const ebpo_ray *r = &b->rays[i];
-    casting_begin(&c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
-                  b->options.sides);
+    cast_begin_of(b, i, worker, &c);
     c.rounds = rounds;
     ebpo_status status = ray_walk(&c, error);
     *waits = c.waits;
     if (status != EBPO_OK || c.waits)
         return status;
     if (b->wants == EBPO_WANTS_FIRST)
-        b->first[i] = c.count ? hit_of(&c.first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+        store_first(b, i, &c);
     else if (b->wants == EBPO_WANTS_ANY)
         b->any[i] = c.count;
     else {
@@ -633,6 +657,50 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
     }
     if (status == EBPO_OK && b->options.done)
         b->options.done[i] = true;
+    return status;
+}
+
+/* Finds the first hits of some rays of a whole model together. */
+static ebpo_status cast_packet(batch *b, const uint64_t *ray, unsigned count, unsigned worker,
+                               ebpo_error *error)
+{
+    casting c[EBPO_RAY_PACKET];
+    ebpo_ray_search search[EBPO_RAY_PACKET], *active[EBPO_RAY_PACKET];
+    const ebpo_model *m = b->context[worker]->model;
+    unsigned walking = 0;
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < count; i++) {
+        cast_begin_of(b, ray[i], worker, &c[i]);
+        if (cast_begin(&c[i], &search[i], m->whole))
+            active[walking++] = &search[i];
+    }
+    if (walking)
+        m->kernels.ray->walk_many(active, walking);
+    for (unsigned i = 0; i < walking; i++)
+        judge_waiting(active[i]);
+    for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
+        status = ray_end(&c[i], EBPO_OK, error);
+        if (status == EBPO_OK)
+            store_first(b, ray[i], &c[i]);
+        if (status == EBPO_OK && b->options.done)
+            b->options.done[ray[i]] = true;
+    }
+    return status;
+}
+
+/* Finds the first hits of the rays begin .. end - 1 of a whole model. */
+static ebpo_status cast_packets(batch *b, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
+        uint64_t ray[EBPO_RAY_PACKET];
+        unsigned count = 0;
+        for (; i < end && count < EBPO_RAY_PACKET; i++)
+            if (!b->options.done || !b->options.done[i])
+                ray[count++] = i;
+        status = cast_packet(b, ray, count, worker, error);
+    }
     return status;
 }
 
@@ -734,6 +802,8 @@ static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned
 {
     batch *b = user;
     const ebpo_model *m = b->context[worker]->model;
+    if (m->whole && b->wants == EBPO_WANTS_FIRST)
+        return cast_packets(b, begin, end, worker, error);
     return m->whole || m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
                ? cast_in_order(b, begin, end, worker, error)
                : cast_in_rounds(b, begin, end, worker, error);

@@ -190,6 +190,14 @@ def change(tool, folder, path, url):
     expect("its folder is removed", not os.path.exists(out + ".part"))
     Handler.data, Handler.etag = content(path), '"1"'
     os.remove(out)
+    # With --box, blocks have another size.
+    Handler.reset(left=3)
+    run(tool, "fetch", "-q", "--http-connections", "1", url, out)
+    Handler.reset()
+    done = run(tool, "fetch", "--box", "0,0,-1,2,2,1", url, out)
+    expect("a run with --box explains why it does not resume",
+           done.returncode == 0 and "run without --box" in done.stderr, done.stderr)
+    os.remove(out)
 
 
 def interrupt(tool, folder, path, url):

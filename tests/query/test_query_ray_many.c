@@ -7,7 +7,20 @@
 #include <string.h>
 
 #include "check_main.h"
+#include "query/face_block.h"
+#include "query/query_model.h"
 #include "query_support.h"
+
+/* Kernels that count how many sides of boxes they decode for eight children at a time. */
+static uint64_t decoded_sides;
+EBPO_EIGHT f8 decode_sides(const uint8_t *x)
+{
+    decoded_sides++;
+    return f8_from_bytes(x);
+}
+#define f8_from_bytes      decode_sides
+#define EBPO_KERNEL_SUFFIX counted
+#include "query/ray_kernels.c"
 
 typedef struct results {
     ebpo_ray_hit *first;
@@ -132,6 +145,97 @@ START_TEST(test_ray_batch_names_invalid_ray)
 }
 END_TEST
 
+/* --- coherent rays, which a batch walks through the model together --- */
+
+/* Makes rays that differ from the first one by about `share` of its origin and direction, or of one
+ * of these, or of nothing. Some rays end near the hit of the first ray. */
+static void make_coherent(query_model *m, uint64_t *state, double share, ebpo_ray *rays,
+                          unsigned count)
+{
+    ebpo_ray *first = &rays[0];
+    ebpo_ray_hit hit;
+    bool found;
+    query_make_ray(m, state, first->origin, first->direction, &first->t_max);
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(first->direction[k]))
+            first->direction[k] = copysign(1e300, first->direction[k]);
+    ASSERT_OK(ebpo_ray_first(m->context, first->origin, first->direction, first->t_max, &hit,
+                             &found, error));
+    unsigned how = (unsigned)(ebpo_test_random(state) % 4);
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, fabs(first->direction[k]));
+    for (unsigned i = 1; i < count; i++) {
+        rays[i] = *first;
+        for (int k = 0; k < 3; k++) {
+            if (how & 1)
+                rays[i].origin[k] +=
+                    share * m->info.box_size[k] * (ebpo_test_random_unit(state) - 0.5);
+            if (how & 2)
+                rays[i].direction[k] += share * size * (ebpo_test_random_unit(state) - 0.5);
+        }
+        if (found && ebpo_test_random(state) % 4 == 0)
+            rays[i].t_max = hit.t * (1 + share * (ebpo_test_random_unit(state) - 0.5));
+    }
+}
+
+START_TEST(test_coherent_rays_match_single_rays)
+{
+    enum { RAYS = 9 };
+    query_model m;
+    ebpo_ray rays[RAYS];
+    ebpo_ray_hit together[RAYS], single;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    uint64_t state = 11, count = query_scaled(m.mesh.face_count > 500 ? 500 : 2000);
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+        options.threads = 1;
+        options.sides = (ebpo_ray_sides)(i % 3);
+        make_coherent(&m, &state, ldexp(1, -(int)(i % 52)), rays, RAYS);
+        ASSERT_OK(ebpo_ray_first_many(m.context, rays, RAYS, &options, together, error));
+        for (int k = 0; k < RAYS; k++) {
+            ASSERT_OK(ebpo_ray_first_many(m.context, &rays[k], 1, &options, &single, error));
+            ck_assert_msg(same_hit(&together[k], &single), "ray %d of %llu", k,
+                          (unsigned long long)i);
+        }
+    }
+    query_model_free(&m);
+}
+END_TEST
+
+/* Returns the number of sides that are decoded for rays from one eye through a square of pixels, in
+ * calls of `part` rays. */
+static uint64_t count_sides(query_model *m, uint64_t part)
+{
+    enum { SIDE = 64 };
+    static ebpo_ray rays[SIDE * SIDE];
+    static ebpo_ray_hit hits[SIDE * SIDE];
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    options.threads = 1;
+    for (int i = 0; i < SIDE * SIDE; i++)
+        rays[i] =
+            (ebpo_ray){ { 0.1, 0.2, 5 },
+                        { (i % SIDE - SIDE / 2) * 0x1p-7, (i / SIDE - SIDE / 2) * 0x1p-7, -1 },
+                        INFINITY };
+    decoded_sides = 0;
+    for (uint64_t i = 0; i < SIDE * SIDE; i += part)
+        ASSERT_OK(ebpo_ray_first_many(m->context, rays + i, part, &options, hits + i, error));
+    return decoded_sides;
+}
+
+START_TEST(test_coherent_rays_share_nodes)
+{
+    query_model m;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    uint64_t single = count_sides(&m, 1), together = count_sides(&m, EBPO_RAY_PACKET);
+    ck_assert_msg(together > 0 && 3 * together < single, "%llu sides, single rays %llu",
+                  (unsigned long long)together, (unsigned long long)single);
+    query_model_free(&m);
+}
+END_TEST
+
 /* --- closed solids --- */
 
 /* Aims from p approximately towards a vertex or a point of an edge or face; returns false when
@@ -239,6 +343,8 @@ TEST_SUITE(query_ray_many)
     tcase_set_timeout(tight, 600);
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
+    tcase_add_test(many, test_coherent_rays_share_nodes);
+    tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
     tcase_add_loop_test(tight, test_rays_detect_inside_of_solids, 0, query_solid_count());
     suite_add_tcase(suite, many);

@@ -421,12 +421,52 @@ START_TEST(test_failed_weld_changes_nothing)
 }
 END_TEST
 
+/* --- a subtree of a surface, without memory for the marks of its nodes --- */
+
+/* Returns the status of a query whose n-th allocation fails. *more: there are more allocations. */
+static ebpo_status query_with_failure(const ebpo_file *file, uint64_t n, bool *more)
+{
+    static const double corner[3] = { 4, 0, 0 };
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_inside_result result;
+    options.threads = 1;
+    options.cut_level = 2;
+    options.memory = 8 << 20;
+    fine(ebpo_model_new(file, &options, &model, &error));
+    fine(ebpo_context_new(model, &context, &error));
+    faults_begin(MEMORY, n, false, ENOMEM);
+    ebpo_status status = ebpo_inside(context, corner, NULL, &result, &error);
+    *more = faults_end() >= n;
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return status;
+}
+
+START_TEST(test_failed_marks_report_memory)
+{
+    ebpo_file *file, *surface;
+    bool more = true;
+    fine(ebpo_open(scratch(EVERY_CALL_SURFACE), &file, &error));
+    fine(ebpo_file_add_border(file, scratch("part.ebpo.h5"), NULL, NULL, &error));
+    fine(ebpo_open(scratch("part.ebpo.h5"), &surface, &error));
+    for (uint64_t n = 1; more; n++) {
+        ebpo_status status = query_with_failure(surface, n, &more);
+        ck_assert_msg(status == EBPO_OK || status == EBPO_E_MEMORY, "allocation %llu: %s: %s",
+                      (unsigned long long)n, ebpo_status_name(status), error.message);
+    }
+    ebpo_close(surface);
+    ebpo_close(file);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     enum { SECONDS = 600 };
     Suite *suite = suite_create("every_call");
     TCase *all = tcase_create("all"), *failing = tcase_create("failing"),
-          *in_part = tcase_create("in_part");
+          *in_part = tcase_create("in_part"), *marks = tcase_create("marks");
     tcase_set_timeout(all, SECONDS);
     tcase_add_unchecked_fixture(all, write_large, remove_all);
     tcase_add_loop_test(all, test_call_releases_workspace, 0, 2 * call_count());
@@ -442,5 +482,8 @@ Suite *test_suite(void)
     suite_add_tcase(suite, in_part);
     tcase_add_loop_test(failing, test_failed_weld_changes_nothing, 0, 4);
     suite_add_tcase(suite, failing);
+    tcase_add_unchecked_fixture(marks, write_small, remove_all);
+    tcase_add_test(marks, test_failed_marks_report_memory);
+    suite_add_tcase(suite, marks);
     return suite;
 }

@@ -98,9 +98,9 @@ static bool report_resuming(const subset_values *v, ebpo_file *file, const char 
         return false;
     if (s.cache_others && !s.cache_held)
         fprintf(stderr,
-                "ebpo fetch: %s: has changed on the server, or is not the file that is in %s; "
-                "fetching it from the beginning\n",
-                remote_shown(url), part);
+                "ebpo fetch: %s: cannot resume: the file has changed on the server, or %s has data "
+                "of another file, or of a run %s --box; fetching it from the beginning\n",
+                remote_shown(url), part, v->box ? "without" : "with");
     else if (s.cache_held && !v->quiet)
         fprintf(stderr, "ebpo fetch: %s: resuming with %s from %s\n", remote_shown(url),
                 words_bytes(bytes, sizeof bytes, s.cache_held), part);
