@@ -11,6 +11,7 @@
  * Source: format-spec/border.md. */
 #include "core/strict_fp.h"
 
+#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -164,6 +165,23 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
     return status;
 }
 
+/* Returns the area of a triangle, or INFINITY if the area is beyond the doubles. The coordinates
+ * are scaled by a power of two, so no intermediate result overflows. */
+static double area_of(const double *const corner[3])
+{
+    double scaled[3][3], u[3], v[3], cross[3], most = 0;
+    int power;
+    for (int i = 0; i < 9; i++)
+        most = fmax(most, fabs(corner[i / 3][i % 3]));
+    frexp(most, &power);
+    for (int i = 0; i < 9; i++)
+        scaled[i / 3][i % 3] = ldexp(corner[i / 3][i % 3], -power);
+    ebpo_vec3_subtract(scaled[1], scaled[0], u);
+    ebpo_vec3_subtract(scaled[2], scaled[0], v);
+    ebpo_vec3_cross(u, v, cross);
+    return ldexp(ebpo_vec3_length(cross) / 2, 2 * power);
+}
+
 /* Sets the counts of the border's loops and points, and the area of the caps. */
 static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
                            const ebpo_border_loops *loops)
@@ -177,14 +195,11 @@ static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
             info->border_longest = loops->loop[2 * i];
     for (uint64_t i = 0; i < caps->node_count; i++) {
         const ebpo_cap_node *n = &caps->node[i];
-        double u[3], v[3], cross[3];
-        uint64_t m = n->from + (n->to - n->from) / 2;
-        if (n->weight == 0)
-            continue;
-        ebpo_vec3_subtract(caps->position[m], caps->position[n->from], u);
-        ebpo_vec3_subtract(caps->position[n->to], caps->position[n->from], v);
-        ebpo_vec3_cross(u, v, cross);
-        info->border_area += n->weight * ebpo_vec3_length(cross) / 2;
+        const double *const corner[3] = { caps->position[n->from],
+                                          caps->position[n->from + (n->to - n->from) / 2],
+                                          caps->position[n->to] };
+        if (n->weight)
+            info->border_area = fmin(info->border_area + n->weight * area_of(corner), DBL_MAX);
     }
 }
 

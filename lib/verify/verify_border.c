@@ -13,6 +13,7 @@
  *   caps from the loops, by a method that shares nothing with the builder. */
 #include "core/strict_fp.h"
 
+#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -88,18 +89,24 @@ typedef struct cap_list {
     bool no_memory; /* true: out of memory, so caps are missing */
 } cap_list;
 
+/* Returns the area of a triangle. The edges are divided by the longest of their components, so that
+ * no product overflows. An area above the doubles is returned as INFINITY. */
 static double area_of(const double *a, const double *b, const double *c)
 {
-    double u[3], v[3], sum = 0;
+    double u[3], v[3], most = 0, sum = 0;
     for (int k = 0; k < 3; k++) {
-        u[k] = b[k] - a[k];
-        v[k] = c[k] - a[k];
+        u[k] = b[k] / 4 - a[k] / 4;
+        v[k] = c[k] / 4 - a[k] / 4;
+        most = fmax(most, fmax(fabs(u[k]), fabs(v[k])));
     }
+    if (most == 0)
+        return 0;
     for (int k = 0; k < 3; k++) {
-        double x = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        double x = u[i] / most * (v[j] / most) - u[j] / most * (v[i] / most);
         sum += x * x;
     }
-    return sqrt(sum) / 2;
+    return 8 * sqrt(sum) * most * most;
 }
 
 /* Lists the caps between the path of a loop from point `first` to point `last` and the straight
@@ -111,7 +118,8 @@ static void list_caps(cap_list *c, uint64_t first, uint64_t last, uint32_t weigh
         return;
     uint64_t middle = (first + last) / 2;
     const double *p = c->loops->point;
-    c->area += weight * area_of(p + 3 * first, p + 3 * middle, p + 3 * last);
+    c->area =
+        fmin(c->area + weight * area_of(p + 3 * first, p + 3 * middle, p + 3 * last), DBL_MAX);
     for (uint32_t i = 0; i < weight; i++) {
         if (!ebpo_grow(&c->corner, &c->capacity, c->count + 1, 3 * sizeof *c->corner)) {
             c->no_memory = true;
@@ -171,7 +179,7 @@ ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_points *points,
     cap_list caps = { .loops = &tree->border };
     ebpo_status status = list_all_caps(&caps, error);
     if (status == EBPO_OK && caps.count) {
-        CHECK(fabs(caps.area - tree->info.border_area) <= 1e-9 * caps.area,
+        CHECK(fabs(caps.area - tree->info.border_area) <= 1e-9 * caps.area + DBL_MIN,
               "the caps have an area of %.17g, the header states %.17g", caps.area,
               tree->info.border_area);
         ebpo_mesh mesh = { .vertex_count = tree->border.point_count,

@@ -55,15 +55,15 @@ static void print_source(FILE *out, const ebpo_info *info)
 
 static void print_border(FILE *out, const ebpo_info *info)
 {
-    char edges[40], loops[40], longest[40];
-    fprintf(out,
-            "\n  border    %s in %s (longest loop: %s); caps have area %.4g, %.3g %% of the "
-            "mesh's area%s",
+    char edges[40], loops[40], longest[40], share[48] = "";
+    double percent = 100 * info->border_area / info->report.area;
+    if (isfinite(percent)) /* areas may be beyond the doubles */
+        snprintf(share, sizeof share, ", %.3g %% of the mesh's area", percent);
+    fprintf(out, "\n  border    %s in %s (longest loop: %s); caps have area %.4g%s%s",
             words_plural(edges, sizeof edges, info->border_points, "edge", "edges"),
             words_plural(loops, sizeof loops, info->border_loops, "loop", "loops"),
             words_plural(longest, sizeof longest, info->border_longest, "edge", "edges"),
-            info->border_area, 100 * info->border_area / info->report.area,
-            info->border_inside ? "; envelopes contain the inside" : "");
+            info->border_area, share, info->border_inside ? "; envelopes contain the inside" : "");
 }
 
 static void print_surface(FILE *out, const ebpo_info *info)
