@@ -320,6 +320,14 @@ START_TEST(test_pen_takes_pressure_of_stylus)
 }
 END_TEST
 
+/* Sets the device to a pose below the proxy by the depth. */
+static void press_down(haptic_sample *s)
+{
+    memcpy(s->device, s->proxy, sizeof s->device);
+    s->device[2] -= s->depth;
+    memcpy(s->device_rotation, s->rotation, sizeof s->device_rotation);
+}
+
 /* Moves a brush, a square of 11 x 11 points with sides of 0.1 that is tilted about the y axis, by
  * 0.2 in steps of 0.00101. */
 static void move_brush(pen_test *t, double tilt, double depth)
@@ -342,7 +350,7 @@ static void move_brush(pen_test *t, double tilt, double depth)
         s.proxy[2] = 1 + low;
         s.rotation[1] = sin(tilt / 2);
         s.rotation[3] = cos(tilt / 2);
-        s.normal[2] = 1;
+        press_down(&s);
         haptic_paint_take(t->paint, &s, 1);
     }
 }
@@ -395,7 +403,8 @@ static void press_point(pen_test *t, double height, double depth, double depth_s
         s.touch[2] += height;
         s.depth = depth + i * depth_step;
         memcpy(s.proxy, s.touch, sizeof s.proxy);
-        s.rotation[3] = s.normal[2] = 1;
+        s.rotation[3] = 1;
+        press_down(&s);
         haptic_paint_take(t->paint, &s, 1);
     }
 }

@@ -83,11 +83,15 @@ static bool extents_intersect(const ebpo_extent *a, const ebpo_extent *b)
     return true;
 }
 
+/* Do the same as fmin and fmax for numbers that are not NAN, without a call. */
+static inline double smaller_of(double a, double b) { return a < b ? a : b; }
+static inline double larger_of(double a, double b) { return a > b ? a : b; }
+
 static void widen_extent(ebpo_extent *e, const double min[3], const double max[3])
 {
     for (int i = 0; i < 3; i++) {
-        e->min[i] = fmin(e->min[i], min[i]);
-        e->max[i] = fmax(e->max[i], max[i]);
+        e->min[i] = smaller_of(e->min[i], min[i]);
+        e->max[i] = larger_of(e->max[i], max[i]);
     }
 }
 
@@ -220,7 +224,7 @@ static double box_square_distance(const ebpo_extent *a, const ebpo_extent *b)
 {
     double square = 0;
     for (int i = 0; i < 3; i++) {
-        double d = fmax(0, fmax(a->min[i] - b->max[i], b->min[i] - a->max[i]));
+        double d = larger_of(0, larger_of(a->min[i] - b->max[i], b->min[i] - a->max[i]));
         square += d * d;
     }
     return square;
@@ -237,7 +241,7 @@ static double min_square_of_leaf(const ebpo_face_box *box, uint64_t leaf, const 
         ebpo_vec3_copy(box->corner[f][0], e.max);
         widen_extent(&e, box->corner[f][1], box->corner[f][1]);
         widen_extent(&e, box->corner[f][2], box->corner[f][2]);
-        least = fmin(least, box_square_distance(&e, around));
+        least = smaller_of(least, box_square_distance(&e, around));
     }
     return least;
 }

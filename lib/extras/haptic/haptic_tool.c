@@ -17,13 +17,14 @@
 
 /* Limits of visited nodes in a search. CLUSTER_VISITS: around a cluster; POINT_VISITS: around a
  * point; KEPT_VISITS: for the kept faces of a point; FACE_VISITS: for the faces around a point's
- * path. FACE_COST: work of examining a face, in visited nodes. */
+ * path. FACE_COST, CONTACT_COST: work of examining a face or a contact, in visited nodes. */
 enum {
     CLUSTER_VISITS = 400,
     POINT_VISITS = 48,
     KEPT_VISITS = 192,
     FACE_VISITS = 256,
-    FACE_COST = 6
+    FACE_COST = 6,
+    CONTACT_COST = 6
 };
 
 /* Distances in units of the skin. */
@@ -293,6 +294,7 @@ static void add_contact(const tool_piece *p, const ebpo_close_point *close, uint
     ebpo_vec3_cross(lever, near->away, c.grip + 3);
     for (int i = 0; i < 3; i++)
         c.grip[3 + i] /= tool->arm;
+    *p->work += CONTACT_COST;
     ebpo_tool_contact_add(&tool->next, &c);
 }
 
@@ -489,7 +491,7 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
     uint32_t flags = continue_piece(t, work, arrived);
     tool->piece_work += *work - before;
     if (*arrived && tool->piece_work > EBPO_TOOL_WORK / 3)
-        t->max_piece = fmax(0.5 * ebpo_screw_length(tool->motion), 4 * t->options.skin);
+        t->max_piece = fmax(0.5 * ebpo_screw_length(tool->motion), 8 * t->options.skin);
     else if (*arrived && tool->piece_work < EBPO_TOOL_WORK / 6 && t->max_piece < t->diagonal)
         t->max_piece *= 2;
     return flags;
@@ -562,7 +564,7 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
             if (*work > EBPO_TOOL_WORK)
                 return flags | EBPO_HAPTIC_PATH_UNFINISHED;
             (void)ebpo_haptic_take_box(t);
-            *work += 4 * (uint64_t)tool->contacts.count; /* work of the contacts */
+            *work += CONTACT_COST * (uint64_t)tool->contacts.count; /* work of the contacts */
             if (!begin_path(t, device, &flags))
                 return flags;
         }

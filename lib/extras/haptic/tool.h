@@ -110,7 +110,7 @@ enum {
     EBPO_TOOL_POOL = 1 << 16, /* number of faces around all points in total */
     EBPO_TOOL_NEAR = 64,      /* number of faces around a point */
     EBPO_TOOL_KEPT = 8,       /* number of faces that are kept for a point */
-    EBPO_TOOL_WORK = 6500     /* work of a haptic step: visited nodes, plus six for each face */
+    EBPO_TOOL_WORK = 7500     /* work of a haptic step: visited nodes, plus six for each face */
 };
 
 /* A set of points that are near each other. */

@@ -1,6 +1,7 @@
 /* ebpo haptic: runs a recorded, simulated or real haptic device at a steady rate, and measures the
  * times of the haptic steps. */
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <signal.h>
 #include <stddef.h>
@@ -323,6 +324,24 @@ static ebpo_status open_scene(job *j, uint64_t memory, ebpo_error *error)
     return status == EBPO_OK ? get_instances(j, counts.begin, error) : status;
 }
 
+/* Returns true if the record would overwrite a model of the scene. */
+static bool overwrites_model(const job *j)
+{
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    const char *slash = strrchr(j->name, '/');
+    (void)ebpo_scene_get_counts(j->scene, &counts);
+    for (uint64_t i = 0; i < counts.models; i++) {
+        ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
+        char path[PATH_MAX];
+        (void)ebpo_scene_get_model_facts(j->scene, i, &facts);
+        int folder = slash && facts.path[0] != '/' ? (int)(slash - j->name) + 1 : 0;
+        snprintf(path, sizeof path, "%.*s%s", folder, j->name, facts.path);
+        if (command_overwrites("haptic", path, j->v->record))
+            return true;
+    }
+    return false;
+}
+
 static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
 {
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
@@ -565,6 +584,8 @@ static int run_job(job *j, uint64_t memory)
     ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
     if (status == EBPO_OK)
         status = is_scene(j->name) ? open_scene(j, memory, &error) : open_model(j, memory, &error);
+    if (status == EBPO_OK && j->scene && j->v->record && overwrites_model(j))
+        return EXIT_USAGE;
     if (status == EBPO_OK && !open_mouse(j))
         return EXIT_FAILED;
     if (status == EBPO_OK)

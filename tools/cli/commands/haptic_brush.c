@@ -186,11 +186,9 @@ static ebpo_status test_point(const search *s, const double point[3], double out
     if (status != EBPO_OK || near.face == EBPO_NO_FACE)
         return status;
     place_point(s->sample->device_rotation, s->sample->device, point, target);
-    for (int k = 0; k < 3; k++) {
-        double away = near.distance > 0 ? (out[k] - near.point[k]) / near.distance : near.normal[k];
-        height += (target[k] - near.point[k]) * away;
-    }
-    *pressed = height <= s->near;
+    for (int k = 0; k < 3; k++)
+        height += (target[k] - near.point[k]) * (out[k] - near.point[k]) / near.distance;
+    *pressed = near.distance <= s->near || height <= s->near;
     return EBPO_OK;
 }
 

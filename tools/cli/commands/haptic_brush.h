@@ -20,11 +20,11 @@ haptic_brush *haptic_brush_new(const double (*points)[3], uint64_t count);
 void haptic_brush_free(haptic_brush *brush);
 
 /* Computes the positions, on the proxy, of the pressed points of a brush in contact. A point is
- * pressed if the motion from proxy to device would bring it to the surface, through it, or nearer
- * to it than `near`. The surface is here the plane through the nearest point of the model,
- * perpendicular to the line from there to the brush's point. If more than HAPTIC_BRUSH_MAX points
- * are pressed, takes about as many, spread over the pressed ones. Sets *count to the number of
- * positions. Fails as ebpo_distance does. */
+ * pressed if it is not farther than `near` from the surface, or if the motion from proxy to device
+ * would bring it so near to the surface or through it. The surface is here the plane through the
+ * nearest point of the model, perpendicular to the line from there to the brush's point. If more
+ * than HAPTIC_BRUSH_MAX points are pressed, takes about as many, spread over the pressed ones. Sets
+ * *count to the number of positions. Fails as ebpo_distance does. */
 ebpo_status haptic_brush_press(haptic_brush *brush, ebpo_context *context,
                                const haptic_sample *sample, double near,
                                double out[HAPTIC_BRUSH_MAX][3], int *count, ebpo_error *error);
