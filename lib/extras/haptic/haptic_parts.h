@@ -67,6 +67,7 @@ struct ebpo_haptic {
     /* --- constant members --- */
     ebpo_haptic_model *models; /* [model_count] */
     ebpo_haptic_part *part;    /* [part_count] only probed_point changes, in haptic steps */
+    uint32_t *order; /* [part_count] the instances in the order in which they are loaded */
     uint64_t model_count, part_count;
     ebpo_haptic_options options;
     ebpo_extent root; /* contains all faces */
