@@ -388,6 +388,21 @@ def test_saved_elsewhere(t):
         check(got["points"] == t.point_count(made) > 0, got)
 
 
+def test_sync_failures(t, faults):
+    """If a disk fails once, the paint is saved again; if it fails always, the command reports this at the end, too."""
+    path = t.at("sync.txt")
+    with open(path, "w", encoding="ascii") as out:
+        out.write("".join(f"{i / 1000} 0.3 {0.97 if 100 < i < 300 else 1.2}\n" for i in range(1500)))
+    for calls in ("1", "1+"):
+        p = t.start(t.at(f"sync-{calls}.paint.h5"), "--path", path,
+                    env={**os.environ, "LD_PRELOAD": faults, "EBPO_TEST_FAULT": f"fsync:{calls}:5"})
+        out, err = p.communicate(timeout=60)
+        got = json.loads(out)["paint"]
+        check(err.count("the device continues") == 1 and got["points"] > 0, err, got)
+        fails = calls == "1+"
+        check(p.returncode == fails and ("could not be synced" in got.get("failure", "")) == fails, p.returncode, got)
+
+
 def request(port, first, *fields):
     """Sends a request to the viewer. Returns (first bytes of the response, socket)."""
     s = socket.create_connection(("127.0.0.1", port), timeout=20)
@@ -454,6 +469,8 @@ def main(ebpo, generate, faults=None):
         others = (test_rough_surface, lambda _: test_full_disk(t, True), lambda _: test_full_disk(t, False),
                   lambda _: test_kill(t, faults), test_second_writer, test_stylus, test_lifted_pen, test_unplugged,
                   test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_gap)
+        if faults:
+            others += (lambda _: test_sync_failures(t, faults),)
         with ThreadPoolExecutor(3) as pool:  # they wait for their devices most of the time
             for result in [pool.submit(test, t) for test in others]:
                 result.result()

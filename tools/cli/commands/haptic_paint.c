@@ -102,6 +102,7 @@ struct haptic_paint {
     haptic_painted result;
     pthread_t saver, syncer;
     atomic_bool unsynced; /* the file was saved, and not synced since then */
+    atomic_bool again;    /* a sync has failed, so the file must be saved again */
     atomic_bool ended;
 };
 
@@ -157,16 +158,18 @@ static ebpo_status copy_strokes(haptic_paint *p, ebpo_error *error)
     return status;
 }
 
-/* Saves the paint if it has changed. Reports the first of successive failures. */
+/* Saves the paint if it has changed, or if its file could not be synced. Reports the first of
+ * successive failures. */
 static ebpo_status save_paint(haptic_paint *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t begin = tool_clock();
+    bool again = atomic_exchange(&p->again, false);
     lock_paint(p);
     ebpo_status status = p->changes == p->saved_changes ? EBPO_OK : copy_strokes(p, &error);
     bool changed = p->changes != p->saved_changes;
     unlock_paint(p);
-    if (!changed)
+    if (!changed && !again)
         return EBPO_OK;
     if (status == EBPO_OK)
         status = ebpo_paint_checkpoint(p->saved, &error);
@@ -188,6 +191,8 @@ static ebpo_status save_paint(haptic_paint *p)
                 error.message);
     p->save_error = error;
     p->result.failed_saves++;
+    if (again)
+        atomic_store(&p->again, true);
     return status;
 }
 
@@ -228,9 +233,11 @@ static ebpo_status sync_paint(haptic_paint *p, ebpo_error *error)
         snprintf(folder, sizeof folder, "%.*s", (int)(slash - p->pen.path) + 1, p->pen.path);
     if (sync_path(p->pen.path) && sync_path(folder))
         return EBPO_OK;
+    int number = errno;
+    atomic_store(&p->again, true);
     *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
     snprintf(error->message, sizeof error->message, "%.200s: could not be synced to the disk: %s",
-             p->pen.path, strerror(errno));
+             p->pen.path, strerror(number));
     return EBPO_E_IO;
 }
 
@@ -243,7 +250,8 @@ static void *sync_often(void *user)
         if (sync_paint(p, &error) == EBPO_OK || failed)
             continue;
         failed = true;
-        fprintf(stderr, "ebpo haptic: %s; the device continues\n", error.message);
+        fprintf(stderr, "ebpo haptic: %s; the device continues, and the paint is saved again\n",
+                error.message);
     }
     return NULL;
 }
