@@ -402,6 +402,37 @@ START_TEST(test_haptic_posed_probe_bounds_exact_distance)
 }
 END_TEST
 
+/* The matrix of a pose may differ from a rotation by 2^-20. Far away, this changes distances by
+ * more than rounding. */
+START_TEST(test_haptic_posed_probe_bounds_distance_of_inexact_rotation)
+{
+    ebpo_mesh mesh[1] = { query_solid_by_name("l_shape") };
+    ebpo_pose pose[1] = { EBPO_POSE_INIT };
+    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
+    ebpo_haptic_probe_result r = { .hi = INFINITY };
+    const double at[3] = { 300, 200, 100 };
+    ebpo_haptic *haptic;
+    oracle_nearest near;
+    scene s;
+    for (int k = 0; k < 3; k++)
+        pose[0].rotation[k][k] += 0x1p-22;
+    scene_make(&s, mesh, pose, 1);
+    options.kind = EBPO_HAPTIC_PROBE;
+    ASSERT_OK(ebpo_haptic_new_posed(s.instance, 1, &options, at, &haptic, error));
+    oracle_find_nearest(s.all, at, &near);
+    for (int rests = 0; !(r.hi - r.lo < 0.01); rests++) {
+        ck_assert_int_lt(rests, 20000);
+        pause_a_little();
+        ebpo_haptic_step_probe(haptic, at, &r);
+        ck_assert_msg(r.lo <= near.distance && near.distance <= r.hi,
+                      "%.17g is not from %.17g to %.17g", near.distance, r.lo, r.hi);
+        ck_assert(!(r.flags & EBPO_HAPTIC_ACCURATE));
+    }
+    ebpo_haptic_free(haptic);
+    scene_free(&s);
+}
+END_TEST
+
 /* --- two cubes with a common face --- */
 
 static ebpo_mesh box_mesh(double length)
@@ -574,6 +605,7 @@ TEST_SUITE(haptic_posed)
     tcase_set_timeout(posed, 600);
     tcase_add_loop_test(posed, test_haptic_posed_proxy_never_penetrates, 0, 6);
     tcase_add_loop_test(posed, test_haptic_posed_probe_bounds_exact_distance, 0, 3);
+    tcase_add_test(posed, test_haptic_posed_probe_bounds_distance_of_inexact_rotation);
     tcase_add_loop_test(posed, test_haptic_two_cubes_feel_like_their_union, 0, 2);
     tcase_add_loop_test(posed, test_haptic_follows_between_many_instances, 0, 2);
     tcase_add_test(posed, test_haptic_posed_refuses_invalid_instances);

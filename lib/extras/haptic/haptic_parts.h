@@ -58,6 +58,7 @@ typedef struct ebpo_probe_query {
     double place[3];            /* the position */
     double distance;            /* distance from the nearest face, 0 or more; infinite if there are
                                  * no faces */
+    double uncertainty;         /* bound of the error of `distance` because of poses */
     double point[3], normal[3]; /* nearest point, and normal of its face */
     ebpo_probe_side *side;      /* [part_count] */
     bool valid;                 /* the results have been set */
