@@ -309,6 +309,18 @@ def test_corner(t):
         check(len(far) > 10 and wide - 0.015 < max(far) < wide + 0.003, k, far, wide)
 
 
+def test_deeper(t):
+    """A brush that is pressed in further at one position also paints with the points that are pressed now."""
+    brush, path, paint = t.at("steps.txt"), t.at("steps.path"), t.at("steps.paint.h5")
+    line(brush, [(0.05 * i, 0, 0.02 * i) for i in range(10)])
+    line(path, [(0.2, 0.5, max(0.91, 1.1 - 0.001 * i)) for i in range(400)])
+    for force in ("1", "1000"):  # full pressure from the beginning, and nearly none
+        t.run("haptic", "--path", path, "--tool", brush, "--paint", paint, "--pen-radius", "0.01", "--full-force", force, t.model)
+        xs = {round(q["place"][0], 2) for s in t.strokes(paint) for q in s["points"]}
+        check(xs == {0.2, 0.25, 0.3, 0.35, 0.4}, xs)  # of heights up to 0.08
+        os.remove(paint)
+
+
 def test_rough_surface(t):
     """A ball of 2,000 points follows the device over a rough surface: its points do not jam where they touch two faces."""
     t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
@@ -468,7 +480,7 @@ def main(ebpo, generate, faults=None):
         test_erase(t)  # of the strokes that test_replay has painted
         others = (test_rough_surface, lambda _: test_full_disk(t, True), lambda _: test_full_disk(t, False),
                   lambda _: test_kill(t, faults), test_second_writer, test_stylus, test_lifted_pen, test_unplugged,
-                  test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_gap)
+                  test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_deeper, test_gap)
         if faults:
             others += (lambda _: test_sync_failures(t, faults),)
         with ThreadPoolExecutor(3) as pool:  # they wait for their devices most of the time
