@@ -662,6 +662,11 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
                              model);
     if (is_scene(model) && !v->path && !v->device)
         return command_usage("haptic", "%s: a scene needs --path or --device", model);
+    if (is_scene(model) && v->remote.compat)
+        return command_usage("haptic",
+                             "%s: --compat cannot be used with a scene; rewrite its models with "
+                             "`ebpo repack --compat`",
+                             model);
     if (v->path && v->seconds != 10)
         return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
                                        "its last position");
