@@ -309,6 +309,18 @@ def test_corner(t):
         check(len(far) > 10 and wide - 0.015 < max(far) < wide + 0.003, k, far, wide)
 
 
+def test_deeper(t):
+    """A brush that is pressed in further at one position also paints with the points that are pressed now."""
+    brush, path, paint = t.at("steps.txt"), t.at("steps.path"), t.at("steps.paint.h5")
+    line(brush, [(0.05 * i, 0, 0.02 * i) for i in range(10)])
+    line(path, [(0.2, 0.5, max(0.91, 1.1 - 0.001 * i)) for i in range(400)])
+    for force in ("1", "1000"):  # full pressure from the beginning, and nearly none
+        t.run("haptic", "--path", path, "--tool", brush, "--paint", paint, "--pen-radius", "0.01", "--full-force", force, t.model)
+        xs = {round(q["place"][0], 2) for s in t.strokes(paint) for q in s["points"]}
+        check(xs == {0.2, 0.25, 0.3, 0.35, 0.4}, xs)  # of heights up to 0.08
+        os.remove(paint)
+
+
 def test_rough_surface(t):
     """A ball of 2,000 points follows the device over a rough surface: its points do not jam where they touch two faces."""
     t.run("convert", "-q", t.at("rough.ply"), t.at("rough.ebpo.h5"))
@@ -388,6 +400,21 @@ def test_saved_elsewhere(t):
         check(got["points"] == t.point_count(made) > 0, got)
 
 
+def test_sync_failures(t, faults):
+    """If a disk fails once, the paint is saved again; if it fails always, the command reports this at the end, too."""
+    path = t.at("sync.txt")
+    with open(path, "w", encoding="ascii") as out:
+        out.write("".join(f"{i / 1000} 0.3 {0.97 if 100 < i < 300 else 1.2}\n" for i in range(1500)))
+    for calls in ("1", "1+"):
+        p = t.start(t.at(f"sync-{calls}.paint.h5"), "--path", path,
+                    env={**os.environ, "LD_PRELOAD": faults, "EBPO_TEST_FAULT": f"fsync:{calls}:5"})
+        out, err = p.communicate(timeout=60)
+        got = json.loads(out)["paint"]
+        check(err.count("the device continues") == 1 and got["points"] > 0, err, got)
+        fails = calls == "1+"
+        check(p.returncode == fails and ("could not be synced" in got.get("failure", "")) == fails, p.returncode, got)
+
+
 def request(port, first, *fields):
     """Sends a request to the viewer. Returns (first bytes of the response, socket)."""
     s = socket.create_connection(("127.0.0.1", port), timeout=20)
@@ -453,7 +480,9 @@ def main(ebpo, generate, faults=None):
         test_erase(t)  # of the strokes that test_replay has painted
         others = (test_rough_surface, lambda _: test_full_disk(t, True), lambda _: test_full_disk(t, False),
                   lambda _: test_kill(t, faults), test_second_writer, test_stylus, test_lifted_pen, test_unplugged,
-                  test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_gap)
+                  test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_deeper, test_gap)
+        if faults:
+            others += (lambda _: test_sync_failures(t, faults),)
         with ThreadPoolExecutor(3) as pool:  # they wait for their devices most of the time
             for result in [pool.submit(test, t) for test in others]:
                 result.result()

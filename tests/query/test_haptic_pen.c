@@ -347,7 +347,7 @@ static void move_brush(pen_test *t, double tilt, double depth)
         s.proxy[0] = s.touch[0];
         s.proxy[1] = s.touch[1];
         s.touch[0] += (i % 2 ? 0.05 : tilt != 0 ? 0.05 : -0.05) * cos(tilt); /* another point */
-        s.proxy[2] = 1 + low;
+        s.proxy[2] = 1 + low + 1e-6; /* not below the surface because of rounding */
         s.rotation[1] = sin(tilt / 2);
         s.rotation[3] = cos(tilt / 2);
         press_down(&s);

@@ -3,7 +3,8 @@
  * - no point of a ball's centre or of a tool passes a face or comes too close to one
  * - the device gains no energy
  * - the bounds of a probe contain the distance, and its side is correct
- * Two cubes that share a face feel like the box that they form. */
+ * Two cubes that share a face feel like the box that they form. Hundreds of models do not slow the
+ * proxy down. */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
 #include <math.h>
@@ -401,6 +402,37 @@ START_TEST(test_haptic_posed_probe_bounds_exact_distance)
 }
 END_TEST
 
+/* The matrix of a pose may differ from a rotation by 2^-20. Far away, this changes distances by
+ * more than rounding. */
+START_TEST(test_haptic_posed_probe_bounds_distance_of_inexact_rotation)
+{
+    ebpo_mesh mesh[1] = { query_solid_by_name("l_shape") };
+    ebpo_pose pose[1] = { EBPO_POSE_INIT };
+    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
+    ebpo_haptic_probe_result r = { .hi = INFINITY };
+    const double at[3] = { 300, 200, 100 };
+    ebpo_haptic *haptic;
+    oracle_nearest near;
+    scene s;
+    for (int k = 0; k < 3; k++)
+        pose[0].rotation[k][k] += 0x1p-22;
+    scene_make(&s, mesh, pose, 1);
+    options.kind = EBPO_HAPTIC_PROBE;
+    ASSERT_OK(ebpo_haptic_new_posed(s.instance, 1, &options, at, &haptic, error));
+    oracle_find_nearest(s.all, at, &near);
+    for (int rests = 0; !(r.hi - r.lo < 0.01); rests++) {
+        ck_assert_int_lt(rests, 20000);
+        pause_a_little();
+        ebpo_haptic_step_probe(haptic, at, &r);
+        ck_assert_msg(r.lo <= near.distance && near.distance <= r.hi,
+                      "%.17g is not from %.17g to %.17g", near.distance, r.lo, r.hi);
+        ck_assert(!(r.flags & EBPO_HAPTIC_ACCURATE));
+    }
+    ebpo_haptic_free(haptic);
+    scene_free(&s);
+}
+END_TEST
+
 /* --- two cubes with a common face --- */
 
 static ebpo_mesh box_mesh(double length)
@@ -460,6 +492,78 @@ START_TEST(test_haptic_two_cubes_feel_like_their_union)
 }
 END_TEST
 
+/* --- many models --- */
+
+enum { SIDE = 8, MANY = SIDE * SIDE * SIDE };
+
+/* Poses the model at all nodes of a lattice, in a random order, with random rotations. */
+static void fill_lattice(ebpo_haptic_instance instance[MANY], ebpo_model *model, uint64_t *state)
+{
+    for (int i = 0; i < MANY; i++) {
+        const double quaternion[4] = { random_of(state), random_of(state), random_of(state), 1 };
+        uint64_t other = ebpo_test_random(state) % (uint64_t)(i + 1);
+        ebpo_pose pose = EBPO_POSE_INIT;
+        ASSERT_OK(ebpo_pose_turn(&pose, quaternion, error));
+        for (int k = 0, n = i; k < 3; k++, n /= SIDE)
+            pose.translation[k] = n % SIDE;
+        pose.scale = 0.4; /* half of the diagonal is less than 0.5 */
+        instance[i] = instance[other];
+        instance[other] = (ebpo_haptic_instance){ model, pose };
+    }
+}
+
+/* Makes a step, and returns its flags. */
+static uint32_t step_to(ebpo_haptic *haptic, bool is_tool, const double at[3])
+{
+    static const double turn[4] = { 0, 0, 0, 1 };
+    ebpo_haptic_ball_result ball;
+    ebpo_haptic_tool_result tool;
+    if (!is_tool) {
+        ebpo_haptic_step_ball(haptic, at, &ball);
+        return ball.flags;
+    }
+    ebpo_haptic_step_tool(haptic, at, turn, &tool);
+    return tool.flags;
+}
+
+/* A ball or a tool moves in the gaps between the models, and arrives without delay. */
+START_TEST(test_haptic_follows_between_many_instances)
+{
+    static ebpo_haptic_instance instance[MANY];
+    static const double point[2][3] = { { 0.01, 0, 0 }, { 0, 0.01, 0 } };
+    const double low[3] = { -0.5, -0.5, -0.5 }, high[3] = { 0.5, 0.5, 0.5 };
+    uint64_t state = 7;
+    query_model cube;
+    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
+    ebpo_haptic *haptic;
+    double at[3] = { -0.5, -0.5, -0.5 };
+    query_model_make(&cube, "cube", ebpo_test_box(low, high, 1), &query_variants[0]);
+    fill_lattice(instance, cube.model, &state);
+    options.skin = 1e-3;
+    options.search_radius = 0.05;
+    options.kind = _i ? EBPO_HAPTIC_TOOL : EBPO_HAPTIC_BALL;
+    options.points = _i ? point : NULL;
+    options.point_count = _i ? 2 : 0;
+    ASSERT_OK(ebpo_haptic_new_posed(instance, MANY, &options, at, &haptic, error));
+    for (int leg = 0; leg < 60; leg++) {
+        uint32_t flags = EBPO_HAPTIC_WAITING;
+        at[leg % 3] = (double)(ebpo_test_random(&state) % SIDE) - 0.5;
+        for (int waits = 0, steps = 0; flags && steps < 40 && waits < 20000;) {
+            flags = step_to(haptic, _i, at);
+            if (flags & EBPO_HAPTIC_WAITING) {
+                waits++;
+                pause_a_little(); /* for the loading thread */
+            } else {
+                steps++;
+            }
+        }
+        ck_assert_uint_eq(flags, 0);
+    }
+    ebpo_haptic_free(haptic);
+    query_model_free(&cube);
+}
+END_TEST
+
 START_TEST(test_haptic_posed_refuses_invalid_instances)
 {
     static const struct {
@@ -501,7 +605,9 @@ TEST_SUITE(haptic_posed)
     tcase_set_timeout(posed, 600);
     tcase_add_loop_test(posed, test_haptic_posed_proxy_never_penetrates, 0, 6);
     tcase_add_loop_test(posed, test_haptic_posed_probe_bounds_exact_distance, 0, 3);
+    tcase_add_test(posed, test_haptic_posed_probe_bounds_distance_of_inexact_rotation);
     tcase_add_loop_test(posed, test_haptic_two_cubes_feel_like_their_union, 0, 2);
+    tcase_add_loop_test(posed, test_haptic_follows_between_many_instances, 0, 2);
     tcase_add_test(posed, test_haptic_posed_refuses_invalid_instances);
     suite_add_tcase(suite, posed);
     return suite;

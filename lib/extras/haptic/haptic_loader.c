@@ -62,13 +62,16 @@ static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error
 {
     ebpo_status status = EBPO_OK;
     out->distance = INFINITY;
+    out->uncertainty = 0;
     for (uint64_t i = 0; i < t->part_count && status == EBPO_OK; i++) {
         const ebpo_haptic_part *part = &t->part[i];
         double p[3], uncertainty, gap = ebpo_haptic_part_gap(part, out->place);
         ebpo_haptic_part_point(part, out->place, p, &uncertainty);
         out->side[i] = (ebpo_probe_side){ 0, false };
-        if (gap < out->distance)
+        if (gap < out->distance) {
+            out->uncertainty = fmax(out->uncertainty, uncertainty * part->scale);
             status = query_distance(part, p, out, error);
+        }
         if (status == EBPO_OK && part->solid && gap == 0)
             status = query_side(part, out->place, p, &out->side[i], error);
     }

@@ -2,8 +2,9 @@
  *
  * The faces of all instances are loaded into one box (face_box.h), in posed coordinates. A haptic
  * step does not distinguish instances, except to report them. So the guarantees of a step hold for
- * the posed faces of all instances together. An object for a single model has one instance that is
- * not posed, so its coordinates stay as they are in the file. */
+ * the posed faces of all instances together. The tree of the box needs faces in a spatial order, so
+ * instances that are near each other are loaded one after the other. An object for a single model
+ * has one instance that is not posed, so its coordinates stay as they are in the file. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -84,6 +85,67 @@ static double rounding_of(const ebpo_haptic_part *part)
     return slack;
 }
 
+/* The position of an instance on a space-filling curve. */
+typedef struct curve_place {
+    uint64_t code;
+    uint32_t part;
+} curve_place;
+
+static int compare_places(const void *a, const void *b)
+{
+    const curve_place *x = a, *y = b;
+    if (x->code != y->code)
+        return x->code < y->code ? -1 : 1;
+    return (x->part > y->part) - (x->part < y->part);
+}
+
+static double middle_of(const ebpo_haptic_part *part, int axis)
+{
+    return part->extent.min[axis] / 2 + part->extent.max[axis] / 2;
+}
+
+/* Returns the Morton code of the middle of an instance; all middles are from `low` to `high`. */
+static uint64_t curve_code(const ebpo_haptic_part *part, const double low[3], const double high[3])
+{
+    enum { BITS = 21 };
+    uint64_t code = 0;
+    for (int i = 0; i < 3; i++) {
+        double size = high[i] - low[i];
+        double share = size > 0 ? (middle_of(part, i) - low[i]) / size : 0;
+        uint64_t cell = (uint64_t)(share * ((1 << BITS) - 1));
+        for (int k = 0; k < BITS; k++)
+            code |= (cell >> k & 1) << (3 * k + i);
+    }
+    return code;
+}
+
+/* Sets t->order. */
+static ebpo_status sort_parts(ebpo_haptic *t, ebpo_error *error)
+{
+    double low[3], high[3];
+    uint64_t count = t->part_count;
+    curve_place *place = ebpo_alloc(count, sizeof *place);
+    t->order = ebpo_alloc(count, sizeof *t->order);
+    if (!place || !t->order) {
+        free(place);
+        return ebpo_fail_memory(error, count * (sizeof *place + sizeof *t->order));
+    }
+    for (int i = 0; i < 3; i++) {
+        low[i] = high[i] = middle_of(&t->part[0], i);
+        for (uint64_t k = 1; k < count; k++) {
+            low[i] = fmin(low[i], middle_of(&t->part[k], i));
+            high[i] = fmax(high[i], middle_of(&t->part[k], i));
+        }
+    }
+    for (uint64_t k = 0; k < count; k++)
+        place[k] = (curve_place){ curve_code(&t->part[k], low, high), (uint32_t)k };
+    qsort(place, count, sizeof *place, compare_places);
+    for (uint64_t k = 0; k < count; k++)
+        t->order[k] = place[k].part;
+    free(place);
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_haptic_parts_new(ebpo_haptic *t, const ebpo_haptic_instance *instances,
                                   uint64_t count, bool posed, ebpo_error *error)
 {
@@ -103,7 +165,7 @@ ebpo_status ebpo_haptic_parts_new(ebpo_haptic *t, const ebpo_haptic_instance *in
         status = make_part(t, &instances[i], posed, error);
         t->slack = fmax(t->slack, rounding_of(&t->part[i]));
     }
-    return status;
+    return status == EBPO_OK ? sort_parts(t, error) : status;
 }
 
 void ebpo_haptic_parts_free(ebpo_haptic *t)
@@ -117,6 +179,7 @@ void ebpo_haptic_parts_free(ebpo_haptic *t)
         free(t->known[i].side);
     free(t->models);
     free(t->part);
+    free(t->order);
 }
 
 void ebpo_haptic_part_point(const ebpo_haptic_part *part, const double w[3], double p[3],
@@ -152,10 +215,10 @@ ebpo_status ebpo_haptic_parts_load(ebpo_haptic *t, ebpo_face_box *box, const ebp
     *fits = true;
     ebpo_face_box_begin(box, ++t->serial, allowed, t->margin);
     for (uint64_t i = 0; i < t->part_count && status == EBPO_OK && *fits; i++) {
-        const ebpo_haptic_part *part = &t->part[i];
+        const ebpo_haptic_part *part = &t->part[t->order[i]];
         if (!part->is_posed || extents_overlap(&part->extent, &box->loaded))
             status = ebpo_face_box_add(box, part->of->loading, part->is_posed ? &part->posed : NULL,
-                                       (uint32_t)i, fits, error);
+                                       t->order[i], fits, error);
     }
     if (status == EBPO_OK && *fits)
         ebpo_face_box_end(box);

@@ -58,6 +58,7 @@ typedef struct ebpo_probe_query {
     double place[3];            /* the position */
     double distance;            /* distance from the nearest face, 0 or more; infinite if there are
                                  * no faces */
+    double uncertainty;         /* bound of the error of `distance` because of poses */
     double point[3], normal[3]; /* nearest point, and normal of its face */
     ebpo_probe_side *side;      /* [part_count] */
     bool valid;                 /* the results have been set */
@@ -67,6 +68,7 @@ struct ebpo_haptic {
     /* --- constant members --- */
     ebpo_haptic_model *models; /* [model_count] */
     ebpo_haptic_part *part;    /* [part_count] only probed_point changes, in haptic steps */
+    uint32_t *order; /* [part_count] the instances in the order in which they are loaded */
     uint64_t model_count, part_count;
     ebpo_haptic_options options;
     ebpo_extent root; /* contains all faces */

@@ -62,7 +62,8 @@ static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
 }
 
 /* Narrows the bounds by the newest exact result and the distance of its position from `place`.
- * Returns true if these positions are equal. */
+ * Returns true if these positions are equal and the result is accurate: far from a model whose
+ * pose is not exactly a rotation, it is not. */
 static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
                            bounds *b)
 {
@@ -73,10 +74,12 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     ebpo_vec3_subtract(place, known->place, motion);
     double far = sqrt(ebpo_vec3_dot(motion, motion)),
            rounding = rounding_of(t, far + known->distance);
+    bool accurate = known->uncertainty <= 4 * rounding;
+    rounding += known->uncertainty;
     narrow_bounds(b, known->distance - far - rounding, known->distance + far + rounding);
     if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
         ebpo_vec3_copy(known->normal, out->normal);
-    return far == 0;
+    return far == 0 && accurate;
 }
 
 /* Narrows the bounds by the upper levels of the octrees. An instance whose box is farther away than

@@ -282,6 +282,30 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
 
 static bool is_scene(const char *name) { return words_end_with(name, ".json"); }
 
+/* Fails if the record would overwrite the file of a model of the scene. */
+static ebpo_status check_models(const job *j, uint64_t model_count, ebpo_error *error)
+{
+    const char *slash = strrchr(j->name, '/');
+    for (uint64_t i = 0; j->v->record && i < model_count; i++) {
+        ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
+        char *path = NULL;
+        (void)ebpo_scene_get_model_facts(j->scene, i, &model);
+        if (asprintf(&path, "%.*s%s", slash ? (int)(slash - j->name) + 1 : 0, j->name, model.path) <
+            0)
+            return no_memory(error, "the paths of the models");
+        bool same = command_same_file(path, j->v->record);
+        free(path);
+        if (!same)
+            continue;
+        *error = (ebpo_error){ .status = EBPO_E_ARGUMENT };
+        snprintf(error->message, sizeof error->message,
+                 "%.200s: is both a model of the scene and output; choose another output",
+                 j->v->record);
+        return EBPO_E_ARGUMENT;
+    }
+    return EBPO_OK;
+}
+
 /* Sets the poses and models of all instances, at the first time of the scene. */
 static ebpo_status get_instances(job *j, double time, ebpo_error *error)
 {
@@ -308,6 +332,9 @@ static ebpo_status open_scene(job *j, uint64_t memory, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     (void)ebpo_scene_get_counts(j->scene, &counts);
+    status = check_models(j, counts.models, error);
+    if (status != EBPO_OK)
+        return status;
     if (counts.instances == 0) {
         *error = (ebpo_error){ .status = EBPO_E_ARGUMENT };
         snprintf(error->message, sizeof error->message, "%.200s: the scene has no instances",
@@ -656,6 +683,11 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
                              model);
     if (is_scene(model) && !v->path && !v->device)
         return command_usage("haptic", "%s: a scene needs --path or --device", model);
+    if (is_scene(model) && v->remote.compat)
+        return command_usage("haptic",
+                             "%s: --compat cannot be used with a scene; rewrite its models with "
+                             "`ebpo repack --compat`",
+                             model);
     if (v->path && v->seconds != 10)
         return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
                                        "its last position");

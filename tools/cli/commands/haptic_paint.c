@@ -73,6 +73,7 @@ struct haptic_paint {
     bool pressed;                /* the brush has painted in this contact, at `print` */
     haptic_sample print;         /* the last step in which the brush has painted */
     double print_pressure;
+    uint64_t print_size;      /* number of points of the last print */
     double print_time;        /* when the brush has painted last, or has found no surface */
     ebpo_paint_point *prints; /* [print_count], at most PRINT_POINTS: the brush's last stroke */
     uint64_t print_count;
@@ -102,6 +103,7 @@ struct haptic_paint {
     haptic_painted result;
     pthread_t saver, syncer;
     atomic_bool unsynced; /* the file was saved, and not synced since then */
+    atomic_bool again;    /* a sync has failed, so the file must be saved again */
     atomic_bool ended;
 };
 
@@ -157,16 +159,18 @@ static ebpo_status copy_strokes(haptic_paint *p, ebpo_error *error)
     return status;
 }
 
-/* Saves the paint if it has changed. Reports the first of successive failures. */
+/* Saves the paint if it has changed, or if its file could not be synced. Reports the first of
+ * successive failures. */
 static ebpo_status save_paint(haptic_paint *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t begin = tool_clock();
+    bool again = atomic_exchange(&p->again, false);
     lock_paint(p);
     ebpo_status status = p->changes == p->saved_changes ? EBPO_OK : copy_strokes(p, &error);
     bool changed = p->changes != p->saved_changes;
     unlock_paint(p);
-    if (!changed)
+    if (!changed && !again)
         return EBPO_OK;
     if (status == EBPO_OK)
         status = ebpo_paint_checkpoint(p->saved, &error);
@@ -188,6 +192,8 @@ static ebpo_status save_paint(haptic_paint *p)
                 error.message);
     p->save_error = error;
     p->result.failed_saves++;
+    if (again)
+        atomic_store(&p->again, true);
     return status;
 }
 
@@ -228,9 +234,11 @@ static ebpo_status sync_paint(haptic_paint *p, ebpo_error *error)
         snprintf(folder, sizeof folder, "%.*s", (int)(slash - p->pen.path) + 1, p->pen.path);
     if (sync_path(p->pen.path) && sync_path(folder))
         return EBPO_OK;
+    int number = errno;
+    atomic_store(&p->again, true);
     *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
     snprintf(error->message, sizeof error->message, "%.200s: could not be synced to the disk: %s",
-             p->pen.path, strerror(errno));
+             p->pen.path, strerror(number));
     return EBPO_E_IO;
 }
 
@@ -243,7 +251,8 @@ static void *sync_often(void *user)
         if (sync_paint(p, &error) == EBPO_OK || failed)
             continue;
         failed = true;
-        fprintf(stderr, "ebpo haptic: %s; the device continues\n", error.message);
+        fprintf(stderr, "ebpo haptic: %s; the device continues, and the paint is saved again\n",
+                error.message);
     }
     return NULL;
 }
@@ -464,9 +473,9 @@ static ebpo_status add_prints(haptic_paint *p, ebpo_error *error)
     return status;
 }
 
-/* Adds a print to the stroke of the brush, or begins a stroke. Returns true if points were added.
- * The caller has the lock. */
-static bool add_print(haptic_paint *p, const haptic_sample *sample, double pressure)
+/* Adds a print of at least `least` points to the stroke of the brush, or begins a stroke. Returns
+ * true if points were added. The caller has the lock. */
+static bool add_print(haptic_paint *p, const haptic_sample *sample, double pressure, uint64_t least)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     if (p->print_count + HAPTIC_BRUSH_MAX > PRINT_POINTS)
@@ -477,9 +486,11 @@ static bool add_print(haptic_paint *p, const haptic_sample *sample, double press
     ebpo_status status = begin_contact(p, &error);
     if (status == EBPO_OK)
         status = take_print(p, sample, pressure, &error);
-    if (status != EBPO_OK)
+    if (status != EBPO_OK || p->print_count - before < least)
         p->print_count = before;
     bool added = p->print_count > before;
+    if (added)
+        p->print_size = p->print_count - before;
     bool removed = before > 0 && info_of(p->drawn).stroke_count == p->finished;
     if (status == EBPO_OK && (added || removed)) /* removed: by replace_stroke */
         status = add_prints(p, &error);
@@ -500,15 +511,16 @@ static double brush_motion(const haptic_paint *p, const haptic_sample *to)
     return sqrt(square) + 2 * p->arm * acos(fmin(1, fabs(cosine)));
 }
 
-/* Paints with the brush if it has moved by a step, or is pressed harder by a level of opacity,
- * since it painted last. The caller has the lock. */
+/* Paints with the brush if it has moved by a step, is pressed harder by a level of opacity, or is
+ * pressed in further by a step and with more points, since it painted last. The caller has the
+ * lock. */
 static void press_brush(haptic_paint *p, const haptic_sample *sample)
 {
     ebpo_paint_input next = input_of(p, sample);
     double step = fmax(p->pen.pen.radius / 2, p->step_least);
-    if (sample->time < p->print_time + PRINT_MS ||
-        (p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
-         brush_motion(p, sample) < step))
+    bool stays = p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
+                 brush_motion(p, sample) < step;
+    if (sample->time < p->print_time + PRINT_MS || (stays && sample->depth < p->print.depth + step))
         return;
     memcpy(next.place, sample->proxy, sizeof next.place);
     int level = next_level(p, &next);
@@ -516,7 +528,12 @@ static void press_brush(haptic_paint *p, const haptic_sample *sample)
         (void)replace_stroke(p, &next, level);
     move_pen(p, &next, level);
     p->print_time = sample->time;
-    if (!add_print(p, sample, next.pressure))
+    uint64_t least = 1;
+    if (stays) {
+        p->print.depth = sample->depth;
+        least = p->print_size < HAPTIC_BRUSH_MAX ? p->print_size + 1 : HAPTIC_BRUSH_MAX;
+    }
+    if (!add_print(p, sample, next.pressure, least))
         return;
     p->print = *sample;
     p->print_pressure = next.pressure;
