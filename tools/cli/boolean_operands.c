@@ -66,16 +66,17 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
                       const ebpo_model_options *model_options, const remote_values *remote)
 {
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     ebpo_error error = EBPO_ERROR_INIT;
+    uint32_t count = 0;
     load.memory = model_options->memory * in->count;
+    load.cut_level = model_options->cut_level;
     load.max_expansion = (uint64_t)remote->max_expansion;
     ebpo_status status = ebpo_scene_load(in->scene, &load, &error);
-    for (uint32_t i = 0; i < in->count && status == EBPO_OK; i++) {
-        ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
-        (void)ebpo_scene_get_instance(in->scene, i, &instance);
-        status =
-            ebpo_scene_model(in->scene, instance.model, &o->operand[in->first + i].model, &error);
-    }
+    if (status == EBPO_OK)
+        status = ebpo_boolean_get_operands(in->scene, 0, operand, BOOLEAN_OPERANDS, &count, &error);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
+        o->operand[in->first + i].model = operand[i].model; /* poses may be those of --pose */
     return status == EBPO_OK ? EXIT_OK : command_failed(name, &error);
 }
 

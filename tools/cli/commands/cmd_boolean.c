@@ -424,13 +424,9 @@ static int check_values(const values *v, const boolean_operands *operands)
                              "--output '%s': expected a name that ends with .ply or "
                              ".ebpo.h5",
                              v->out);
-    for (uint32_t i = 0; i < operands->inputs; i++) {
-        const boolean_input *in = &operands->input[i];
-        if (v->out && command_overwrites("boolean", in->path, v->out))
+    for (uint32_t i = 0; i < operands->inputs; i++)
+        if (v->out && command_overwrites("boolean", operands->input[i].path, v->out))
             return EXIT_USAGE;
-        if (in->scene && v->query.cut_level >= 0)
-            return command_usage("boolean", "--cut-level does not apply to scenes");
-    }
     return EXIT_OK;
 }
 
