@@ -86,9 +86,16 @@ static int open_model(boolean_operands *o, const char *name, boolean_input *in,
                       const ebpo_model_options *model_options, const remote_values *remote)
 {
     const ebpo_model_options any_level = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options options = *model_options;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
     int code = query_open_file(&in->session, name, in->path, &any_level, -1, remote);
+    if (code == EXIT_OK && o->raises_memory &&
+        ebpo_model_memory(in->session.file, &any_level, &plan, &error) == EBPO_OK &&
+        options.memory < 2 * plan.least)
+        options.memory = 2 * plan.least;
     if (code == EXIT_OK)
-        code = query_open_model(&in->session, name, model_options);
+        code = query_open_model(&in->session, name, &options);
     o->operand[in->first].model = in->session.model;
     return code;
 }

@@ -24,6 +24,7 @@ typedef struct boolean_operands {
     ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
     uint32_t count;                      /* number of operands */
+    bool raises_memory; /* large models may use more memory than model_options.memory */
 } boolean_operands;
 
 /* Lists the operands in the order of the paths, which end with NULL. A path is a model, or a scene

@@ -482,8 +482,8 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
 static const values standard = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
 
 /* Default memory in bytes for each model with --changed-only, which reads only a part of operand A.
- */
-static const uint64_t changes_memory = UINT64_C(256) << 20;
+ * Models that fit in this memory are read completely, so it is small. */
+static const uint64_t changes_memory = UINT64_C(16) << 20;
 
 /* Opens the models, and evaluates the expression. */
 static int run_expression(const values *v, const char *expression, boolean_operands *operands,
@@ -506,7 +506,9 @@ static int run_expression(const values *v, const char *expression, boolean_opera
     int code = check_values(v, operands);
     if (code == EXIT_OK)
         code = limit_memory(v, operands->count, &model_options, &workspace);
-    if (v->changed_only && model_options.memory == 0 && model_options.cut_level < 0)
+    operands->raises_memory =
+        v->changed_only && model_options.memory == 0 && model_options.cut_level < 0;
+    if (operands->raises_memory)
         model_options.memory = changes_memory;
     if (code == EXIT_OK)
         code = boolean_operands_open(operands, "boolean", &model_options, &v->query.remote);
