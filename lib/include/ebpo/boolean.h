@@ -103,10 +103,12 @@ typedef struct ebpo_boolean ebpo_boolean;
  * outlive the expression.
  *
  * EBPO_E_ARGUMENT: an index is out of range; a node refers to itself or to a later node; an
- * operation, box, plane or pose (ebpo_pose_check) is not valid; or there is a complement, but no
- * box. EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
- * surface. EBPO_E_ABSENT: an operand's file has no mesh. EBPO_E_IO: `temp_dir` cannot hold files.
- * Messages give the index of the node, or the number of the operand (from 1 on) and its file.
+ * operation, box, plane or pose (ebpo_pose_check) is not valid; there is a complement, but no box;
+ * or operands that the expression uses have different units (an operand without a unit may be
+ * combined with every unit). EBPO_E_LIMIT: there are no operands or nodes, or too many.
+ * EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no mesh.
+ * EBPO_E_IO: `temp_dir` cannot hold files. Messages give the index of the node, or the number of
+ * the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
@@ -461,8 +463,8 @@ typedef struct ebpo_boolean_mesh_report {
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
  *
- * EBPO_E_ARGUMENT: operands have different units. Also if `changed_only` is true and one of these
- * conditions is met: the expression does not use operand 0; `volume` is true; `attributes` is true.
+ * EBPO_E_ARGUMENT: `changed_only` is true, and one of these conditions is met: the expression does
+ * not use operand 0; `volume` is true; `attributes` is true.
  * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices.
  * EBPO_E_FORMAT: an operand is not closed, although its file says that it is a solid.
  * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 is cut or reversed where its faces
