@@ -361,15 +361,15 @@ static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress 
     return status;
 }
 
-static int make_cells(const values *v, const boolean_operands *operands, ebpo_workspace *workspace,
-                      ebpo_boolean *b)
+static int make_cells(const values *v, const boolean_nodes *nodes, const boolean_operands *operands,
+                      ebpo_workspace *workspace, ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     cell_result a = { .v = v,
                       .operands = operands,
                       .output = { .path = v->out,
-                                  .unit = boolean_operands_unit(operands),
+                                  .unit = boolean_operands_unit(operands, nodes),
                                   .threads = (unsigned)v->query.threads,
                                   .doubles = v->doubles,
                                   .volume = v->volume,
@@ -424,10 +424,7 @@ static int check_values(const values *v, const boolean_operands *operands)
                              "--output '%s': expected a name that ends with .ply or "
                              ".ebpo.h5",
                              v->out);
-    for (uint32_t i = 0; i < operands->inputs; i++)
-        if (v->out && command_overwrites("boolean", operands->input[i].path, v->out))
-            return EXIT_USAGE;
-    return EXIT_OK;
+    return v->out && boolean_operands_overwrite(operands, "boolean", v->out) ? EXIT_USAGE : EXIT_OK;
 }
 
 /* Reads the box and the planes to which the result is cut. */
@@ -457,8 +454,8 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
     if (ebpo_boolean_new(operands->operand, operands->count, nodes->node, nodes->count,
                          boolean_options, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code =
-        v->inside || v->distance ? query_points(v, b) : make_cells(v, operands, workspace, b);
+    int code = v->inside || v->distance ? query_points(v, b)
+                                        : make_cells(v, nodes, operands, workspace, b);
     ebpo_boolean_free(b);
     return code;
 }
