@@ -460,6 +460,9 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
     return code;
 }
 
+/* Memory in bytes that each model may use in any case. Budgets below 3 MiB are refused. */
+static const uint64_t least_memory = UINT64_C(4) << 20;
+
 /* If the exact result is written with --memory or --temp-dir, makes the workspace. With --memory,
  * sets the limit of each model; all models together may use a quarter of the memory. */
 static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
@@ -472,6 +475,8 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;
     model_options->memory /= 4 * count;
+    if (model_options->memory < least_memory)
+        model_options->memory = least_memory;
     return memory_new(out, &memory, &error) == EBPO_OK ? EXIT_OK
                                                        : command_failed("boolean", &error);
 }
