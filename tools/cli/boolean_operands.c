@@ -73,6 +73,7 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
     uint32_t count = 0;
     load.memory = model_options->memory * in->count;
     load.cut_level = model_options->cut_level;
+    load.threads = model_options->threads;
     load.max_expansion = (uint64_t)remote->max_expansion;
     ebpo_status status = ebpo_scene_load(in->scene, &load, &error);
     if (status == EBPO_OK)

@@ -368,8 +368,7 @@ typedef struct ebpo_load_options {
 
     /* As in ebpo_model_options, for all models that ebpo_scene_model makes after this call. */
     int cut_level;
-
-    uint32_t reserved;
+    unsigned threads;
 } ebpo_load_options;
 
 #define EBPO_LOAD_OPTIONS_INIT                                 \
