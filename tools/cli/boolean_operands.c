@@ -71,7 +71,8 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
     ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     ebpo_error error = EBPO_ERROR_INIT;
     uint32_t count = 0;
-    load.memory = model_options->memory * in->count;
+    /* raises_memory: the least memory of the models is not known before they are open */
+    load.memory = model_options->memory * in->count * (o->raises_memory ? 16 : 1);
     load.cut_level = model_options->cut_level;
     load.threads = model_options->threads;
     load.max_expansion = (uint64_t)remote->max_expansion;
